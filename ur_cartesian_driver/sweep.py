@@ -186,8 +186,8 @@ def sweep(
     """
     Plan goals in parallel, and return their results in the order of the goals.
 
-    A goal that is refused, or whose planning fails, does not affect the others. Neither does one
-    that ends its process, unless ``executor`` is given: if that breaks, the goals left fail, too.
+    A goal that is refused, or whose planning fails, does not affect the others. Neither does a
+    goal that ends its process, unless ``executor`` is given: if this breaks, all goals left fail.
 
     :param goals: variants, or goals and paths for a UR5e in its home position.
     :param executor: runs the planning, and is not shut down; None = a process for each core.
@@ -390,7 +390,7 @@ def _grid(
     """
     Return the axes of a map, their values, and the worst margin of each cell.
 
-    A margin of -inf means that a variant of the cell is refused; NaN, that the cell has none.
+    -inf means that a variant of the cell is refused; NaN, that no margin of the cell is known.
     """
     names = _axes(results)
     values: list[list[Coordinate]] = [
@@ -414,6 +414,8 @@ def _order(value: Coordinate) -> tuple[int, Coordinate]:
 def heat_map(results: Sequence[SweepResult], column: str = 'singularity') -> str:
     """
     Return a map as text over the two coordinates with the most values; ``x`` = refused.
+
+    The text is empty if the variants have no coordinates.
 
     :param column: joint_limit, singularity, speed, clearance or duration; each cell shows the
         least value of its variants.

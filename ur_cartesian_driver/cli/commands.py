@@ -137,7 +137,7 @@ def _note_place(arguments: argparse.Namespace, result: Any, left: Any) -> None:
     outcome = outcome_of(result)
     place = outcome.stopped
     if place is None and not outcome.succeeded:
-        return  # nothing has moved, so the place noted before is still right
+        return  # nothing has moved, or the place is not known: an earlier note stays
     if place is not None and left is not None:
         place = left.original(place)
     if place is not None:

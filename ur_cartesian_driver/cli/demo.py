@@ -238,7 +238,7 @@ def _free_port_options(*names: str) -> Sequence[str]:
 
 
 def _environment() -> dict[str, str]:
-    """Return an environment in which processes find only each other; set variables are kept."""
+    """Return an environment in which processes find only each other; existing values stay."""
     return {
         'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
         'ROS_DOMAIN_ID': str(1 + os.getpid() % 100),

@@ -99,7 +99,7 @@ class Driver(RobotServices, InteractiveMotions):
             motion = driver.start(plan)  # returns at once
             outcome = motion.result()
 
-    :meth:`execute` does the last three in one call. Callbacks run on the driver's own reader
+    :meth:`execute` does the last three steps in one call. Callbacks run on the driver's own reader
     thread: keep them short.
     """
 

@@ -191,13 +191,13 @@ class Appender:
         if progress is not None:
             self._goal = without_passed(self._goal, progress.time)
             if cut_time(self._goal, new_points) < progress.time:
-                # Motion that was sent to the robot and not carried out yet is final too.
+                # Motion that was sent and not yet carried out cannot be replaced either.
                 ahead = progress.buffered if isnan(progress.lag) else progress.lag
                 raise AlreadySent(*first_replaceable(self._goal, progress.time + ahead))
         return self._goal
 
     def _is_at_rest(self) -> bool:
-        """Return whether the newest report has the arm at rest after all points of the goal."""
+        """Return whether the arm rests after the goal's last point, by the newest report."""
         progress = self._progress()
         return (
             progress is not None
@@ -275,7 +275,7 @@ def _from_rest(timed: bool) -> str:
     """
     Return the sentence about points that continue from rest.
 
-    The sentence does not say how much later: the arm may have waited, and may still wait.
+    It does not say by how much the points are late: the arm may have waited, or may still wait.
     """
     clause = ', later than their times say' if timed else ''
     return f' The motion had come to rest before them, and goes on from there{clause}.'

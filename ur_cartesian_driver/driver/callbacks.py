@@ -14,7 +14,7 @@ T = TypeVar('T')
 
 
 def run_callback(callback: Callable[[T], None], argument: T) -> None:
-    """Call user code; an exception of it is logged, and does not end the driver's thread."""
+    """Call user code; an exception that it raises is logged, and does not end the thread."""
     try:
         callback(argument)
     except Exception as error:

@@ -157,7 +157,7 @@ class InteractiveMotions(ABC):
         """
         Return the newest state.
 
-        :raises RobotNotReady: the robot reports no state, or its program lacks the function.
+        :raises RobotNotReady: the robot reports no state, or runs another program than ours.
         """
         if not self.config.runs_own_program:
             raise RobotNotReady(

@@ -79,8 +79,8 @@ class MotionHandle:
         callbacks.
 
         :param waypoints: the points, with times from the start of the goal, in the goal's frame.
-        :param segments: none, or one for each point.
-        :param io_commands: outputs to switch; their waypoints count from the start of the goal.
+        :param segments: empty, or one for each point.
+        :param io_commands: outputs to switch; their waypoint indices are those of the whole goal.
         :param last: whether no more points follow, so that the arm comes to rest at the last one.
             If ``waypoints`` is empty, the arm comes to rest at the planned ending, which for a
             spline is after its last point.
@@ -89,8 +89,8 @@ class MotionHandle:
         :param replace_from_time: an alternative to ``replace_from_point``: the time [s], since the
             start of the goal, from which the new points replace the old ones. The motion goes on
             from its place at that time to the first new point.
-        :raises AlreadySent: the tail to replace is final; the error gives the first point and time
-            that can still be replaced.
+        :raises AlreadySent: the tail can no longer be replaced, because it was passed or
+            sent; the error gives the first point and time that still can be.
         :raises GoalRefused: a check or the robot loop refused the points, as the text explains; no
             point was accepted, and the goal goes on.
         """

@@ -65,7 +65,7 @@ def _rows(rows: GoalRows[Any]) -> list[Fields]:
 
 
 def _write(each: GoalField, value: Any, fields: Fields) -> None:
-    """Add a value to ``fields``, unless it is its field's default (NaN never is) and optional."""
+    """Add a value to ``fields``, unless it is the default of an optional field (NaN never is)."""
     default = each.default if each.has_default else 0
     if value == default and not each.is_always_sent:
         return

@@ -50,8 +50,9 @@ class ImportFormat:
 
     #: Reads a file; raises BrokenFile, ImportError if a package is missing, or OSError.
     collect: Callable[[Path, ImportOptions, PathCollector], None]
-    #: For the documentation: the terms that the reader knows; a sentence on all other terms.
+    #: The terms that the reader knows.
     terms: Mapping[str, Term] = field(default_factory=dict)
+    #: A sentence of the documentation on all other terms.
     others: str = ''
 
 

@@ -72,7 +72,7 @@ def parse_code_output(text: str) -> tuple[str, CodeOutput]:
     """
     Return code and output of ``M3=standard:2:1``, ``M280 S40=tool:0:1`` or ``S=analog:0:10000``.
 
-    :raises ValueError: the text is none of these.
+    :raises ValueError: the text has none of these forms.
     """
     try:
         code, rest = text.upper().split('=')
@@ -134,8 +134,8 @@ class ImportOptions:
     approach_time: float | None = None
     #: Blend radius [m] at inner points for which the file has none; smaller where lines are short.
     blend: float = 0.0
-    #: How far the path may be beside the corners of lines and arcs [m] unless the file has it; 0 =
-    #: the arm stops there, or passes with a blend.
+    #: Largest distance [m] of the path from the corners of lines and arcs for which the file has
+    #: none; 0 = the arm stops at these corners, or passes them with a blend.
     corner: float = 0.0
     #: Largest distance of the simplified path from that of the file [m]; 0 = all points are kept.
     simplify: float = 0.0
@@ -154,7 +154,7 @@ class ImportOptions:
         """
         Refuse a corner that no goal can have.
 
-        :raises ValueError: it is out of its range, or a blend is given, too.
+        :raises ValueError: the corner is out of its range, or a blend is given, too.
         """
         if not CORNER_DEVIATION.holds(self.corner):
             raise ValueError(f'corner {CORNER_DEVIATION.refusal(self.corner)[0]}')

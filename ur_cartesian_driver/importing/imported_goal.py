@@ -158,9 +158,9 @@ def _scaled(path: ImportedPath, scale: float) -> ImportedPath:
 
 def _rounded(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) -> ImportedPath:
     """
-    Return the path with a corner at each point if it has rounded corners, else with none.
+    Return the path with a corner at every point if any is rounded, else with no corners.
 
-    :raises BrokenFile: a motion that is no line or arc leads to a point.
+    :raises BrokenFile: a corner is rounded, but a motion is neither a line nor an arc.
     """
     corners, lines = path.corners.copy(), path.lines
     if options.blend:
@@ -192,7 +192,7 @@ def _rounded(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) -
 
 
 def _common_corner(path: ImportedPath, options: ImportOptions) -> float:
-    """Return the corner of the goal [m], from which points can differ, but not to a stop."""
+    """Return the corner of the whole goal [m]; 0 if a point stops, which no point can demand."""
     return options.corner if (path.corners > 0.0).all() else 0.0
 
 
@@ -335,7 +335,8 @@ def _lifted(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) ->
                 int(path.lines[row]), 'a contour begins elsewhere', 'straight to it, without lift'
             )
         return path
-    # Such a row becomes three: up from the previous point, across, and down to the row's point.
+    # The row of such a contour becomes three: up from the previous point, across, and down to
+    # the row's point.
     count = np.ones(len(path), dtype=np.int64)
     count[rows] = 3
     order = np.repeat(np.arange(len(path)), count)
@@ -413,7 +414,7 @@ def _blends(
     fits = radii.copy()
     fits[1:] = np.minimum(fits[1:], _BLEND_SHARE * lengths)
     fits[:-1] = np.minimum(fits[:-1], _BLEND_SHARE * lengths)
-    # The first line begins where the arm is, which is unknown: its length limits no blend.
+    # The first line begins at the arm, whose position is unknown, so its length limits no blend.
     special = np.isin(path.types, (SegmentType.CIRCULAR, SegmentType.PROCESS))
     special[:-1] |= special[1:]
     rates = np.where(speeds > 0.0, speeds, _UNKNOWN_SPEED)

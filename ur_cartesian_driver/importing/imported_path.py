@@ -36,8 +36,8 @@ _OPTIONAL = {
     'times': 1,
     'dwells': 1,
 }
-#: Largest distance [m] of a point from the origin; no arm reaches farther. A larger one means, for
-#: example, that millimetres were read as metres.
+#: Largest distance [m] of a point from the origin; no arm reaches farther. A larger distance
+#: means, for example, that millimetres were read as metres.
 MAX_DISTANCE = 20.0
 UNKNOWN3: Vector3 = (nan, nan, nan)
 #: Two points are the same if they are less than this distance [m] apart and their orientations
@@ -52,9 +52,9 @@ class BrokenFile(ValueError):
         """
         Put the line before the text of the message.
 
-        :param line: the line at fault; 0 = none.
+        :param line: the line at fault; 0 = no particular line.
         :param text: a sentence without a full stop.
-        :param unit: the word for what ``line`` counts, if the file has no lines.
+        :param unit: the word for the parts that ``line`` numbers, if the file has no lines.
         """
         super().__init__(f'{unit} {line}: {text}.' if line else f'{text}.')
         self.line = line
@@ -102,7 +102,7 @@ class ImportNotes:
     """Collects remarks; equal remarks are merged into one with all their lines."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Begin with no remarks."""
         self._lines: dict[tuple[str, str], set[int]] = {}
 
     def add(self, line: int, what: str, why: str) -> None:
@@ -132,20 +132,23 @@ class ImportedPath:
     lines: Int64s
     #: (n,) numbers of :class:`~ur_cartesian_driver.motion.goal.goal.SegmentType`.
     types: Int64s
-    #: (n,) whether the motion is only travel; whether the tool has to be lifted for the motion.
+    #: (n,) whether the motion is only travel.
     travels: Flags
+    #: (n,) whether the tool has to be lifted for the motion.
     lifts: Flags
     #: (n,) numbers of :class:`~ur_cartesian_driver.motion.goal.goal.ArcMode`.
     arc_modes: Int64s
-    #: (n, 3) points on arcs; (n, 4) unit quaternions of the tool; (n, 3) normals of the surface.
+    #: (n, 3) a point on each arc.
     vias: Floats
+    #: (n, 4) unit quaternions of the tool.
     quaternions: Floats
+    #: (n, 3) normals of the surface.
     normals: Floats
     #: (n,) numbers in each of the following columns.
     speeds: Floats
     accelerations: Floats
     blends: Floats
-    #: How far the path may be beside the corner at the point; 0 = the arm stops there.
+    #: Largest distance of the path from the corner at the point; 0 = the arm stops there.
     corners: Floats
     times: Floats
     #: (n,) time for which the arm rests at the row's point.
@@ -169,11 +172,11 @@ class ImportedPath:
 
     @property
     def is_rounded(self) -> bool:
-        """Whether the path may be beside a corner."""
+        """Whether any corner of the path is rounded."""
         return bool((self.corners > 0.0).any())
 
     def take(self, rows: Int64s) -> ImportedPath:
-        """Return some rows, in rising order; outputs of other rows move to the kept row before."""
+        """Return some rows, in rising order; other outputs move to the kept row before."""
         new_row = {int(row): i for i, row in enumerate(rows)}
         return replace(
             self,

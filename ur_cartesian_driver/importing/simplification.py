@@ -3,15 +3,15 @@
 """
 Fewer points: sequences of short lines become long lines and arcs.
 
-The tolerance holds in both directions: it bounds the distance of each place of the old path from
-the new one, and of each place of the new path from the old one. A new line is within the tolerance
-if the left-out points are, because both paths are straight between these. A new arc is compared
-with the left-out points, and with the place of each short line that is nearest to the arc's
-centre. Along the old path the angle about that centre only grows, so every place of the arc has a
-place of the old path beside it.
+A line here is a straight piece of the path. The tolerance bounds the distance of any position on
+the old path from the new path, and vice versa. A new line is within the tolerance if the points
+that it leaves out are, because both paths are straight between these points. For a new arc, two
+kinds of positions on the old path are checked: the points left out, and on each short line the
+position nearest to the arc's centre. (Along the old path the angle about this centre only grows,
+so the old path is near every position on the arc.)
 
-A point stays if it has an output, a posture, another speed or another corner, or if the tool
-turns unevenly there.
+A point is kept if an output, wait, dwell or posture belongs to it, if speed, acceleration or
+corner change after it, or if leaving it out would turn the tool by more than `MAX_TURN` there.
 """
 
 from __future__ import annotations
@@ -77,9 +77,9 @@ def simplify(path: ImportedPath, tolerance: float, orientations: Floats) -> Impo
 
 def farthest_row(start: int, first: int, stop: int, holds: Callable[[int, int], object]) -> int:
     """
-    Find a far row to which a piece is possible, by doubling the step and then bisecting.
+    Return a far row to which a piece is possible, by doubling the step and then bisecting.
 
-    :param first: the nearest row to try; if it is not possible, return the row after ``start``.
+    :param first: the nearest row to try; if no piece leads to it, the result is ``start`` + 1.
     :param holds: returns whether a piece from one row to another is possible.
     """
     if not holds(start, first):
@@ -102,7 +102,11 @@ def farthest_row(start: int, first: int, stop: int, holds: Callable[[int, int], 
 
 
 def _ends_of_runs(path: ImportedPath) -> list[int]:
-    """Return the rows after the first that must stay; only lines of one kind are between them."""
+    """
+    Return the rows, apart from row 0, that have to be kept.
+
+    The rows between two of them are ends of lines with equal speed, acceleration and corner.
+    """
     stays = path.rests
     stays[-1] = True
     lines = np.isin(path.types, (SegmentType.AUTO, SegmentType.LINEAR)) & ~path.lifts
@@ -139,7 +143,7 @@ class _Simplifier:
         return _Piece(end, via)
 
     def _first_test(self) -> Flags:
-        """Return for each row whether the next point could be left out: a quick test for all."""
+        """Return for each row whether the point after it might be left out, by a quick test."""
         a, b, c = self.points[:-2], self.points[1:-1], self.points[2:]
         chord = c - a
         square = np.einsum('ij,ij->i', chord, chord)
@@ -156,7 +160,7 @@ class _Simplifier:
             return False
         along = (between - a) @ chord / length**2
         off = between - a - along[:, None] * chord
-        # If a point lies beyond an end, the old path goes back and forth there.
+        # If a point is outside the stretch from a to the end, the old path goes back and forth.
         if along.min() < 0.0 or along.max() > 1.0:
             return False
         if np.einsum('ij,ij->i', off, off).max() > self.tolerance**2:
@@ -188,7 +192,7 @@ class _Simplifier:
             return None
         if radius * (1.0 - np.cos(sweep / 2.0)) < _MIN_HEIGHT:
             return None
-        # Each short line comes nearest to the centre between its ends, or at one of them.
+        # On each short line, find the position nearest to the centre.
         flat = np.stack((x, y), axis=1)
         d = flat[1:] - flat[:-1]
         share = -np.einsum('ij,ij->i', flat[:-1], d) / np.einsum('ij,ij->i', d, d)

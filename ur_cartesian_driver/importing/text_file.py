@@ -10,8 +10,8 @@ import re
 
 from ur_cartesian_driver.importing.imported_path import BrokenFile
 
-# str.splitlines() also splits at form feeds, 0x85 and U+2028. These end a line in no format, so
-# the numbers of all later lines would be wrong.
+# Used in place of str.splitlines(), which also splits at form feeds, 0x85 and U+2028. No format
+# ends a line at these, so the numbers of all later lines would be wrong.
 _LINE_END = re.compile(r'\r\n|\n|\r')
 # The UTF-32 marks come first, because one of them begins with a UTF-16 mark.
 _MARKS = (
@@ -25,7 +25,9 @@ _MARKS = (
 
 def file_text(path: Path) -> str:
     """
-    Return the text of a file: UTF-8, UTF-16 or UTF-32 by its mark, or Windows-1252.
+    Return the text of a file in the encoding of its byte order mark.
+
+    Without a mark, the encoding is UTF-8 or, if the text is not UTF-8, Windows-1252.
 
     :raises BrokenFile: the file is binary.
     :raises OSError: the file cannot be opened.
@@ -56,8 +58,8 @@ def _by_code_page(data: bytes, code_page: str) -> str:
     try:
         return data.decode(code_page)
     except (LookupError, UnicodeDecodeError):
-        # Old programs name the code page of their Windows. Windows-1252 lacks five bytes, such as
-        # 0x81, which Latin-1 has.
+        # The code page (named by an old program) is unknown or wrong. Use Windows-1252 or,
+        # if there is a 0x81, which Windows-1252 lacks, Latin-1.
         return data.decode('latin-1' if b'\x81' in data else 'cp1252', errors='replace')
 
 

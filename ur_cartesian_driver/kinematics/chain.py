@@ -5,8 +5,8 @@ Forward kinematics and Jacobian of one arm, nominal or calibrated.
 
 Callers need one pose (each control cycle, each step of an iteration) or ten thousand (a sampled
 path). The same formulas take floats or arrays, so the two cases cannot differ. They use no
-matrices: a float operation takes a few hundredths of a microsecond, a small array a hundred times
-that.
+matrices: an operation on floats takes a few hundredths of a microsecond, one on small arrays a
+hundred times that.
 """
 
 from __future__ import annotations
@@ -47,10 +47,11 @@ class _Link:
 class ChainFramesOf(Generic[N]):
     """Joint axes and flange frame in base, of one configuration or of a batch."""
 
-    #: Origin [m] and direction of each joint's axis.
+    #: Origin of each joint's axis [m].
     origins: tuple[tuple[N, N, N], ...]
+    #: Direction of each joint's axis.
     axes: tuple[tuple[N, N, N], ...]
-    #: Flange origin [m] and the directions of its axes x, y, z.
+    #: Origin of the flange [m]; the next three fields are the directions of the flange's axes.
     position: tuple[N, N, N]
     x: tuple[N, N, N]
     y: tuple[N, N, N]

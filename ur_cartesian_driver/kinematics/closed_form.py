@@ -42,7 +42,7 @@ class WristSolution(NamedTuple):
     theta6: float
     #: theta2 + theta3 + theta4.
     theta234: float
-    #: Position of wrist 1 relative to the shoulder, in the plane of the arm [m].
+    #: Position of wrist 1 relative to the shoulder, in the plane of the arm [m]; also ``up``.
     outward: float
     up: float
 
@@ -53,7 +53,7 @@ def closed_form(
     """
     Return every joint solution [rad], each angle within (-pi, pi].
 
-    :param wrist_3: position of wrist 3 where axes 4 and 6 are parallel [rad].
+    :param wrist_3: position of wrist 3 for solutions in which axes 4 and 6 are parallel [rad].
     :param misfit_factor: multiple of its misfit by which the ideal arm may be wrong. The real arm
         may reach poses that the ideal one does not; for these, both roots are returned as guesses.
     """
@@ -152,7 +152,7 @@ def _elbow_angles(
 
 
 def _roots(square: float, slack: float) -> tuple[float, ...]:
-    """Return both roots, positive first; slack makes a slightly negative square positive."""
+    """Return the roots, positive first; () if the square is below 0 by more than ``slack``."""
     if square < -max(slack, FLANGE_ROUNDING):
         return ()
     square = max(square, 0.25 * slack)

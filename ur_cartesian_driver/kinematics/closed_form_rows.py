@@ -36,7 +36,7 @@ class BranchMeasures:
     """
     Three signed measures per row: their signs identify the branch, a zero is a singularity.
 
-    For a calibrated arm, its ideal arm is measured, so they are exact to the misfit.
+    For a calibrated arm, its ideal arm is measured, so the measures are exact to its misfit.
     """
 
     #: Distance of the wrist centre in front of the plane of axes 1 and 2 [m]. The centre cannot

@@ -12,10 +12,10 @@ All joint housings are cylinders about their own joint's axis, and all tubes run
 So each end of a body is a point on an axis, and calibrated arms use the same table. The connector
 of the robot cable lies along y of ``base``, towards +y.
 
-The distance of two cylinders is at least their separation along any direction. To choose one, both
-axes are shortened at both ends by :data:`_CUT` radii, to skeletons. The direction between the
-nearest points of the skeletons gives a bound in closed form: the distance of these points, less
-the length by which each cylinder reaches beyond its skeleton in this direction.
+The distance of two cylinders is at least their separation along any direction. To choose a
+direction, both axes are shortened at both ends by :data:`_CUT` radii, to skeletons. The direction
+between the nearest points of the skeletons gives a bound in closed form: the distance of these
+points, less the length by which each cylinder reaches beyond its skeleton in this direction.
 """
 
 from __future__ import annotations
@@ -91,8 +91,8 @@ _REACH_SLACK = 0.02
 _PARALLEL = 1e-12
 _TINY = 1e-300
 
-#: Pairs of links that are checked. Neighbours share a joint that turns freely and are left out, as
-#: are pairs that cannot collide, as tests with the meshes show: forearm and wrist 2 (wrist
+#: Pairs of links that are checked. Neighbours share a joint that turns freely and are left out. So
+#: are pairs that, as tests with the meshes show, cannot collide: forearm and wrist 2 (wrist
 #: 3 collides first), wrist 1 and wrist 3 (d5 apart), wrist 2 and tool (the tool turns about the
 #: axis of wrist 3, and would have to pass through it). The upper arm turns past the round part of
 #: the base, so it is checked only against the connector of the base.
@@ -298,7 +298,7 @@ class CollisionBodies:
             yield link, start, end, radius
 
     def _lines(self, q: Floats) -> Floats:
-        """Return a point on each axis, and its direction (2, 3, axes, n)."""
+        """Return a point on each axis and the axis's direction, as one array (2, 3, axes, n)."""
         frames = self.arm.frames_rows(q)
         (zero, _, one), (x, z) = frames.axes[0], self._connector
         origins = [*frames.origins, (zero + x, zero, zero + z)]
@@ -340,8 +340,8 @@ def segment_gap(start_1: Floats, vector_1: Floats, start_2: Floats, vector_2: Fl
     """
     Return the vectors between the nearest points of pairs of segments, from second to first.
 
-    They minimize a convex quadratic form over the unit square (Ericson, Real-Time Collision
-    Detection, 5.1.9). Segments can be parallel, or points.
+    The nearest points minimize a convex quadratic form over the unit square (Ericson, Real-Time
+    Collision Detection, 5.1.9). Segments can be parallel, or have the length 0.
 
     :param start_1: (3, ...) [m]; the first segment ends at ``start_1 + vector_1``.
     """

@@ -6,7 +6,7 @@ Exact distances between the links of an arm, from the manufacturer's meshes.
 :mod:`~.link_shapes` knows the models that have meshes, and their files; pinocchio computes the
 distances. Packages and meshes are optional; without them the cylinders of
 :mod:`~.collision_bodies` decide. The connector at the base is always the cylinder of that module,
-because the meshes of the e-Series have none.
+because the meshes of the e-Series have no connector.
 """
 
 from __future__ import annotations
@@ -139,7 +139,7 @@ class CollisionMeshes:
         """
         Return whether two links are nearer than a bound [m]; far faster than :meth:`distances`.
 
-        :returns: (n,) whether they are, and (n,) a lower bound of the distance [m] if not.
+        :returns: (n,) whether the links are nearer, and (n,) a lower bound of the distance if not.
         """
         indices = self._pairs[pair]
         for index in indices:

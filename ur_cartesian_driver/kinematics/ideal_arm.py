@@ -65,7 +65,7 @@ def _nominal_lengths(arm: Arm) -> Floats:
 
 
 def _fit(arm: Arm, lengths: Floats) -> tuple[Floats, Floats, float]:
-    """Fit by Gauss-Newton over samples of the joint space; the problem is nearly linear."""
+    """Return lengths, offsets and misfit, fitted by Gauss-Newton; the problem is nearly linear."""
     samples = np.random.default_rng(1).uniform(-np.pi, np.pi, (_SAMPLES, 6))
     targets = [arm.forward(q) for q in samples]
     offsets = np.zeros(6)

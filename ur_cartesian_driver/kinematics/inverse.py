@@ -35,29 +35,33 @@ _LIMIT_ROUNDING = 1e-9
 # tried if the first finds no solution, which happens where two singularities meet.
 MISFIT_FACTORS = (3.0, 30.0)
 
-# Newton: squared error (metres and radians) that is exact enough; maximum number of steps; number
-# of steps that may fail to halve the squared error; largest joint step [rad].
+# Newton's method ends when the squared error (metres and radians) is below this.
 _EXACT = 1e-24
+# Maximum number of Newton steps.
 _MAX_STEPS = 40
+# Number of Newton steps that may fail to halve the squared error.
 _MAX_FAILURES = 12
+# Largest turn of a joint in one Newton step [rad].
 _MAX_JOINT_STEP = 0.5
 #: Minimum damping: keeps the normal equations of a singular arm solvable and does not slow down
 #: the convergence of other arms.
 MIN_DAMPING = 1e-14
-# Least singular value of the Jacobian below which another solution may be close; sine of theta5
-# likewise; largest distance of a twin that is searched [rad]; step of the derivative [rad].
+# Another solution may be close if the smallest singular value of the Jacobian is below this.
 _NEARLY_SINGULAR = 0.05
+# Another solution may be close if the sine of theta5 is below this.
 _NEARLY_STRAIGHT = 0.1
+# Largest distance of a twin that is searched [rad].
 _MAX_TWIN_DISTANCE = 0.6
+# Step of the numerical derivative of the Jacobian [rad].
 _DIFFERENCE = 1e-4
 # Two refined solutions closer than this [rad] are the same.
 _SAME = 1e-5
-# A seed whose pose is this near [m, rad] to the goal pose is one more start.
+# A seed whose pose is this near [m, rad] to the goal pose is also used as a start.
 _NEAR_POSE = 0.1
 # If a solution is this near to the seed [rad], the search ends.
 _CLOSE_TO_SEED = 0.02
-# A start is skipped if it is farther from the seed than the best refined solution, by more than
-# this [rad]: refinement moves a start by a few hundredths, unless the arm is singular there.
+# If a start is farther from the seed than the best solution so far, by more than this [rad], it is
+# skipped: refinement moves a start by a few hundredths, unless the arm is near a singularity.
 _PRUNING_MARGIN = 0.5
 
 # Solutions this close in the named joints [rad] are equally near: branches that agree in a joint
@@ -75,8 +79,8 @@ def solutions(arm: Arm, T_base_flange: Pose, seed: Joints | None = None) -> list
     solutions.
 
     :param seed: configuration that gives the position of wrist 3 if the axes of wrist 1 and 3 are
-        parallel (default 0). For a calibrated arm, a seed near the pose is one more start of
-        the search.
+        parallel (default 0). For a calibrated arm, a seed near the pose is also used as a start
+        of the search.
     """
     wrist_3 = 0.0 if seed is None else seed[5]
     if not arm.calibrated:
@@ -92,7 +96,7 @@ def solutions(arm: Arm, T_base_flange: Pose, seed: Joints | None = None) -> list
 
 def nearest(arm: Arm, T_base_flange: Pose, q_near: Joints) -> Joints | None:
     """
-    Return the solution nearest to ``q_near`` [rad] within the limits, or None.
+    Return the solution within the limits that is nearest to ``q_near`` [rad]; None if none is.
 
     All branches and full turns are searched; the distance is Euclidean in joint space.
     """
@@ -118,7 +122,7 @@ def nearest_to_posture(
     arm: Arm, T_base_flange: Pose, named: Mapping[int, float], q_before: Joints
 ) -> Joints | None:
     """
-    Return the solution nearest to a partial posture, or None.
+    Return the solution nearest to a partial posture; None if none is within the limits.
 
     Of the solutions within the limits, those nearest in the named joints (within 0.01 rad) are
     chosen, and of these the one nearest to ``q_before``. Both distances include full turns.
@@ -178,9 +182,9 @@ def _twins(arm: Arm, q: Joints) -> list[Joints]:
     """
     Return starts for the twins: the solutions that meet this one in a nearby singularity.
 
-    Let sigma be the smallest singular value and u, v its vectors. A joint step of length t along v
-    hardly moves the flange: the error along u is sigma t + curvature t^2 / 2, which is zero again
-    at the twin. The twin of a straight wrist is half a turn away.
+    Let sigma be the Jacobian's smallest singular value and u, v its vectors. A joint step of
+    length t along v hardly moves the flange: the error along u is sigma t + curvature t^2 / 2,
+    which is zero again at the twin. The twin of a straight wrist is half a turn away.
     """
     jacobian = arm.jacobian(q)
     u, sigma, v = np.linalg.svd(jacobian)
@@ -219,14 +223,14 @@ def _nearest_of(
 
 
 def _solve_from(arm: Arm, T_base_flange: Pose, start: Joints, q_near: Joints) -> Joints | None:
-    """Return the solution found from a start, at the turns nearest to q_near."""
+    """Return the solution found from a start, at the turns nearest to ``q_near``, or None."""
     q = _refine(arm, T_base_flange, start) if arm.calibrated else start
     return None if q is None else _nearest_turns(q, q_near, arm.model.position_limits)
 
 
 def _refine(arm: Arm, T_base_flange: Pose, start: Joints) -> Joints | None:
     """
-    Return the solution that Newton's method finds from a start, or None.
+    Return the solution that Newton's method finds from a start; None if it finds none.
 
     The squared error damps the step (Levenberg-Marquardt). This keeps the step finite at a
     singularity and costs no accuracy elsewhere.
@@ -253,7 +257,12 @@ def _refine(arm: Arm, T_base_flange: Pose, start: Joints) -> Joints | None:
 
 
 def _step(q: Joints, frames: ChainFrames, error: list[float], square: float) -> Joints:
-    """Return q + (J'J + square I)^-1 J' error, with a bounded largest joint step."""
+    """
+    Return the joints after one damped Newton step: q + (J'J + damping I)^-1 J' error.
+
+    The damping is ``square``, the squared error, but at least ``MIN_DAMPING``. The step is scaled
+    down if a joint would turn by more than ``_MAX_JOINT_STEP``.
+    """
     jacobian = jacobian_at(frames, frames.position)
     normal = jacobian.T @ jacobian
     normal.flat[::7] += max(square, MIN_DAMPING)
@@ -295,7 +304,7 @@ def _nearest_turns(
     q: Joints, wanted: Joints, limits: PositionLimits, q_before: Joints | None = None
 ) -> Joints | None:
     """
-    Return q with each joint turned as near to ``wanted`` as its limits allow, or None.
+    Return q with each joint turned as near to ``wanted`` as its limits allow; None if one cannot.
 
     :param q_before: of two equally near turns, the one nearer to this configuration is taken.
     """
@@ -314,7 +323,7 @@ def _nearest_turns(
 
 
 def _nearest_turn(angle: float, target: float, low: float, high: float) -> float | None:
-    """Return the angle plus the full turns that bring it nearest to the target, or None."""
+    """Return the angle moved by full turns as near to the target as the limits allow, or None."""
     turned = angle + tau * round((target - angle) / tau)
     if low <= turned <= high:
         return turned
@@ -342,7 +351,7 @@ def format_distinct(value: float, bound: float) -> tuple[str, str]:
 
 def _explain_no_elbow(ideal: IdealArm, T_base_flange: Pose) -> str:
     distances = [hypot(wrist.outward, wrist.up) for wrist in wrist_solutions(ideal, T_base_flange)]
-    if not distances:  # a calibrated arm within its misfit of the inner cylinder
+    if not distances:  # calibrated arm, wrist centre within the misfit of the cylinder
         return f'the centre of the wrist cannot come nearer than {ideal.d4:.4f} m to the base axis'
     longest, shortest = abs(ideal.a2 + ideal.a3), abs(ideal.a2 - ideal.a3)
     nearest_to_reach = min(distances, key=lambda r: max(r - longest, shortest - r))
@@ -360,7 +369,7 @@ def _explain_no_elbow(ideal: IdealArm, T_base_flange: Pose) -> str:
 
 
 def _explain_outside_limits(found: list[Joints], model: RobotModel) -> str:
-    """Return a clause on the joint beyond its limits in the best solution; '' if there is none."""
+    """Return a clause on the joint outside its limits in the best solution; '' if none is."""
     worst = [max(_outside(q, model.position_limits)) for q in found]
     excess, joint, angle = min(worst)
     if excess <= 0.0:

@@ -4,9 +4,9 @@
 Inverse kinematics in small steps, for use in a control cycle.
 
 When the previous solution is known and the next one is near, there is no need to search all
-branches or to iterate long: each step of Newton's method doubles the exact digits, for nominal and
-calibrated arms alike. The branch never changes, because a solution far from the previous one is
-rejected.
+branches or to iterate long: each step of Newton's method doubles the number of exact digits, for
+nominal and calibrated arms alike. The branch never changes, because a solution far from the
+previous one is rejected.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ def track_pose(arm: Arm, T_base_flange: Pose, q_before: Joints) -> Joints | None
     Return the joint positions of a pose [rad], starting from the joints of a nearby pose.
 
     :param q_before: joint positions of a pose at most centimetres away [rad].
-    :returns: None if the iteration does not converge because the pose is out of reach or nearly
-        singular.
+    :returns: None if the iteration does not converge or a joint would turn too far: the pose is
+        out of reach, or the arm is near a singularity.
     """
     rotation = rotation_from_quaternion(T_base_flange.quaternion)
     q = q_before
@@ -56,10 +56,11 @@ def track_pose(arm: Arm, T_base_flange: Pose, q_before: Joints) -> Joints | None
 
 def singularity_distances(arm: Arm, q: Joints) -> Vector3:
     """
-    Return the distances of wrist [rad], elbow [rad] and shoulder [m] from singularity.
+    Return the distances of wrist [rad], elbow [rad] and shoulder [m] from their singularities.
 
-    All are >= 0: the angles of wrist 2 and elbow, and the distance of the wrist centre from the
-    plane of axes 1 and 2.
+    For the wrist this is the angle of wrist 2 from the nearest multiple of pi; for the elbow, that
+    of the elbow joint; for the shoulder, the distance of the wrist centre from the plane of axes 1
+    and 2. None is negative.
     """
     ideal = ideal_arm_of(arm)
     _, t2, t3, t4, t5, _ = (a + b for a, b in zip(q, ideal.offsets, strict=True))
@@ -68,7 +69,7 @@ def singularity_distances(arm: Arm, q: Joints) -> Vector3:
 
 
 def _newton_step(q: Joints, frames: ChainFrames, error: list[float]) -> Joints:
-    """Return q + (J'J + tiny I)^-1 J' error."""
+    """Return the joints after one Newton step: q + (J'J + _DAMPING I)^-1 J' error."""
     jacobian = jacobian_at(frames, frames.position)
     normal = jacobian.T @ jacobian
     normal.flat[::7] += _DAMPING

@@ -39,17 +39,19 @@ _BLOCK = 1024
 # Block size after a row that needed a search; it then grows again.
 _MIN_BLOCK = 16
 
-# Newton: squared error (metres and radians) that is exact enough; largest joint step [rad].
+# Newton's method ends when the squared error (metres and radians) is below this.
 _EXACT = 1e-21
+# Largest turn of a joint in one Newton step [rad].
 _MAX_JOINT_STEP = 0.5
-# Newton steps from a solution of the ideal arm: two suffice except near singularities.
+# Number of Newton steps from a solution of the ideal arm: two suffice except near singularities.
 _STEPS = 3
-# On a path, Newton starts from the ideal solution in one of this many rows. The rows in between
-# start from their ideal solutions plus the shifts that were found for their neighbours.
+# First, Newton's method finds the shift from ideal to real solution in one row of this many. Then
+# all rows are solved, starting from their ideal solutions plus the interpolated shifts.
 _STRIDE = 8
-# A result of Newton farther than this [rad] from the ideal solution may be on another branch.
+# A real solution farther than this [rad] from the ideal solution may be on another branch.
 _MAX_CALIBRATION_SHIFT = 0.05
-# Branches of the ideal arm closer than this may be swapped in the real one [rad].
+# Two branches of the real arm may be closer to each other than those of its ideal arm by this much
+# [rad]. So if ideal branches are this close, it is uncertain which real branch is the nearest.
 _AMBIGUOUS_SEPARATION = 4.0 * _MAX_CALIBRATION_SHIFT
 _LIMIT_ROUNDING = 1e-9
 
@@ -63,7 +65,7 @@ class PathSolution:
     #: (n,) whether there is a solution.
     found: Flags
     #: (n,) largest joint change from the last solved row (or from the start) [rad]. If the branch
-    #: or the turn jumps, the change is large however finely the path is sampled.
+    #: or the turn jumps, the change stays large even if the path is sampled more finely.
     step: Floats
 
 
@@ -105,7 +107,7 @@ def solve_path(
                 q[index] = before = solution
             elif not skip_gaps:
                 return _path_solution(q, q_start)
-        # Back off: in a long uncertain stretch few blocks are tried in vain.
+        # In a long uncertain stretch, more and more rows are solved singly between two blocks.
         row, block, single_count = (
             row + single_count,
             _MIN_BLOCK,
@@ -122,7 +124,7 @@ def _path_solution(q: Floats, q_start: Joints) -> PathSolution:
 
 
 def _solve_certain(arm: Arm, poses: Floats, before: Joints) -> Floats:
-    """Return the joints of the leading rows that certainly stay on the branch."""
+    """Return the joints of the leading rows that certainly stay on the branch of ``before``."""
     start = np.array([before])
     signs = BRANCHES[int(branch_measures(arm, start).branch[0])]
     q, max_step = _on_branch(arm, TargetPoses.of(poses), signs)
@@ -161,7 +163,7 @@ def nearest_rows(arm: Arm, poses: Floats, q_near: Floats) -> Floats:
 def _on_branch(
     arm: Arm, targets: TargetPoses, signs: tuple[int, int, int]
 ) -> tuple[Floats, Floats]:
-    """Return the joints on a branch (n, 6) and half its distance to others (n,), < 0 if unsure."""
+    """Return joints on a branch (n, 6), and half its distance to others (n,), < 0 if unknown."""
     branch = branch_rows(ideal_arm_of(arm), targets, signs)
     q, max_step = branch.q.T, 0.5 * branch.separation
     sound = branch.exists
@@ -198,11 +200,12 @@ def _joints(row: Floats) -> Joints:
 
 def refine(arm: Arm, targets: TargetPoses, q: Floats) -> tuple[Floats, Flags]:
     """
-    Return the joint positions that Newton's method finds from ``q``, and which are exact.
+    Return the joint positions (n, 6) that Newton's method finds, and whether each row is exact.
 
     A row is exact if its error is below 3e-11 [m, rad].
 
-    :param q: (n, 6) [rad], within some hundredths of the solution; rows should follow a path.
+    :param q: (n, 6) the starts [rad], within some hundredths of the solutions; consecutive rows
+        should be near each other, as on a path.
     """
     every = np.arange(0, len(q), _STRIDE)
     if len(every) < 2:
@@ -225,7 +228,7 @@ def _refine(arm: Arm, targets: TargetPoses, q: Floats) -> tuple[Floats, Flags]:
         error, facing = pose_error(frames, targets.position, targets.rotation)
         errors = np.array(error)
         squares = np.einsum('in,in->n', errors, errors)
-        # The sines also vanish for half a turn.
+        # The orientation error is a sine, also zero at half a turn, where ``facing`` is -1.
         done = (facing > 1.0) & (squares < _EXACT)
         exact[active[done]] = True
         if step == _STEPS or done.all():
@@ -240,7 +243,12 @@ def _refine(arm: Arm, targets: TargetPoses, q: Floats) -> tuple[Floats, Flags]:
 
 
 def _newton(columns: Floats, errors: Floats, squares: Floats) -> Floats:
-    """Return (J'J + square I)^-1 J' error (n, 6), with a bounded largest joint step."""
+    """
+    Return damped Newton steps (n, 6) [rad]: (J'J + damping I)^-1 J' error.
+
+    The damping is the squared error, but at least ``MIN_DAMPING``. A step is scaled down if a
+    joint would turn by more than ``_MAX_JOINT_STEP``.
+    """
     normal = np.einsum('ikn,jkn->ijn', columns, columns)
     normal[range(6), range(6)] += np.maximum(squares, MIN_DAMPING)
     gradient = np.einsum('ikn,kn->in', columns, errors)

@@ -92,8 +92,9 @@ class _MeshSource:
     package: str
     #: Folder of the model inside the package.
     folder: str
-    #: File name extensions of visual and collision meshes.
+    #: File name extension of visual meshes.
     visual: str
+    #: File name extension of collision meshes.
     collision: str
     #: The files of collision meshes that consist of parts.
     parts: Mapping[Link, tuple[str, ...]]
@@ -101,7 +102,7 @@ class _MeshSource:
     fillings: Mapping[Link, tuple[float, float, float]]
     #: Mesh origins of upper arm, forearm, wrists 1 to 3, along z of their link frames [m].
     offsets: tuple[float, float, float, float, float]
-    #: By how much two links were found nearer by their visual than by their collision meshes [m].
+    #: Largest amount by which two links are nearer by their visual than collision meshes [m].
     tolerance: float
 
     def files(self, link: Link, detail: Detail) -> list[Path]:
@@ -318,7 +319,7 @@ class LinkFrames:
 
 
 def _nominal_frames(arm: Arm) -> list[Pose]:
-    """Return ``T_base_link`` of the nominal arm at joints 0; a frame is after d of its DH row."""
+    """Return ``T_base_link`` of the nominal arm at joints 0: each frame follows d of a DH row."""
     g, T, frames = arm.model.geometry, IDENTITY, [IDENTITY]
     for theta, d, a, alpha in zip(g.theta, g.d, g.a, g.alpha, strict=True):
         T = T @ Pose((0.0, 0.0, d), (0.0, 0.0, sin(0.5 * theta), cos(0.5 * theta)))

@@ -109,7 +109,7 @@ class RobotModel:
     series: str
     #: The nominal table.
     geometry: DhTable
-    #: Lowest and highest position of each joint [rad], infinite where it turns without end.
+    #: Lowest and highest position of each joint [rad], infinite if the joint turns endlessly.
     position_limits: PositionLimits
     #: Largest speed of each joint [rad/s]. For ur15, ur18 and ur8long nothing is published: they
     #: are given the values of the ur20, which are the lowest of the series.
@@ -181,7 +181,7 @@ def _torques(j1: float, j2: float, j3: float, wrist: float) -> Vector6:
 
 
 _TURN = (-2 * pi, 2 * pi)
-#: Joint values of users that are larger than this [rad] must be mistakes, such as degrees.
+#: Joint positions larger than this [rad] in users' input must be mistakes, such as degrees.
 MAX_JOINT_VALUE = 8.0 * pi
 _LIMITS: PositionLimits = (_TURN,) * 6
 _ENDLESS_WRIST: PositionLimits = (_TURN,) * 5 + ((-inf, inf),)

@@ -135,11 +135,13 @@ class Progress:
     actual_pose: Pose
     actual_twist: Vector6 = ZERO6
     actual_acceleration: Vector6 | None = None
-    #: Joint positions [rad] and velocities [rad/s]: those that the controller desires (first two
-    #: fields), and the measured ones (next two).
+    #: Joint positions that the controller desires [rad].
     desired_q: Vector6 = ZERO6
+    #: Joint velocities that the controller desires [rad/s].
     desired_qd: Vector6 = ZERO6
+    #: Measured joint positions [rad].
     actual_q: Vector6 = ZERO6
+    #: Measured joint velocities [rad/s].
     actual_qd: Vector6 = ZERO6
     #: Expected time of the desired pose, from the start of the motion [s].
     time: float = 0.0

@@ -119,12 +119,12 @@ class CentreLine:
 
     def swing(self, s: float, amplitude: float, waves: int) -> Pose:
         """
-        Return the pose after a distance s [m] along the line, on a sine wave about the line.
+        Return the pose after a distance s [m] along the centre line, on a sine wave about it.
 
         :param amplitude: largest distance of the wave to either side [m].
-        :param waves: number of waves on the whole line.
+        :param waves: number of waves on the whole centre line.
 
-        :raises ZeroDivisionError: the tool points along the line.
+        :raises ZeroDivisionError: the tool points along the centre line.
         """
         k = min(bisect_right(self._begins, s) - 1, len(self._strokes) - 1)
         stroke, along = self._strokes[k], s - self._begins[k]

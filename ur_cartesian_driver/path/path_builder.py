@@ -5,7 +5,7 @@ A path of the tool, composed motion by motion.
 
 A :class:`Path` never changes: each method returns a new one. Units are SI (:func:`~.units.mm` and
 :func:`~.units.deg` convert), poses place the controlled frame in the frame of the path. A mistake
-raises an :exc:`~ur_cartesian_driver.motion.errors.InvalidGoal` at the line with the mistake.
+raises an :exc:`~ur_cartesian_driver.motion.errors.InvalidGoal` at the program line that makes it.
 """
 
 from __future__ import annotations
@@ -143,11 +143,11 @@ class Path(PathWithEvents):
         """
         Round the corners of lines and arcs, so that the arm passes their points without a stop.
 
-        The planned path is nowhere farther from the lines and arcs than the deviation, and slows
-        down where it has to. A motion can have a corner of its own at its end:
+        The planned path is nowhere farther from the lines and arcs than the deviation, and the
+        tool slows down where it has to. A motion can have its own deviation at its end:
         ``line(..., corner_deviation=mm(0.1))``.
 
-        :param deviation: [m]; 0 = only motions with their own have rounded corners.
+        :param deviation: [m]; 0 = corners are rounded only after motions with their own deviation.
         :param angle: how far the tool may be turned from its programmed orientation [rad]; 0 =
             0.02.
         :raises InvalidGoal: a number is out of its range.
@@ -201,7 +201,7 @@ class Path(PathWithEvents):
         """
         Allow points to be appended while the arm moves.
 
-        :param replace_horizon: how far ahead of the arm points are final [s]; later points can be
+        :param replace_horizon: how far ahead of the arm points are fixed [s]; later points can be
             replaced. 0 = no points can be replaced.
         """
         return self._with(
@@ -212,7 +212,7 @@ class Path(PathWithEvents):
         """
         Name the value that an output takes when the motion does not go on as planned.
 
-        :param restore: whether the output gets its value back after a pause.
+        :param restore: whether the output gets its previous value back after a pause.
         :raises InvalidGoal: the output cannot have the value, or has a safe value already.
         """
         safe, known = output.safe(value, restore), self._settings.safe_outputs
@@ -389,8 +389,9 @@ class Path(PathWithEvents):
 
         :param amplitude: largest distance to either side [m].
         :param wavelength: length of one wave [m], rounded so that whole waves fit into the path.
-        :raises InvalidGoal: the path has corners, motions that are no lines or arcs, events,
-            durations, postures or dwells, no start or no speed, or the tool points along it.
+        :raises InvalidGoal: the path has corners, motions other than lines and arcs, events,
+            durations, postures or dwells; start or speed is missing; or the tool points along
+            the path.
         """
         for name, value in (('amplitude', amplitude), ('wavelength', wavelength)):
             amount('weave()', name, value, MAX_BLEND, 'm')

@@ -292,8 +292,8 @@ class PathWithEvents(PathOfMotions):
         Return the path with an event at the last point.
 
         :param point: the last point, changed as the event requires.
-        :param event: the event, which begins at point 0. An event with an end has it at point 1,
-            so that it passes the check.
+        :param event: the event, numbered as if the last point were point 0. If it needs an end,
+            the end is point 1 for the check, and is removed afterwards.
         """
         check_event(where, event)
         if type(event) in _METHODS:
@@ -333,7 +333,7 @@ class PathWithEvents(PathOfMotions):
                     )
 
     def _stop(self, name: str) -> tuple[str, PathPoint]:
-        """Return a phrase for the place of a method call, and the last point with a stop there."""
+        """Return where a method is called, as a phrase, and the last point changed to a stop."""
         if not self._points:
             raise InvalidGoal(f'{name}()', 'comes before the first point', 'add a motion first')
         where, point = f'{name}() at point {len(self) - 1}', self._points[-1]

@@ -146,7 +146,8 @@ def _process_blend(points: Sequence[PathPoint], index: int, start: Pose | None) 
     """
     Return the blend radius of a point for which none is given [m]; 0 if it gets no blend.
 
-    It gets a blend if the motion to or from the point is a PROCESS motion, and if the blend fits.
+    The last point gets none. Another point gets one if the motion to or from it is a PROCESS
+    motion, and if the blend fits.
     """
     if index + 1 == len(points):
         return 0.0

@@ -47,13 +47,13 @@ Place: TypeAlias = Sequence[float] | Pose
 #: For a spline point: a twist or an acceleration that the driver chooses to fit the neighbours.
 FREE: Vector6 = (nan,) * 6
 
-#: Larger coordinates [m], blends [m] and durations [s] must be mistakes, mostly of the unit. Other
-#: frames than the base may be far from the robot.
+#: Larger coordinates [m], blends [m] and durations [s] must be mistakes, mostly of the unit. The
+#: bound is larger in frames other than the base, which may be far from the robot.
 MAX_COORDINATE_OF_BASE = 3.0
 MAX_COORDINATE = 50.0
 MAX_BLEND = 0.5
 MAX_DURATION = 3600.0
-#: The largest speed and acceleration of a motion, by the unit of its speed.
+#: The units of speeds, and the largest speed and acceleration of a motion for each unit.
 _TOOL, _JOINTS, _FRACTION = 'm/s', 'rad/s', 'of the limits of the robot'
 _MAX_SPEED = {_TOOL: (5.0, 100.0), _JOINTS: (20.0, 200.0), _FRACTION: (1.0, 1.0)}
 
@@ -61,7 +61,7 @@ _BASE_FRAMES = ('', 'base', 'base_link')
 _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 _OPTIMIZED_TYPES = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 _FREE_AXES = {axis.name.lower(): axis for axis in FreeAxis if axis}
-#: Segment fields for which methods have parameters with other names; the rest is given by name.
+#: Segment fields that methods set by parameters of their own; other fields are given by name.
 _OWN_WORDS = {
     *('type', 'blend_radius', 'dwell', 'velocity', 'acceleration'),
     *('via', 'via_posture', 'arc_mode', 'free_axis', 'free_min', 'free_max'),
@@ -146,7 +146,7 @@ class PathOfMotions:
 
     @property
     def starts_with_joint_motion(self) -> bool:
-        """Whether the first motion is a joint motion, which can begin wherever the arm stands."""
+        """Whether the first motion is a joint motion, which can begin wherever the arm is."""
         return bool(self._points) and self._points[0].segment.type in _JOINT_TYPES
 
     # ---- what holds from here on ---------------------------------------------------------------
@@ -261,7 +261,8 @@ class PathOfMotions:
         :param orientation: orientation at the end of the line; None = that of the pose, or of the
             point before.
         :param blend: replaces the blend of :meth:`at`; likewise ``speed`` and ``acceleration``.
-        :param duration: duration of this motion [s]; in a path, all motions have one, or none.
+        :param duration: duration of this motion [s]; in a path, either all motions have one, or
+            none has.
         :param posture: joint positions near which the arm is to arrive, by joint name [rad].
         :param optimized: use optimovel; speed and acceleration are then fractions of the limits.
         :param fields: other fields of the segment, by their names in ``MotionSegment``.
@@ -469,7 +470,7 @@ class PathOfMotions:
         return f'point {len(self)} ({kind})'
 
     def _pose(self, where: str, place: Place, orientation: Quaternion | None) -> Pose:
-        """Return the pose of a place; None = its own orientation, or that of the point before."""
+        """Return a pose; ``orientation`` None = that of the place, or else of the point before."""
         before = place if isinstance(place, Pose) else self.end
         position = place.position if isinstance(place, Pose) else place
         if orientation is None:

@@ -16,12 +16,13 @@ from ur_cartesian_driver.motion.goal.goal import Posture
 NANOSECONDS = 1_000_000_000
 #: Larger numbers in twists and accelerations, and larger joint positions [rad], must be mistakes.
 _MAX_RATE, _MAX_JOINT = 100.0, 25.2
-#: A quaternion is accepted, or exact, if its squared length differs from 1 by at most this.
+#: Largest difference between 1 and the squared length of a quaternion that is accepted; of one
+#: that is exact.
 _UNIT, _EXACT_UNIT = 1e-3, 1e-12
 
 
 def amount(where: str, name: str, value: float | None, bound: float, unit: str) -> float | None:
-    """Return a value that is a number from 0 to a bound; None stays None."""
+    """Return a value as a number, refused if it is not from 0 to a bound; None stays None."""
     if value is None:
         return None
     number = any_number(where, name, value)
@@ -78,7 +79,7 @@ def unit_quaternion(where: str, q: Sequence[float]) -> Quaternion:
 
 
 def six_numbers(where: str, values: Sequence[float]) -> Vector6:
-    """Return three linear and three angular numbers; angular ones not given are free (NaN)."""
+    """Return three linear and three angular numbers; missing angular ones become NaN (free)."""
     try:
         numbers = [float(value) for value in values]
     except (TypeError, ValueError):

@@ -123,7 +123,7 @@ def _turned(rates: Vector6, q: Quaternion) -> Vector6:
 
 
 def seen_from(point: PathPoint, T_tool_new: Pose, before: Pose | None, where: str) -> PathPoint:
-    """Return the point that a frame on the tool passes; ``T_tool_new`` is this frame's pose."""
+    """Return a point as passed by another frame on the tool, whose pose is ``T_tool_new``."""
     waypoint, segment = point.waypoint, point.segment
     offset = rotate(waypoint.pose.quaternion, T_tool_new.position)
     if segment.via is not None:

@@ -67,7 +67,7 @@ _JOINT_MOTIONS = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResumedGoal:
-    """What remains of an original goal, which was stopped, as a goal."""
+    """What remains of a stopped goal (the original), as a goal of its own."""
 
     goal: Goal
     #: The place on the original path where this goal begins.
@@ -93,7 +93,7 @@ def resume(
     """
     Return what remains of a goal that was stopped at a place, as a goal.
 
-    :param place: of the stop, as the outcome of the goal reports it.
+    :param place: the place of the stop, as the outcome of the goal reports it.
     :param overlap: how far before that place the path is resumed [m]; farther if a blend is there,
         but never before the beginning of a joint motion or of the path.
     :param approach: distance from which the tool comes down to the path, backwards along the z
@@ -143,7 +143,7 @@ class _Resumption:
             if self._length(k) * (1.0 - u) > _NOTHING or is_turn:
                 points.append(self.points[k])
                 segments.append(self._cut(k, u))
-            else:  # the arm is at the end of the segment: the next one follows
+            else:  # the arm is at the end of the segment: the next segment follows
                 self.begin = k + 1.0
                 places = [self.begin] * len(points)
                 del times[len(points)]
@@ -180,7 +180,7 @@ class _Resumption:
         )
 
     def _with_a_corner(self, segments: Sequence[Segment]) -> Sequence[Segment]:
-        """Return segments of which one has a corner; at the last point it changes nothing."""
+        """Return segments, one with a corner deviation, which has no effect at the last point."""
         if any(segment.corner_deviation for segment in segments):
             return segments
         largest = max(segment.corner_deviation for segment in self.segments)
@@ -284,7 +284,7 @@ class _Resumption:
     # -- the approach ----------------------------------------------------------------------------
 
     def _approach(self, k: int, u: float) -> tuple[list[Waypoint], list[Segment], list[float]]:
-        """Return points and segments up to the place, where the arm rests, and their places."""
+        """Return points, segments and places of the approach, which ends at rest on the path."""
         there = self._pose(k, u)
         poses = [there]
         if self.approach > 0.0:
@@ -293,7 +293,7 @@ class _Resumption:
         if self.moves_joints and (len(poses) > 1 or self.goal.min_speed_fraction):
             kinds[0] = SegmentType.JOINT
         if self.moves_joints and self.goal.min_speed_fraction:
-            kinds[-1] = SegmentType.JOINT  # a rest between lines would miss min_speed_fraction
+            kinds[-1] = SegmentType.JOINT  # a stop between lines would break min_speed_fraction
         cut = self.segments[k]
         free = Segment(free_axis=cut.free_axis, free_min=cut.free_min, free_max=cut.free_max)
         return (
@@ -442,7 +442,7 @@ class _Spline:
 
     def waypoint(self, time: float, at: float, rate: float, gain: float) -> Waypoint:
         """
-        Return the point of the curve at a time [s], for a goal that follows it at another rate.
+        Return the point of the curve at a time [s], for a goal that passes the curve at a rate.
 
         :param at: time of the point in that goal [s].
         :param rate: time of the curve that passes in each second of that goal; ``gain``: change of

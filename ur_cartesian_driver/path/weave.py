@@ -64,7 +64,7 @@ def woven(
     """
     Yield pose, time [s] and twist of the points on waves along a centre line.
 
-    :raises ZeroDivisionError: the tool points along the line.
+    :raises ZeroDivisionError: the tool points along the centre line.
     """
     count = waves * _POINTS_PER_WAVE
     for i in range(1, count + 1):

@@ -21,7 +21,7 @@ _ROUNDING = 1e-6
 
 
 def slower_by(goal: Goal) -> float:
-    """Return the least speed deficit of a slow stretch, as a fraction of the asked speed."""
+    """Return the speed deficit from which a stretch is slow, as a fraction of the asked speed."""
     return min(SLOWER_BY, 1.0 - goal.min_speed_fraction + _ROUNDING)
 
 
@@ -29,8 +29,8 @@ def check_min_speed(goal: Goal, stretches: Sequence[SlowStretch]) -> None:
     """
     Refuse a goal whose tool is slower than demanded.
 
-    :raises JointLimitExceeded: joint limits make the tool slow.
-    :raises InvalidGoal: the path or the numbers of the goal make the tool slow.
+    :raises JointLimitExceeded: the tool is too slow because of joint limits.
+    :raises InvalidGoal: the tool is too slow for another reason.
     """
     counted = [each for each in stretches if each.counts]
     worst = min(counted, key=lambda each: each.lowest / each.asked, default=None)
@@ -48,9 +48,9 @@ def check_min_speed(goal: Goal, stretches: Sequence[SlowStretch]) -> None:
 
 def unknown_speed_remark(goal: Goal, blends: Sequence[int], free: Sequence[int]) -> list[str]:
     """
-    Return the remark that names the motions whose tool speed is not known, and so not checked.
+    Return the remark on motions whose tool speed is unknown and so not checked; [] if none.
 
-    :param blends: the points with blends in which the robot chooses its speed.
+    :param blends: the points in whose blends the robot chooses the speed.
     :param free: the points to which joint and OPTIMIZED motions lead.
     """
     parts = [

@@ -27,15 +27,15 @@ def place_outputs(
     point_times: Floats | None = None,
 ) -> PlannedRows:
     """
-    Return the segments with the outputs that are switched during the motion, in order of time.
+    Return the segments with the records of outputs switched during the motion, in order of time.
 
-    :param reference: the path of the TCP, with the times of the segments.
-    :param events: the output events by goal field, with the waypoint numbers of ``segments``.
+    :param reference: the path of the TCP along the segments, on the clock of ``start_time``.
+    :param events: the output events by goal field, with waypoints numbered as in ``segments``.
     :param blend_halves: duration of the first half of the blend after each segment [s]; None =
         no blends.
     :param start_time: when the first segment begins [s].
     :param point_times: when points are passed within a motion (n,) [s]; None = each point is at
-        the end of one.
+        the end of a motion.
     :raises InvalidGoal: no motion leads to a point, or too many outputs are pending at once.
     """
     if not any(events.values()):

@@ -149,7 +149,7 @@ def _plan_free(table: GoalTable, state: RobotState, arm: Arm, options: PlanningO
     """
     Return the plan of a checked goal with a free axis, and choose the rotations about this axis.
 
-    If no choice passes the checks, the goal is planned with the orientations that it gives.
+    If no choice passes the checks, the goal is planned with the orientations of its points.
     """
     refusal: GoalRefused | None = None
     found = 'no rotation about the free axis was found that leads along the whole path'
@@ -198,7 +198,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     )
     timings = SegmentTimings(geometries, options, arm.model, paths.blend_samples, planner.running)
     segments = _planned_rows(paths, geometries, timings)
-    del paths, samples  # frees memory: long goals have many samples, and so has the reference
+    del paths, samples  # frees memory: samples and reference path of long goals are large
     motion = reference_path(
         state.actual_tcp_pose, geometries.begin, geometries.path, timings.chain.times
     )
@@ -409,7 +409,8 @@ class GoalPlanner:
 
         :param goal: the goal as planned, without stops.
         :param remarks: appended to the remarks that have been collected so far.
-        :param point_times: when points are passed within a piece (n,) [s], without stops.
+        :param point_times: (n,) when each point is passed [s], not including stops; None = each
+            point is at the end of a piece.
         :raises GoalRefused: the tool is slower than demanded, or an output cannot be placed.
         """
         if goal.min_speed_fraction:

@@ -3,7 +3,7 @@
 """
 The states from which goals are planned: an arm at rest, and a moving arm after a stop.
 
-A goal that preempts another one is checked from where the arm comes to rest.
+A goal that preempts another one is checked from the state in which the arm will come to rest.
 
 The robot program stops the arm along its joints (``stopj``): the leading joint brakes evenly and
 the others in proportion, so each travels half as far as it would at constant speed in the time of
@@ -54,9 +54,9 @@ def at_set_point(state: RobotState, arm: Arm) -> RobotState:
 
 def predict_stop(state: RobotState, arm: Arm, deceleration: float) -> RobotState:
     """
-    Return the state of the arm after a stop that begins now; the same state if it is at rest.
+    Return the state of the arm after a stop that begins now; ``state`` if the arm is at rest.
 
-    :param deceleration: of the leading joint [rad/s^2].
+    :param deceleration: deceleration of the leading joint [rad/s^2].
     """
     leading = max(map(abs, state.target_qd))
     if leading == 0.0:

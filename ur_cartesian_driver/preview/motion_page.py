@@ -71,10 +71,10 @@ _TYPES: dict[str, tuple[str, Colour]] = {
 _ASIDE = np.array((0.65, 0.65, 0.4))
 _BLEND: Colour = (240, 200, 60)
 _LOW, _MIDDLE, _HIGH = np.array([(205, 40, 40), (235, 190, 40), (40, 150, 70)], dtype=np.float64)
-#: Where viser's page has the scene; where it has the settings.
+#: Pattern of the scene in viser's page; name of the settings in it.
 _DATA = re.compile(r'window\.__VISER_EMBED_DATA__="([^"]*)";')
 _CONFIG = 'window.__VISER_EMBED_CONFIG__'
-#: What names the place in the text of a refusal: the point; the fraction of the segment to it.
+#: Patterns of the place in the text of a refusal: the point; the fraction of the segment to it.
 _PLACE = re.compile(r'(?:points|segments)\[(\d+)\]|point (\d+)')
 _FRACTION = re.compile(r'at ([\d.]+) % of its segment')
 
@@ -127,7 +127,7 @@ def motion_page(plan: Plan, arm: Arm, planes: Sequence[Plane] = ()) -> str:
 
 
 def scene_of_plan(server: Server, arm: Arm, tcp: Pose, plan: Plan | None) -> Scene:
-    """Draw the arm and, if there is a plan, the path coloured by type, points and outputs."""
+    """Return a scene with the arm and, if a plan is given, its points, outputs and path."""
     scene = Scene(server, arm, tcp)
     if plan is not None:
         scene.add_points(_waypoints(plan))
@@ -322,7 +322,7 @@ class Scene:
         self.look_at(positions)
 
     def look_at(self, positions: Floats) -> None:
-        """Point the camera at path and arm, from beside the path; they appear beside the text."""
+        """Point the camera at path and arm from the side, so that they appear beside the text."""
         low, high = np.minimum(positions.min(axis=0), 0.0), np.maximum(positions.max(axis=0), 0.4)
         x, y, _ = positions.mean(axis=0)
         out = np.array((0.7 * x - 0.7 * y, 0.7 * x + 0.7 * y, 0.5 * np.hypot(x, y)))

@@ -233,7 +233,7 @@ class _ForeignLine(str):
 
 @cache
 def taken_names() -> tuple[frozenset[str], frozenset[str]]:
-    """Return the controller's functions that the program calls, and its parameters and locals."""
+    """Return the controller functions that the program calls, and the program's local names."""
     text = ''.join(
         files('ur_cartesian_driver.program').joinpath(f'{name}.script').read_text('ascii')
         for name in ('driver', 'servo')

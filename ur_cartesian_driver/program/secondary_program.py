@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Secondary programs: the controller runs them beside its main program, within one step.
+Secondary programs: the controller runs them in parallel with its main program, within one step.
 
-The driver uses one to restore a TCP that the robot program cannot restore.
+The driver uses a secondary program to restore a TCP that the robot program cannot restore.
 """
 
 from __future__ import annotations

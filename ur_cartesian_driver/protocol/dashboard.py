@@ -122,7 +122,7 @@ COMMAND_SPECS: Mapping[str, CommandSpec] = MappingProxyType(
     }
 )
 
-#: Patterns for the valid values of some replies, mainly of those that are only a value.
+#: Patterns for the valid values of some replies, mainly of replies that are only a value.
 _VALUE_PATTERNS: Mapping[str, re.Pattern[str]] = MappingProxyType(
     {
         'running': re.compile('true|false'),
@@ -230,8 +230,8 @@ class DashboardClientCodec:
         """
         Return the greeting and the replies in bytes from the server (``b''`` = end of stream).
 
-        :raises RemoteProtocolError: a line is too long or truncated, no command waits for it, or
-            the stream ended while a command waited for its reply.
+        :raises RemoteProtocolError: a line is too long or truncated, a reply came although no
+            command waited for one, or the stream ended while a command waited for its reply.
         """
         events: list[DashboardGreeting | DashboardReply] = []
         lines = self._lines.feed(data)

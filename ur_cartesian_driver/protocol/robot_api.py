@@ -183,7 +183,7 @@ def parse_answer(
 
 
 def _fields(body: bytes) -> Mapping[str, Any]:
-    """Return the JSON object in an answer; empty if it is none (a proxy's error page)."""
+    """Return the JSON object in an answer; empty if the answer is none (a proxy's error page)."""
     try:
         fields = json.loads(body)
     except ValueError:

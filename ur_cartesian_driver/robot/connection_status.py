@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The status of a driver, and the sentences that name the next step towards running a goal."""
+"""The status of a driver, and the sentences that say what to do before a goal can run."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConnectionStatus:
-    """Progress of the connection, and the next step towards running a goal."""
+    """Progress of the connection, and what to do before a goal can run."""
 
     state: ConnectionState = ConnectionState.DISCONNECTED
-    #: The next step, or the reason why the robot cannot be used, as a sentence; empty when a goal
-    #: can run.
+    #: What to do next before a goal can run, or why the robot cannot be used, as a sentence; empty
+    #: when a goal can run.
     message: str = ''
     #: The last error: its time, what happened, and the events that led to it.
     last_error: str = ''
@@ -106,7 +106,7 @@ def required_action(
     foreign_program: bool = False,
 ) -> str:
     """
-    Return the next step towards running a goal, as a sentence; empty when a goal can run.
+    Return what to do next before a goal can run, as a sentence; empty when one can run.
 
     :param robot: newest state of the robot; None = none yet.
     :param stale: a sentence if the states of the robot are too old; empty = they are fresh.

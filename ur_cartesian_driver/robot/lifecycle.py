@@ -54,7 +54,8 @@ class ConnectionEvent(Enum):
 
 S, E = ConnectionState, ConnectionEvent
 
-#: State -> event -> next state. An event that is not in the row of a state does not change it.
+#: State -> event -> next state. An event that is not in the row of a state leaves it
+#: unchanged.
 TRANSITIONS: Mapping[ConnectionState, Mapping[ConnectionEvent, ConnectionState]] = {
     S.DISCONNECTED: {E.ROBOT_ANSWERED: S.CONNECTING},
     S.CONNECTING: {

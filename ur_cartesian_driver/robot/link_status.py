@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The status of a link: its state, the next step, and the last error."""
+"""The status of a link: its state, what to do next before a goal can run, and the last error."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ class LinkStatus:
         """
         Begin disconnected.
 
-        :param required_action: returns the next step in a state, as a sentence.
+        :param required_action: returns what to do next in a state before a goal can run, as a
+            sentence; this is the "next step" below.
         """
         self._required_action, self._on_status, self._on_log = required_action, on_status, on_log
         self._attempts = AttemptLog(self._log_info, self._log_info)

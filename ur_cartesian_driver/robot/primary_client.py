@@ -39,7 +39,8 @@ SILENCE_TIMEOUT = 1.5
 READ_ONLY_CODE = 210
 #: Beginning of a message's title if a secondary program failed, which stops no other program.
 SECONDARY_EXCEPTION = 'SECONDARY_PROGRAM_EXCEPTION'
-#: Largest age of a request that is repeated [s]; a later switch to remote control starts nothing.
+#: Largest age of a request that is repeated [s], so that a much later switch to remote control
+#: does not carry out an old request.
 REPEAT_TIMEOUT = 1.0
 
 

@@ -182,7 +182,7 @@ async def dial(connection: TcpConnection, host: str, port: int) -> None:
 
 
 def error_reason(error: OSError) -> str:
-    """Return the system's text for an error; asyncio's repeats the address or counts attempts."""
+    """Return the system's text for an error; asyncio's text has the address or counts attempts."""
     if error.errno is not None and error.errno in errno.errorcode:
         return os.strerror(error.errno).lower()
     return error.strerror or str(error)  # such as an unknown host name
@@ -256,7 +256,7 @@ class WarningLimiter:
         self._count = 0
 
     def add(self, text: str, now: float) -> None:
-        """Log a line, or only count it."""
+        """Log a line, or only count it if the period has had too many."""
         if now - self._begin >= WARNING_PERIOD:
             suppressed = self._count - MAX_LINES
             self._begin, self._count = now, 0

@@ -153,7 +153,7 @@ class GoalClient:
         #: The appender of the running goal; None = no goal runs, or it has no keep_open.
         self._appender: GoalAppender | None = None
         self._client = ActionClient(node, FollowCartesianTrajectory, self.action)
-        #: None = another executor spins the node.
+        #: The client's own executor; None = another executor spins the node.
         self._executor: SingleThreadedExecutor | None = None
         if node.executor is None:
             self._executor = SingleThreadedExecutor(context=node.context)
@@ -363,7 +363,7 @@ class GoalClient:
             self._appender = None
 
     def _running_goal(self) -> Any:
-        """Return the id of the goal that moves the arm (the oldest, newer ones wait), or None."""
+        """Return the id of the goal that moves the arm (the oldest goal); None if no goal runs."""
         latest: list[GoalStatusArray] = []
         subscription = self._node.create_subscription(
             GoalStatusArray,

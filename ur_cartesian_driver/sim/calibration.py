@@ -37,10 +37,11 @@ _OFF_AXIS = 1e-9
 class _Axes:
     """The joint axes and the flange of an arm with all joints at 0, in base axes."""
 
-    #: A point on each joint axis [m] (6, 3); the direction of each joint axis (6, 3).
+    #: A point on each joint axis [m] (6, 3).
     points: Floats
+    #: The direction of each joint axis (6, 3).
     directions: Floats
-    #: The pose of the flange (4, 4); its origin lies on the last joint axis, its z axis along it.
+    #: The pose of the flange (4, 4); its origin and its z axis lie on the last joint axis.
     flange: Floats
 
 
@@ -156,7 +157,7 @@ def _table(axes: _Axes, model: RobotModel) -> DhTable:
 def _common_normal(
     origin: Floats, z: Floats, point: Floats, following: Floats
 ) -> tuple[Floats, float, float]:
-    """Return direction of the common normal, its distance from ``origin`` along z, its length."""
+    """Return the common normal's direction, its distance from ``origin`` along z, its length."""
     normal = np.cross(z, following)
     size = float(np.linalg.norm(normal))
     if size > _PARALLEL:

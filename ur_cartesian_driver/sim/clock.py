@@ -66,7 +66,7 @@ class RealClock:
 
         :param cycle: simulated time of a cycle [s].
         :param rate: seconds of simulated time per second of real time.
-        :param when_late: 'skip' = a restart adds the lateness to ``skipped``; 'wait' = does not.
+        :param when_late: 'skip' = a restart adds the lateness to ``skipped``; 'wait' = it adds 0.
         """
         self._period, self._rate = cycle / rate, rate
         self._skips = when_late == 'skip'

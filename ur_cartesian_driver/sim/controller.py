@@ -67,8 +67,8 @@ MAX_HISTORY = 100
 _MAX_POPUPS = 100
 #: Error code of a protective stop (C209).
 _PROTECTIVE_STOP_CODE = 209
-#: Delay from a line that demands the unlocking of a protective stop to the unlocking [s]. It is
-#: only known that a real robot does not unlock immediately.
+#: Delay [s] of the unlocking of a protective stop after a client's `set unlock protective stop`.
+#: Assumed; it is only known that a real robot does not unlock immediately.
 UNLOCK_TIME = 0.02
 
 
@@ -98,8 +98,9 @@ class Controller:
         :param sockets: the sockets of programs; None = in memory, for tests.
         """
         self.config = config
-        #: Duration of a cycle [s]; number of cycles so far.
+        #: Duration of a cycle [s].
         self.cycle = config.cycle
+        #: Number of cycles so far.
         self.cycles = 0
         #: Time that the clock has skipped because this computer was too busy [s].
         self.skipped_time = 0.0
@@ -246,7 +247,7 @@ class Controller:
         Return the actual joint positions of an earlier cycle [rad].
 
         :param steps: how many cycles ago.
-        :raises RuntimeException: ``steps`` is negative, or longer than the history.
+        :raises RuntimeException: ``steps`` is negative, or larger than the history.
         """
         if not 0 <= steps < MAX_HISTORY:
             raise RuntimeException(f'steps is {steps}; the history holds 0..{MAX_HISTORY - 1}')
@@ -324,7 +325,7 @@ class Controller:
 
     def brake(self) -> None:
         """
-        Stop the arm because the program has ended: on the path, or hard if there is no path.
+        Stop the arm because the program has ended: along its path or, off a path, at HARD_STOP.
 
         If the arm is paused on its path or stopped by a fault, the path is discarded.
         """
@@ -422,7 +423,7 @@ class Controller:
         return ''
 
     def unlock_soon(self) -> None:
-        """Unlock a protective stop shortly, as a primary client can: without unlock delay."""
+        """Unlock a protective stop after ``UNLOCK_TIME``, without the dashboard's unlock delay."""
         if self.safety.mode is SafetyMode.PROTECTIVE_STOP:
             self._unlock_at = self.time + UNLOCK_TIME
 
@@ -431,7 +432,7 @@ class Controller:
         Check from now on that an RTDE input is written often enough.
 
         :param frequency: lowest rate of writing [Hz]; 0 ends the check.
-        :param action: 'pause' or 'stop' the program if the input is late, or 'ignore' this.
+        :param action: 'pause' or 'stop' the program if the input is late; 'ignore' = do nothing.
         :raises RuntimeException: the action has another value.
         """
         if action not in ('pause', 'stop', 'ignore'):

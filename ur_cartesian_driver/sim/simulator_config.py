@@ -78,8 +78,8 @@ class SimulatorConfig:
     turn_ratio: float = TURN_RATIO
     #: Denavit-Hartenberg parameters of this arm; None = the nominal parameters of the model.
     geometry: DhTable | None = None
-    #: Limits of the joints, where these are tighter than the model's; None = the model's. The arm
-    #: keeps to the limits, and the primary interface reports them.
+    #: Joint limits of this arm, if they are tighter than the model's; None = the model's. The arm
+    #: keeps to these limits, and the primary interface reports them.
     joint_limits: JointLimits | None = None
     #: Imperfections of the arm and its controller; None = a perfect arm and controller.
     #: `sim.motion.imperfect_arm.typical_imperfections` returns typical values for a model.

@@ -214,7 +214,7 @@ def norm(a: Value) -> float | int:
 
 
 def normalize(v: Value) -> list[float]:
-    """Return the list of numbers in the same direction whose norm is 1."""
+    """Return a list of numbers divided by its norm."""
     items = _numbers(v)
     length = math.hypot(*items)
     if length == 0:

@@ -29,8 +29,8 @@ MAX_ROWS = 6000
 #: Largest number of points that are numbered.
 MAX_NUMBERED_POINTS = 12
 _AXES = 'xyz'
-#: Weights of the path's extents in x, y and z when two of them are chosen for the flat view: it is
-#: from above, unless the path is mainly vertical.
+#: Weights of the path's extents in x, y and z when two of them are chosen for the flat view: the
+#: view is from above, unless the path is mainly vertical.
 _VIEW_WEIGHTS = np.array([1.0, 1.0, 0.4])
 _PLANNED, _TARGET, _ACTUAL, _MARK = '#9aa5b1', '#1f77b4', '#c8372d', '#2a9d5c'
 #: Events that are marked in all charts.

@@ -3,11 +3,11 @@
 """
 The pipe between the owner of a driver and the robot loop.
 
-On the pipe, a message is its length, then two pickles. The second pickle is the message itself,
-one of the dataclasses below. The first is the notification that refuses the message, for a
-receiver that cannot read the second (None = the message needs no answer). Both ends are this
-package, and no other process can open the pipe, a pair of sockets; so pickle is safe here, and it
-moves the arrays of a large plan without conversion.
+A message is sent as its length, then two pickles. The second pickle is the message itself, one of
+the dataclasses below. The first is the notification that refuses the message, for a receiver that
+cannot read the second (None = the message needs no answer). Both ends run this package, and no
+other process can open the pipe (a pair of sockets), so pickle is safe here. Pickle is used because
+it moves the arrays of a large plan without conversion.
 """
 
 from __future__ import annotations

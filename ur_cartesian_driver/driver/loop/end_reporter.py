@@ -35,7 +35,7 @@ CAUSE_LEAD = 0.1
 
 
 class EndReporter:
-    """Reports the end to the owner, the recording and the status of the link."""
+    """Reports the end of a motion to the owner, the recording and the status of the link."""
 
     def __init__(
         self, link: RobotLink, pipe: OwnerPipe, recorder: Recorder, outputs: OutputSecurer

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Run the robot loop in its own process, or in a thread; no other module depends on which.
+Run the robot loop in its own process, or in a thread; no other module depends on the choice.
 
 The process is not forked, because the owner may be a ROS node with many threads. It inherits two
 open descriptors: of the pipe and of the shared memory. If the process dies, its sockets close and

@@ -15,7 +15,8 @@ from ur_cartesian_driver.motion.goal.goal import SafeOutput
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.services.output_writer import write_outputs
 
-#: Period and total time of the retries of a failed write [s]; people would not expect a later one.
+#: Period and total time of the retries of a failed write [s]; a later write could take people
+#: by surprise.
 RETRY_PERIOD, RETRY_TIMEOUT = 0.25, 5.0
 
 

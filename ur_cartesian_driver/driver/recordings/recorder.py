@@ -5,7 +5,7 @@ Record every motion in its own file, written while the motion runs.
 
 Packets are 2 ms apart, and a disk may take longer than that at any time. So a packet is copied
 into a preallocated buffer (a few microseconds), and a separate thread writes full buffers. The
-number of buffers is fixed: if the disk is too slow, rows are lost, which the recording counts, but
+number of buffers is fixed: if the disk is too slow, rows are lost (the recording counts them), but
 the motion is not delayed and memory does not grow. A recording that cannot be written ends with a
 warning; the motion goes on.
 """

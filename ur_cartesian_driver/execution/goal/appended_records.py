@@ -69,7 +69,7 @@ class AppendedRecords(Phrasing, Reporting):
 
     def supply(self, state: GoalState, *, runs_out: bool, has_more: bool) -> Meaning:
         """
-        Return the signal about points: they run out, come while the arm rests, or end.
+        Return the signal that is due about the supply of points (such as STARVING), or none.
 
         :param runs_out: whether only the ending is left to send.
         :param has_more: whether the goal has a motion after the ending.
@@ -95,7 +95,7 @@ class AppendedRecords(Phrasing, Reporting):
         return self.committed
 
     def rest(self, time: float = inf) -> None:
-        """Note that the arm rests after the ending, at a planned time [s]."""
+        """Note that the arm rests after the ending, whose planned end is ``time`` [s]."""
         self._is_resting = True
         self._monitor.finish(time)
 

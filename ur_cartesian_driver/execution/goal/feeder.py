@@ -10,7 +10,8 @@ Motions differ greatly: points on a socket, set-points through registers, a pers
 arm. One base class with a hook for each difference would leave most hooks empty in most feeders.
 So a feature of only some motions is a *capability*: a small class from which the feeder, or one of
 its :attr:`~Feeder.parts`, inherits. The machine looks up the capabilities once
-(:class:`Capabilities`). The methods of a capability class are the defaults for feeders without it.
+(:class:`Capabilities`). The methods of a capability class are the defaults for feeders without
+that capability.
 
 To add a capability, write its class here, add a line to :class:`Capabilities`, use it in the
 machine, and let the feeder or part that has it inherit from the class. The other feeders need no
@@ -84,7 +85,7 @@ class Prepared:
 
     def explain_not_ready(self, packet: RobotState | None) -> str:
         """
-        Return why the motion cannot begin yet, as a clause, or ''.
+        Return why the motion cannot begin yet, as a clause; '' = it can begin.
 
         :param packet: the newest packet of the robot; None before the first packet.
         """
@@ -102,7 +103,7 @@ class Appendable:
         return [AnswerAppend(number=append_job.number, refusal='The goal is not open.')]
 
     def supply(self, state: GoalState) -> Meaning:
-        """Return the signal about points: they run out, come while the arm rests, or end."""
+        """Return the signal that is due about the supply of points (such as STARVING), or none."""
         return NO_MEANING
 
 
@@ -210,7 +211,7 @@ class Phrasing:
         return ''
 
     def location(self, *, started: bool) -> str:
-        """Return when or where the motion ended, as a clause; '' = name the point."""
+        """Return when or where the motion ended, as a clause; '' = the monitor names the place."""
         return ''
 
 
@@ -224,7 +225,7 @@ class Reporting:
 
 
 class Capabilities:
-    """The capabilities of a feeder; each one that it lacks has its default methods."""
+    """The capabilities of a feeder; for each that it lacks, an object with the default methods."""
 
     def __init__(self, feeder: Feeder) -> None:
         """Look up the capabilities of the feeder and its parts."""

@@ -104,12 +104,12 @@ class AnswerAppend(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OpenServo(GoalCommand):
-    """Claim the RTDE inputs of the buffered servo, and have the robot report its outputs."""
+    """Claim the RTDE inputs of the buffered servo, and request its RTDE outputs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OpenOffsets(GoalCommand):
-    """Claim the RTDE inputs of path offsets, and have the robot report its outputs for them."""
+    """Claim the RTDE inputs of path offsets, and request their RTDE outputs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

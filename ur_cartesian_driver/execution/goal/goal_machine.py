@@ -265,7 +265,7 @@ class GoalMachine:
         return GoalSignal.DEVIATION, fault
 
     def _check_packet(self, packet: RobotState, now: float) -> Meaning:
-        """Return the signal of a packet in the present state; nothing has stopped the robot."""
+        """Return the signal of a packet in the present state; the packet reports no stop."""
         if self.state in RUNNING_STATES:
             fault = self._monitor.find_fault(
                 packet, may_stand_still=self.can.streaming.is_read(now)
@@ -315,9 +315,9 @@ class GoalMachine:
         """
         Return whether the program runs the goal, but has not reported a point of it yet.
 
-        A CANCELED names no goal. If it comes this early, it most likely answers an earlier goal
-        whose end was never seen because RTDE was lost. So it takes effect only if no point begins
-        within ``EARLY_CANCELED_TIMEOUT``.
+        The result CANCELED does not say to which goal it belongs. If it comes this early, it most
+        likely belongs to an earlier goal whose end was never seen because RTDE was lost. So it
+        takes effect only if no point begins within ``EARLY_CANCELED_TIMEOUT``.
         """
         return self.state in RUNNING_STATES and self._monitor.awaits_count()
 
@@ -341,7 +341,7 @@ class GoalMachine:
     # ---- from signals to commands -------------------------------------------------------------
 
     def _apply(self, signal: GoalSignal, text: str, now: float) -> list[GoalCommand]:
-        """Make the transition in the table, and return its commands; only this sets the state."""
+        """Make a table transition and return its commands; only this method sets ``state``."""
         transition = TRANSITIONS[self.state][signal]
         before, self.state = self.state, transition.state
         if transition.code is not None:
@@ -397,7 +397,7 @@ class GoalMachine:
 
     def _explain_late(self, tolerance: float) -> str:
         """
-        Return how late the last point was reached, as a clause, or ''.
+        Return how late the last point was reached, as a clause; '' = in time.
 
         :param tolerance: allowed delay [s]; negative = any delay.
         """

@@ -198,7 +198,7 @@ class GoalMonitor:
         )
 
     def script_call(self) -> tuple[float, str]:
-        """Return the timeout [s] and the place of the running script function; 0 = none runs."""
+        """Return timeout [s] and place (clause) of the running script function; (0, '') = none."""
         if not self.job.script_calls:
             return 0.0, ''
         record = self.records.begun_records(self._motions_begun) - 1
@@ -353,7 +353,7 @@ class GoalMonitor:
         return f'the robot program has been {where} for more than its timeout of {timeout:g} s'
 
     def _wrong_speed(self, state: RobotState) -> str | None:
-        """Return a clause if a program without progress reports is far too fast or slow."""
+        """Return a clause if a program without progress reports is much too fast or slow."""
         if self._speed_check is None or not self._awaits_count:
             return None
         return self._speed_check.violation(state.target_tcp_twist, self.scaled_time, self.time())

@@ -23,7 +23,7 @@ def missed_deadline(
     """
     Return the signal for a missed deadline, with a clause for the outcome's text.
 
-    :param state: any state with a deadline, except those in which the program runs points.
+    :param state: a state with a deadline; not MOVING or RUNNING_OUT.
     """
     match state:
         case GoalState.ARMING:

@@ -51,7 +51,7 @@ class MotionJob:
     duration: float
     #: When the last point is due [s]; None = the goal gives no times.
     due: float | None = None
-    #: How long after the end of the motion the last output is switched [s]; part of ``due``.
+    #: How long after the end of the motion the last output is switched [s]; ``due`` includes it.
     output_delay: float = 0.0
     T_base_frame: Pose = IDENTITY
     #: The robot's TCP at the time of planning.
@@ -62,7 +62,7 @@ class MotionJob:
     T_tcp_controlled: Pose = IDENTITY
     path_tolerance: Tolerance = field(default_factory=Tolerance)
     goal_tolerance: Tolerance = field(default_factory=Tolerance)
-    #: The joint tolerances of a joint goal, in addition to the others.
+    #: The joint tolerances of a joint goal, in addition to the tolerances above.
     joint_tolerances: JointTolerances | None = None
     #: Allowed delay of the end [s]; 0 = the default, negative = no limit.
     goal_time_tolerance: float = 0.0
@@ -72,8 +72,8 @@ class MotionJob:
     #: chooses, nor for open goals and set-points.
     has_speed_profile: bool = True
     execution: ExecutionMode = ExecutionMode.PRIMITIVES
-    #: (records,) index of the waypoint to which each record leads or belongs; empty = record i is
-    #: the motion to waypoint i.
+    #: (records,) index of the waypoint to which each motion leads, or each output belongs; empty =
+    #: record i is the motion to waypoint i.
     waypoint: Int32s = field(default_factory=lambda: np.empty(0, dtype=np.int32))
     #: (records,) mask of the records that are motions, which the robot program counts; empty = all
     #: records are motions.
@@ -81,21 +81,23 @@ class MotionJob:
     #: (records,) when each record is planned to end [s]; an output ends with its motion. Empty =
     #: when the reference path arrives at the waypoint of the record.
     end_times: Floats = field(default_factory=lambda: np.empty(0))
-    #: (records,) when the robot program asks for the record after each record [s]: when the record
-    #: ends, or when the blend at its end begins. Empty = at ``end_times``.
+    #: (records,) when the robot program, while it runs a record, asks for the next one [s]: when
+    #: the running record ends or, with a blend at its end, when that blend begins. Empty = at
+    #: ``end_times``.
     request_times: Floats = field(default_factory=lambda: np.empty(0))
     #: Whether points may be appended (keep_open).
     keep_open: bool = False
-    #: How far ahead of the arm its motion may be final [s]; 0 = not limited.
+    #: Motion farther ahead of the arm than this time must remain replaceable [s]; 0 = need not.
     replace_horizon: float = 0.0
     #: How many records at the end of an open goal bring the arm to rest if nothing is appended.
     ending_records: int = 0
-    #: Whether the robot program does anything at points while the arm stands still.
+    #: Whether at some point the robot program does something while the arm stands still.
     has_stops: bool = False
-    #: By waypoint: the timeout [s] of its wait for an input, and the clause if no input came.
+    #: By waypoint with a wait for an input: the timeout of the wait [s], and the clause that
+    #: explains a failure because the input did not come.
     input_waits: Mapping[int, tuple[float, str]] = field(default_factory=dict)
-    #: By record number: the time allowed for its function of the prelude [s], and a clause that
-    #: says where the program is while the function runs.
+    #: By number of a record that calls a function of the prelude: the longest duration of the call
+    #: [s], and a clause that names the function and the point.
     script_calls: Mapping[int, tuple[float, str]] = field(default_factory=dict)
     #: The parts of the path where the tool may give way.
     presses: tuple[PressWindow, ...] = ()
@@ -103,7 +105,8 @@ class MotionJob:
     safe_outputs: tuple[SafeOutput, ...] = ()
     #: How long the motion waits for an arm that is off its path [s]; 0 = it does not wait.
     stall_timeout: float = 0.0
-    #: Analog outputs that the robot program itself writes again after a pause.
+    #: Pins of the analog outputs that follow the speed (``proportional_outputs``): after a pause
+    #: the robot program writes them again, so the driver does not restore them.
     following_outputs: frozenset[int] = frozenset()
     #: The band within which offsets may displace the path; None = no offsets.
     offset_band: OffsetBand | None = None
@@ -125,7 +128,7 @@ class MotionJob:
 
     @property
     def own_program_needs(self) -> str:
-        """A feature of the job that needs our own robot program, for a sentence; '' = none."""
+        """A feature of the job that only our own robot program has, as a noun; '' = none."""
         if self.following_outputs:
             return 'outputs that follow the speed (proportional_outputs)'
         if not self.is_motion.all():
@@ -143,7 +146,7 @@ class MotionJob:
 class AppendJob:
     """Records that are appended to an open goal."""
 
-    #: The number by which the answer is matched.
+    #: The number of this request; the answer carries the same number.
     number: int
     #: How many records of the goal stay; the appended records follow them, and replace any later
     #: ones that were planned before.
@@ -168,7 +171,7 @@ def job_from_plan(
     :param start_time: when the plan's first segment begins, since the start of the goal [s]; not
         0 for appended points.
     :param ending_records: see :class:`MotionJob`.
-    :param spline: the joint spline of a part that does not begin at rest.
+    :param spline: the joint spline of a part that does not begin at rest; None = the plan's own.
     """
     goal, rows, streams = plan.goal, plan.rows, plan.execution.traits.streams_setpoints
     stalls = goal.on_path_tolerance is OnPathTolerance.STALL
@@ -275,10 +278,10 @@ def _longest_delay(rows: PlannedRows, row: int) -> float:
 
 
 def _blend_lead_times(rows: PlannedRows) -> Floats:
-    """Return for each motion an upper bound of the time from its blend's start to its end [s]."""
+    """Return for each motion an upper bound on how long before its end its blend begins [s]."""
     radii = blend_radii(rows.primitives)
-    # On average the tool is slower in the segment than in its blend; if it brakes before the
-    # blend, the time in the blend entry is longer.
+    # The first bound holds for a tool that is not slower in the blend than on average in the
+    # segment; for one that brakes before the blend, the time in the blend entry is longer.
     share = radii / np.maximum(np.maximum(rows.lengths, radii), 1e-300)
     times: Floats = np.maximum(rows.durations * share, rows.blend_entries[:, -1])
     return times

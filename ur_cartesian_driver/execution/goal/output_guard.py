@@ -5,8 +5,8 @@ The outputs of a goal that have to be safe whenever its motion does not go on as
 
 The robot program gets the safe values before the motion; the thread of the program that stops the
 arm also sets the outputs. A program that is paused or gone runs no thread: then the driver writes
-the values to the robot. An order takes effect here only once it is confirmed: the robot program
-confirms with a token, the driver's write with the list of outputs that it has changed.
+the values to the robot. An order is regarded as carried out only once it is confirmed: the robot
+program confirms it by a token, the driver by the list of outputs that its write has changed.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ class OutputGuard:
         Keep the outputs of a goal; without outputs the guard does nothing.
 
         :param packet: the newest packet of the robot.
-        :param following: analog outputs that the robot program itself writes again after a pause.
+        :param following: pins of the analog outputs that follow the speed; they are not restored
+            after a pause, because the robot program writes them again.
         """
         self._outputs, self._following = outputs, following
         self._token = packet.safe_outputs_token
@@ -63,9 +64,9 @@ class OutputGuard:
 
     def release(self, *, succeeded: bool) -> list[GoalCommand]:
         """
-        Return the command at the end of the goal.
+        Return the command for the robot program at the end of the goal.
 
-        After a success the outputs stay as they are, else the robot program makes them safe.
+        After a success the outputs stay as they are, otherwise the robot program makes them safe.
         """
         return self._order(SafeOutputsAction.DISARM if succeeded else SafeOutputsAction.SET)
 

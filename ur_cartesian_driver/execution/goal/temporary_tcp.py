@@ -83,7 +83,7 @@ class TemporaryTcp:
         return True
 
     def retry_now(self) -> None:
-        """Allow the next try at once, because a change of the robot may let it succeed."""
+        """Allow the next try at once, because the robot has changed and may now accept the TCP."""
         self._retry_period, self._next_retry = MIN_RETRY_PERIOD, -inf
 
     def report(self, packet: RobotState | None) -> str:

@@ -52,11 +52,11 @@ class WireRecords:
 
     def running_waypoints(self, motions: int, lag_motions: int = 0) -> tuple[int, int] | None:
         """
-        Return the points to which the newest begun motion and the one before it lead.
+        Return the points to which the newest begun motion and an earlier motion lead.
 
-        :param motions: how many motions have begun; None is returned for 0.
-        :param lag_motions: by how many motions the controller's target may lag: "the one before
-            it" is earlier by this number. Without such a motion, its point is -1.
+        :param motions: how many motions have begun; for 0 the result is None.
+        :param lag_motions: by how many motions the controller's target may lag: the earlier motion
+            comes ``1 + lag_motions`` before the newest. If there is none, its point is -1.
         """
         if motions <= self._first_motion:
             return None

@@ -76,7 +76,7 @@ class LiveTargets(Steerable, Ageing, Reporting):
             warnings = self._warnings.due(text, now)
         self._was_blocked = bool(generator.blocked)
         if generator.target is not None and self.freshness.is_stale(now):
-            # Dropping the target does not stop an arm that rests there already.
+            # Dropping the target does not stop an arm that already rests at it.
             self.pauses += not generator.arrived
             generator.clear_target()
         self._last_came = min(self._last_came, now)

@@ -72,7 +72,7 @@ class LiveLimits:
     linear_acceleration: float = 1.0
     angular_velocity: float = 1.0
     angular_acceleration: float = 4.0
-    #: Bound on each joint [rad/s].
+    #: Bound on the speed of each joint [rad/s].
     joint_velocity: Vector6 = (inf,) * 6
     #: Margins to the singularities: wrist [rad], elbow [rad], shoulder [m]; 0 = no limit.
     singularity_margins: Vector3 = (0.05, 0.05, 0.02)
@@ -203,7 +203,7 @@ class OnlineTrajectoryGenerator:
         )
 
     def _move(self, linear: Vector3, angular: Vector3, dt: float) -> None:
-        """Take a step, shortened if the joints are not fast enough."""
+        """Take a step, shortened if a joint would be too fast."""
         pose, q = self._next_pose(linear, angular, dt)
         if q is None:  # only by rounding, because earlier cycles have checked the way
             reason = explain_unreachable(self._arm, pose @ self._T_tcp_flange)

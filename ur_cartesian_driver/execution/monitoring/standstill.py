@@ -24,8 +24,8 @@ class Standstill:
         """Find the longest planned standstill of the target."""
         #: Whether the target has stood still for longer than the plan explains.
         self.is_long = False
-        #: How long the target has stood still: in real time; in scaled time; the longest scaled
-        #: time that the plan explains [s].
+        #: How long the target has stood still, in real time [s]; the same in scaled time [s]; the
+        #: longest standstill that the plan explains, in scaled time [s], 0 = it explains none.
         self._time = self._scaled_time = self._timeout = 0.0
         self.extend(path, output_delay)
 

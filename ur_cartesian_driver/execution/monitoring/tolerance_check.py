@@ -97,7 +97,7 @@ class ToleranceCheck:
 
 def excess_clause(errors: Iterable[tuple[str, str, str, float, float]]) -> str | None:
     """
-    Return a clause about the error with the largest ratio to its limit, if that exceeds 1.
+    Return a clause about the error with the largest ratio to its limit; None = no ratio exceeds 1.
 
     A NaN is treated as the largest error; of several NaN the first is named.
 
@@ -132,7 +132,7 @@ def _rate(name: str, unit: str, field: str, first: int) -> ToleranceQuantity:
     """
     Return the quantity for the linear or angular half of a twist or acceleration.
 
-    Its error is NaN if the robot reports no such value.
+    Its error is NaN if the robot does not report that twist or acceleration.
     """
 
     def limits(tolerance: Tolerance) -> Vector3:

@@ -11,8 +11,8 @@ until it is told how many there are. Three rules hold whatever is appended:
   a blend; after a spline a braking piece), and the ending is held back. If no more points have
   come by ``margin`` seconds before the program would ask for the next one, the ending is sent, and
   the stream is closed with the number of its records.
-* Records that were sent are final, and a program that is cancelled has to read all of them. So
-  only ``horizon`` seconds of motion are sent ahead.
+* Records that were sent cannot be replaced, and a program that is cancelled has to read all of
+  them. So only ``horizon`` seconds of motion are sent ahead.
 * Memory does not grow: records that were sent, and the path behind the arm, are forgotten.
 
 Only goals with keep_open have the states RUNNING_OUT and AWAITING_POINTS
@@ -46,7 +46,7 @@ class AppendFeeder(PointFeeder, Appendable):
         """
         Begin with the records that are known so far; nothing is sent yet.
 
-        :param horizon: how far ahead of the arm motion is sent to the robot program [s].
+        :param horizon: how far ahead of the arm its motion is sent to the program [s].
         :param margin: the stream is closed this long before the robot program would ask for a
             missing point [s].
         :param timeout: how long the goal waits at rest for more points [s]; 0 = without limit.
@@ -75,7 +75,7 @@ class AppendFeeder(PointFeeder, Appendable):
         return [answer, *self._release()]
 
     def supply(self, state: GoalState) -> Meaning:
-        """Return the signal about points: they run out, come while the arm rests, or end."""
+        """Return the signal that is due about the supply of points (such as STARVING), or none."""
         return self._appended.supply(
             state,
             runs_out=self._is_running_out(),

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The feeder of a goal whose points the robot runs while offsets displace its path.
+The feeder of a goal whose points the robot runs while offsets displace the path.
 
 In addition to sending points, the feeder answers each packet about the offset with the offset to
 reach. The robot program moves towards this offset within the bounds of the goal, cycle by cycle,
@@ -34,10 +34,11 @@ from ur_cartesian_driver.motion.plan.offset_band import (
 )
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
-#: By how much our first sequence number exceeds the last one that the robot has read: more than
-#: the count of numbers that a lost client may have written and the robot has not read.
+#: By how much our first sequence number exceeds the last one that the robot has read. Between the
+#: two are the numbers that a lost client may have written and the robot has not read.
 SEQUENCE_GAP = 1000
-#: If the robot has read a number beyond this, ours begin at 0, long before the register overflows.
+#: If the last number that the robot has read is not below this, ours begin at 1: long before the
+#: register overflows.
 MAX_SEQUENCE = 2**30
 
 
@@ -48,7 +49,7 @@ class OffsetPointFeeder(PointFeeder, Prepared, Displaced):
     _takes_offsets = True
 
     def __init__(self, monitor: GoalMonitor, band: OffsetBand) -> None:
-        """Begin before the RTDE inputs are claimed."""
+        """Keep the offset band; the RTDE inputs are not claimed yet."""
         super().__init__(monitor)
         self._band, self._requests = band, OffsetRequests(band)
         self.parts = (self._requests,)

@@ -3,8 +3,8 @@
 """
 The feeder of a goal with keep_open through the buffered servo.
 
-The driver makes the set-points, and only set-points already made are final: the rest of the curve,
-even its ending, can be replaced at once. A goal whose set-points reach the ending comes to rest
+The driver makes the set-points. Those already made can no longer be replaced, but the remaining
+curve can be, even its ending, at once. A goal whose set-points reach the ending comes to rest
 (RUNNING_OUT, :mod:`~ur_cartesian_driver.execution.goal.goal_transitions`); points that come later
 continue from that rest.
 """
@@ -69,7 +69,7 @@ class AppendServoFeeder(ServoFeeder, Appendable):
         return [answer]
 
     def supply(self, state: GoalState) -> Meaning:
-        """Return the signal about points: they run out, come while the arm rests, or end."""
+        """Return the signal that is due about the supply of points (such as STARVING), or none."""
         self._notice_ending()
         return self._appended.supply(
             state, runs_out=self._stop_time < inf, has_more=self._next_spline is not None

@@ -55,7 +55,7 @@ class BoundedOffset:
     """
     The offset, which moves towards a target within the bounds of a band.
 
-    Each axis moves independently, so none is too fast to stop at its limit.
+    Each axis has its own bounds and its own limit, so each can stop at its limit in time.
     """
 
     def __init__(self, band: OffsetBand) -> None:

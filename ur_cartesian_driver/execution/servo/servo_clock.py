@@ -8,9 +8,10 @@ how fast the robot's time runs; L, the motion time in flight, accumulates the re
 
     rate = effective_speed + (target - L) / T        0 <= rate <= MAX_RATE, slew-limited
 
-L is the motion time in the robot's buffer, which the robot reports, plus the time of set-points
-that the robot had not read when it made the report. So the delay of the wire does not make L look
-too small, and the loop (an integrator with a proportional gain) does not oscillate.
+T is :data:`CORRECTION_TIME`. L is the motion time in the robot's buffer, which the robot reports,
+plus the time of set-points that the robot had not read when it made the report. So the delay of
+the wire does not make L look too small, and the loop (an integrator with a proportional gain) does
+not oscillate.
 
 With s for the true speed, the derivative of L is ``rate - s``. The clock keeps L within
 ``max_lag`` at any rate: everything in flight fits into the buffer even if the robot reads all of

@@ -14,8 +14,8 @@ goal (:mod:`~ur_cartesian_driver.execution.goal.goal_transitions`) then mean:
 * in CANCELLING the mode IDLE is written instead of a CANCEL; the program answers by leaving the
   servo.
 
-However the goal ends, the robot program is told to brake and stop reading, and the inputs are
-released.
+At the end of every goal, successful or not, the robot program is told to brake and stop reading,
+and the inputs are released.
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ from ur_cartesian_driver.motion.geometry.vectors import subtract6
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.servo_report import UNKNOWN6
 
-#: A robot program that has read one of our sequence numbers within this time does not hang, even
-#: if the arm stands still [s].
+#: A robot program that has read one of our sequence numbers within this time [s] is not considered
+#: hung, even if the arm stands still.
 ANSWER_TIMEOUT = 1.0
-#: The controller's target lags the set-point that ``servoj`` follows by about its lookahead time,
-#: and by more with a low gain: by this many lookahead times at most.
+#: ``servoj`` smooths its set-points, so the controller's target lags them: by about the lookahead
+#: time of ``servoj``, or, with a low gain, by up to this many lookahead times.
 MAX_LAG_LOOKAHEADS = 4.0
 #: ``servoj`` has reached its end if every joint is this near to the last set-point [rad].
 _END_TOLERANCE = 1e-4
@@ -66,7 +66,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
 
     def __init__(self, monitor: GoalMonitor, stream: ServoStream, *parts: object) -> None:
         """
-        Begin before the RTDE inputs are claimed.
+        Keep the stream; the RTDE inputs are not claimed yet.
 
         :param stream: the stream of set-points, from the goal's spline or another source.
         :param parts: objects with further capabilities of this motion.
@@ -106,7 +106,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         )
 
     def _joint_distance(self, packet: RobotState, knot: int) -> float:
-        """Return the largest joint distance of the target from a knot [rad]; 0 = no spline."""
+        """Return the largest distance of a joint target from a knot [rad]; 0 without a spline."""
         if self._spline is None:
             return 0.0
         q, _, _ = self._spline.at(float(self._spline.times[knot]))
@@ -183,7 +183,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
     # ---- progress -----------------------------------------------------------------------------
 
     def motions_begun(self, packet: RobotState) -> tuple[int | None, int]:
-        """Return how many pieces of the spline the arm has begun, and the lag of its target."""
+        """Return the count of spline pieces begun (None = no spline), and the target's lag."""
         if self._spline is None:
             return None, 0
         time = self.stream.motion_time
@@ -199,7 +199,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         return now - self._last_answer < ANSWER_TIMEOUT
 
     def has_arrived(self, packet: RobotState) -> bool:
-        """Return whether the target is at the last set-point: servoj may swing past and back."""
+        """Return whether the target is at the last set-point, which servoj may overshoot."""
         return self._joint_distance(packet, -1) <= _END_TOLERANCE
 
     @property

@@ -58,8 +58,8 @@ START_FILL = 0.75
 RESTART_ACCELERATION = 2.0
 #: How fast the rate of the motion falls while the arm is off its path [1/s].
 STALL_DECELERATION = 4.0
-#: If the robot has read a sequence number beyond this, ours begin at 0, long before the register
-#: overflows.
+#: If the last sequence number that the robot has read is not below this, ours begin at 1: long
+#: before the register overflows.
 MAX_SEQUENCE = 2**30
 #: Steps of the robot's clock that are negative or longer than this are taken as 0 [s].
 MAX_CLOCK_GAP = 1.0

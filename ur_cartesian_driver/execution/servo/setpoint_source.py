@@ -12,7 +12,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector6, vector6
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 
 #: How many set-points of a spline are computed at a time: in an array each takes a fiftieth of
-#: the time.
+#: the time that it takes alone.
 BATCH = 128
 _TIME_TOLERANCE = 1e-12
 

@@ -18,8 +18,8 @@ from typing import NamedTuple
 from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
 
 AXES = 'XYZ'
-#: Two states of an axis: its position is known, or not known yet. A state above 0 is the number of
-#: the line since which the position is unknown.
+#: Two states of an axis: its position is known, or not known yet. A state above 0 means that the
+#: position was lost; the state is the number of the line that lost it.
 _KNOWN, _BEGIN = 0, -1
 
 
@@ -37,10 +37,10 @@ class Coordinates:
         """Begin at an unknown position."""
         self.place = [0.0, 0.0, 0.0]
         self.states = [_BEGIN, _BEGIN, _BEGIN]
-        #: Whether the tool has gone to a machine position since the last point; whether the state
-        #: of an axis has changed since then.
+        #: ``is_away``: the tool has gone to a machine position since the last point;
+        #: ``has_changed``: the state of an axis has changed since the last point.
         self.is_away, self.has_changed = False, True
-        #: The present offsets; the offsets that apply without G92 and G52.
+        #: ``_offsets`` are the present offsets; ``_origin`` are those without G92 and G52.
         self._offsets = self._origin = [_Offset(), _Offset(), _Offset()]
         #: The offsets that G92.2 suspended; empty = none.
         self._suspended: list[_Offset] = []
@@ -124,7 +124,7 @@ class Coordinates:
         """
         Set the coordinates that the tool's present position has in the work offset (G10 L20).
 
-        :raises BrokenFile: G92 or G52 is in use, or as for :meth:`preset`.
+        :raises BrokenFile: G92 or G52 is in use, or :meth:`preset` refuses the coordinates.
         """
         if self._preset_by:
             raise BrokenFile(line, f'G10 L20 while {self._preset_by} is in use; cancel it before')
@@ -146,7 +146,7 @@ class Coordinates:
 
     def cancel_preset(self, code: str, line: int) -> None:
         """
-        Cancel the offsets of G92 and G52 (G92.1, G92.2), or restore those before G92.2 (G92.3).
+        Cancel the offsets of G92 and G52 (G92.1, G92.2), or restore what G92.2 cancelled (G92.3).
 
         :raises BrokenFile: G92.3 is given, but G92.2 has not suspended any offsets.
         """
@@ -168,7 +168,7 @@ class Coordinates:
     # ---- rows of the path ----------------------------------------------------------------------
 
     def start_is_known(self, states_before: Sequence[int]) -> bool:
-        """Return whether the last motion's start is as well known, along each axis, as its end."""
+        """Return whether the last motion's start is known along each axis whose end is known."""
         return self.states == states_before or all(
             before == after or (before == _BEGIN and from_zero)
             for before, after, from_zero in zip(

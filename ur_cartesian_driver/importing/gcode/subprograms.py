@@ -17,15 +17,17 @@ _END_LINE = re.compile(r'\s*(?:N\s*[0-9]+\s*)?M\s*0*(?:2|30)\b', re.I)
 _MAX_DEPTH = 10
 #: Largest number of executed lines of all subprograms together.
 _MAX_LINES = 200_000
-#: Fanuc packs repetitions and a four-digit number into one P: P51002 calls O1002 five times.
+#: Fanuc packs repetitions and a four-digit program number into one P: P51002 calls O1002 five
+#: times.
 _PACKED = 10_000
 
 
 @dataclass(slots=True)
 class _Call:
     number: int
-    #: The index of the subprogram's first line; the index of the line after the call.
+    #: The index of the subprogram's first line.
     first: int
+    #: The index of the line after the call.
     back: int
     repeats_left: int
 
@@ -62,7 +64,7 @@ class LineSequence:
         self._next = len(self._lines)
 
     def meet_number(self, line: int, number: int, *, is_first: bool) -> None:
-        """Accept an O number at the beginning; refuse a program that runs into a later one."""
+        """Accept an O number at the program's beginning; refuse to run into a later O number."""
         if self._calls:
             raise BrokenFile(line, f'the subprogram O{self._calls[-1].number} has no M99 before')
         if not is_first:

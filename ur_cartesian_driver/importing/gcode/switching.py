@@ -3,8 +3,8 @@
 """
 The outputs that codes switch.
 
-S is the power of a spindle or a laser. S drives its output while M3 or M4 is active, even if its
-number changes on a line without M3 and M4, such as GRBL's ``G1 X1 S200``. M5, M2 and M30 set the
+S is the power of a spindle or a laser. While M3 or M4 is active, S drives its output; a new S on a
+line without M3 and M4, such as GRBL's ``G1 X1 S200``, takes effect at once. M5, M2 and M30 set the
 output to 0.
 """
 
@@ -112,7 +112,7 @@ class CodeOutputs:
     def _switch(
         self, line: int, code: str, values: Mapping[str, float], modal: Mapping[str, float]
     ) -> None:
-        """Switch the output of a code; of several that fit, the one with the most values."""
+        """Switch the output of a code; if several outputs fit, the one with the most values."""
         own = [f'{letter}{value:g}' for letter, value in values.items()]
         here = {*own, *(f'{letter}{value:g}' for letter, value in modal.items())}
         keys = [key for key in self._keys.get(code, ()) if here.issuperset(key)]

@@ -35,9 +35,10 @@ class Toolpath:
         #: Factor on X: 0.5 if X is a diameter (G7), 1 if it is a radius (G8); None = not given.
         self.share_of_x: float | None = None
         self._has_begun = False
-        #: How far the tool may be beside a corner, and the unit of that [m]; for a corner, 0 = it
-        #: stops there, None = as the options say; for the unit, None = the first one of the file.
+        #: Allowed distance of the tool from a corner, in ``_corner_unit``; 0 = the tool stops at
+        #: the corner, None = as the options say.
         self._corner: float | None = None
+        #: The unit of ``_corner`` [m]; None = the first unit in the file.
         self._corner_unit: float | None = None
 
     def length(self, line: int) -> float:
@@ -58,14 +59,15 @@ class Toolpath:
 
     def set_corner(self, number: float | None) -> None:
         """
-        Set how far the tool may be beside the corners that follow.
+        Set the allowed distance of the tool from the following corners.
 
-        :param number: in the unit of lengths; 0 = it stops there, None = as the options say.
+        :param number: the distance in the unit of lengths; 0 = the tool stops at each corner,
+            None = as the options say.
         """
         self._corner, self._corner_unit = number, self.unit
 
     def _corner_at(self, line: int) -> float | None:
-        """Return how far the tool may be beside the corner at the end of a motion [m]."""
+        """Return the allowed distance [m] from the corner after a motion; None = as in options."""
         if not self._corner:
             return self._corner
         if self._corner_unit is None:

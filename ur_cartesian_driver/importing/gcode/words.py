@@ -3,8 +3,9 @@
 """
 The codes and words of a line of a program.
 
-The grammar follows RS274/NGC: blanks and case mean nothing, a number has no exponent, a letter
-occurs once in a line. Commands of printers have other forms and are recognised by their beginning.
+The grammar follows RS274/NGC: blanks and case have no meaning, numbers have no exponents, and each
+letter except G and M occurs at most once in a line. Some commands of 3D printers have other forms;
+they are recognised by the beginning of the line.
 """
 
 from __future__ import annotations
@@ -18,10 +19,11 @@ from ur_cartesian_driver.importing.imported_path import BrokenFile
 
 _COMMENT = re.compile(r'\([^()]*\)|;.*')
 _MESSAGE = re.compile(r'\(\s*(MSG|DEBUG|PRINT|LOG)\s*,', re.I)
-# Replaces a comment until it is clear that it divides no word; no file has this character.
+# Replaces each comment until the check that no comment divides a word. No text file has this
+# character.
 _MARK = '\0'
 _DIVIDED_WORD = re.compile(rf'[A-Z]{_MARK}+[-+.0-9]|[-+.0-9]{_MARK}+[.0-9]')
-# Fifteen digits are all that a float keeps, and more than any length needs.
+# A float keeps fifteen digits, which is more than any length needs.
 _NUMBER = r'[-+]?(?:[0-9]{1,15}(?:\.[0-9]*)?|\.[0-9]+)'
 _WORD = re.compile(rf'([A-Z])({_NUMBER})')
 _BLOCK = re.compile(rf'(?:[A-Z]{_NUMBER})+')
@@ -29,7 +31,7 @@ _WORDS_BEFORE = re.compile(rf'(?:[A-Z]{_NUMBER})*')
 _BARE_LETTER = re.compile(r'[A-Z](?![-+.0-9])')
 _LINE_NUMBER = re.compile(r'N-?[0-9]+(?:\.[0-9]+)?')
 _CHECKSUM = re.compile(r'\*[0-9]+$')
-# After the number of a code, as in G92E0, E is a word.
+# Matches a number with an exponent; not after G or M, because in G92E0 the E begins a word.
 _EXPONENT = re.compile(r'[A-FH-LN-Z][ \t]*[-+]?[0-9.]+E[-+]?[0-9]+(?![0-9.])', re.I)
 _M_CODE = re.compile(r'(?:N-?[0-9]+)?M([0-9]+(?:\.[0-9]+)?)')
 _QUOTED = re.compile(r'"[^"]*"')
@@ -38,7 +40,7 @@ _PROGRAM_NUMBER = re.compile(r'[O:]([0-9]{1,8})')
 
 
 class Block(NamedTuple):
-    """The codes of a line, and its other words in their order."""
+    """The codes of a line in their order, and its other words by letter."""
 
     codes: list[str]
     words: dict[str, float]
@@ -48,10 +50,10 @@ class Block(NamedTuple):
 
 def read_line(number: int, line: str) -> Block | None:
     """
-    Return the codes and words of a line; None = it has none.
+    Return the codes and words of a line; None = the line is empty or only a comment.
 
-    A line that has no words, such as ``%``, becomes a block with the name of its row in the
-    table of codes.
+    For a line in another form, such as ``%``, the block has one code: the name under which the
+    table of codes lists such lines.
 
     :param number: the number of the line, for error messages.
     :raises BrokenFile: the line is no G-code.
@@ -60,7 +62,7 @@ def read_line(number: int, line: str) -> Block | None:
     if ';' in line or '(' in line:
         text = _COMMENT.sub(_MARK, line)
     text = text.replace(' ', '').replace('\t', '')
-    # Some other letters have ASCII capitals, such as the long s.
+    # Only ASCII: upper() would turn some other letters, such as the long s, into ASCII capitals.
     text = text.upper() if text.isascii() else text
     if not text:
         return None
@@ -83,7 +85,7 @@ def _block(number: int, line: str, text: str) -> Block:
         text = _LINE_NUMBER.sub('', text, count=1) if text[0] == 'N' else text
     if _BLOCK.fullmatch(text) is None or text[0] == 'O':
         return _odd_block(number, line, text)
-    # A blank before it distinguishes the word of an extruder from an exponent.
+    # Without a blank before it, the E of an extruder could also be an exponent.
     if 'E' in text and _EXPONENT.search(line) and _EXPONENT.search(_COMMENT.sub('', line)):
         raise BrokenFile(
             number,
@@ -104,12 +106,12 @@ def _block(number: int, line: str, text: str) -> Block:
 
 @lru_cache(maxsize=1024)
 def _code_name(letter: str, value: str) -> str:
-    """Return the name of a code: G01 and G1. are G1."""
+    """Return the name of a code, for example G1 for ``G01`` and for ``G1.``."""
     return f'{letter}{float(value):.15g}'
 
 
 def _printer_code(text: str) -> str | None:
-    """Return the code of a line if a text, or values that are no numbers, follow it."""
+    """Return the M-code of a line if text or non-numeric values follow it, else None."""
     match = _M_CODE.match(text)
     entry = code_named(name := _code_name('M', match[1])) if match else None
     if match is None or entry is None:

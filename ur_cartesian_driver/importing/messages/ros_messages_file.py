@@ -212,7 +212,7 @@ def _sequence(value: Any, name: str, line: int) -> Sequence[Any]:
 
 
 def _seconds(part: Any, line: int) -> float:
-    """Return the time [s] of a stamp or a duration; its fields have other names in ROS 1."""
+    """Return the time [s] of a stamp or a duration; ROS 1 names the fields differently."""
     part = _part(part, 'sec, nanosec', line)
     names = ('secs', 'nsecs') if 'secs' in _fields(part) else ('sec', 'nanosec')
     sec, nanosec = (_number(getattr(part, name), name, line) for name in names)

@@ -3,8 +3,9 @@
 """
 The position of the arm while a program runs, as far as the file determines it.
 
-Before the first move the arm's position is unknown; after lines only, the joint positions still
-are. Most programs never read the joint positions, so inverse kinematics waits until one does.
+Before the first move the arm's position is unknown; until the first joint motion, only the pose is
+known. Most programs never read the joint positions, so inverse kinematics is postponed until a
+program reads them.
 """
 
 from __future__ import annotations

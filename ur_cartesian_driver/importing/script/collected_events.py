@@ -60,10 +60,11 @@ class CollectedEvents:
         #: The newest point.
         self.last: CollectedPoint | None = None
         self._events: list[CollectedPoint | IOCommand | InputWait] = []
-        #: The TCP of the lines and arcs; None = there are none yet.
+        #: The TCP of the points without joint positions; None = there is no such point yet.
         self._tcp: Pose | None = None
-        #: The thread that moved the arm last; the thread that is in a motion call (None = none).
+        #: The thread that moved the arm last.
         self._mover = MAIN
+        #: The thread that is in a motion call; None = no thread is.
         self._moving: int | None = None
 
     def __len__(self) -> int:
@@ -72,7 +73,7 @@ class CollectedEvents:
 
     @property
     def acts(self) -> bool:
-        """Whether the running thread moved last, or is the main one and the mover has ended."""
+        """Whether the running thread moved the arm last, or is main and that thread has ended."""
         thread = self.run.thread
         return thread == self._mover or (thread == MAIN and not self.run.lives(self._mover))
 
@@ -102,7 +103,8 @@ class CollectedEvents:
         """
         Add a point.
 
-        :raises RuntimeException: the active TCP differs from that of the previous lines.
+        :raises RuntimeException: the point has no joint positions, and the active TCP is not that
+            of earlier such points.
         """
         if point.joints is None:
             if self._tcp not in (None, self.place.tcp):
@@ -137,7 +139,7 @@ class CollectedEvents:
         """
         Wait for an input at the last point.
 
-        :raises RuntimeException: another wait or a delayed output comes first at the same point.
+        :raises RuntimeException: the same point already has a wait or a delayed output.
         """
         point = self.last
         if point is None:
@@ -174,7 +176,7 @@ class CollectedEvents:
         self._events.append(replace(output, offset=offset))
 
     def hand_over(self, into: PathCollector) -> None:
-        """Add all events to a path; joint positions become poses of the TCP of the lines."""
+        """Add all events to a path; joint positions become poses of the other points' TCP."""
         tcp = self.place.tcp if self._tcp is None else self._tcp
         if (found := self.place.set_tcps.get(tcp)) is not None:
             line, pose = found

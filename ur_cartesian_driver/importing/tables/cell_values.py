@@ -17,7 +17,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats
 
 #: Matches a number; Python's float() also accepts underscores, digits of other scripts, and nan.
 _NUMBER = re.compile(r'\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?\s*', re.IGNORECASE | re.ASCII)
-#: All numbers of a table are smaller: even the ns since 1970 have only 19 digits.
+#: All numbers of a table are smaller than this: even the ns since 1970 have only 19 digits.
 _MAX_NUMBER = 1e30
 _NO_CHARACTER_OF_IT = re.compile(r'[^-+.0-9eE \t]')
 #: In a text with one cell on each line: a cell with thousands separators, and a cell whose comma

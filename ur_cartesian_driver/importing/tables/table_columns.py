@@ -163,7 +163,7 @@ def _say_others(
     """
     Add remarks on the columns that are left out.
 
-    :raises BrokenFile: a left-out column could be an orientation, and there is no other.
+    :raises BrokenFile: a left-out column could be an orientation, and no other column is one.
     """
     oriented = reasons.get(_ORIENTATION) or reasons.get(_NORMAL)
     for name, columns in COLUMNS.items():

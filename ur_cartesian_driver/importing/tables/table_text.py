@@ -129,7 +129,7 @@ def _with_rows(
     for number, text in itertools.islice(rows, 2):
         split = {d: [cell.strip() for cell in _cells(text, d)] for d in order}
         fitting = [d for d in order if _fits(split[d], len(table.titles))]
-        # If no delimiter fits, the later error about the width is for one that is in the row.
+        # If no delimiter fits, use one that occurs in the row; the row will be refused later.
         table.delimiter = next(iter(fitting), next((d for d in order if d and d in text), None))
         if table.units or not (fitting and _are_units(split[table.delimiter])):
             break

@@ -67,7 +67,7 @@ class Pose:
         return Pose(self.apply(other.position), multiply(self.quaternion, other.quaternion))
 
     def apply(self, point: Vector3) -> Vector3:
-        """Return a point that is given in this frame [m] in coordinates of the parent frame."""
+        """Return the coordinates [m] in the parent frame of a point given in this frame."""
         x, y, z = rotate(self.quaternion, point)
         px, py, pz = self.position
         return (x + px, y + py, z + pz)

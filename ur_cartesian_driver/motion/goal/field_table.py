@@ -78,16 +78,17 @@ class Mark(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """The range of a field's numbers, the same whatever other fields hold; all must be finite."""
+    """The range of a field's numbers, independent of other fields; the numbers must be finite."""
 
     low: float = -inf
     high: float = inf
-    #: For the text of a refusal: the unit of the numbers, and the advice to the user.
+    #: The unit of the numbers, for the text of a refusal.
     unit: str = ''
+    #: The advice to the user, for the text of a refusal.
     remedy: str = ''
     #: Whether ``low`` itself is excluded.
     above: bool = False
-    #: The meaning of 0 if it is special; 0 is then allowed even outside the range. '' = it is not.
+    #: The special meaning of 0, which is then allowed even outside the range; '' = 0 has none.
     zero: str = ''
     #: Whether the field of a spline's point can be NaN; the driver then chooses the number.
     nan_in_splines: bool = False

@@ -157,10 +157,11 @@ DEFAULT_OFFSET_MOTION = (0.02, 0.2, 0.5)
 #: time from the program's SUCCESS until the arm rests inside the goal tolerance.
 DEFAULT_GOAL_TIME_TOLERANCE = 1.0
 
-#: Largest turn beside the programmed path at a rounded corner, unless the goal gives it [rad].
+#: Largest turn of the tool from its programmed orientation at a rounded corner, unless the goal
+#: gives it [rad].
 DEFAULT_CORNER_ANGLE = 0.02
 
-#: The longest rest and timeout at a point [s]; longer ones must be mistakes.
+#: The longest dwell and timeout at a point [s]; longer ones must be mistakes.
 MAX_STOP_TIME = 600.0
 #: The longest time between a point and an output that it switches [s].
 MAX_OUTPUT_OFFSET = 60.0
@@ -215,9 +216,11 @@ class WaypointColumns:
     poses: Annotated[Floats, ColumnOf('pose', always=True)]
     #: (n,)
     times: Annotated[Floats, ColumnOf('time')]
-    #: (n, 6) each
+    #: (n, 6)
     twists: Annotated[Floats, ColumnOf('twist')]
+    #: (n, 6)
     accelerations: Annotated[Floats, ColumnOf('acceleration')]
+    #: (n, 6)
     jerks: Annotated[Floats, ColumnOf('jerk', packed=None)]
     #: The postures that are not empty, by row.
     postures: Annotated[Mapping[int, Posture], ColumnOf('posture')] = field(default_factory=dict)
@@ -238,9 +241,9 @@ class Segment:
     blend_radius: Annotated[float, NOT_NEGATIVE, Mark.OF_POINT] = 0.0
     #: How long the arm rests at the waypoint [s].
     dwell: Annotated[float, NOT_NEGATIVE, Mark.OF_POINT] = 0.0
-    #: 0 = derived from the times of the goal, or the default if the goal has none; also for
-    #: ``acceleration``.
+    #: 0 = derived from the times of the goal, or the default velocity if the goal has no times.
     velocity: Annotated[float, NOT_NEGATIVE] = 0.0
+    #: 0 = derived or the default, likewise.
     acceleration: Annotated[float, NOT_NEGATIVE] = 0.0
     #: A pose on the arc; only for CIRCULAR.
     via: Pose | None = None
@@ -251,8 +254,9 @@ class Segment:
     free_axis: Annotated[FreeAxis, Mark.OF_POINT] = FreeAxis.NONE
     free_min: Annotated[float, FINITE, Mark.OF_POINT] = 0.0
     free_max: Annotated[float, FINITE, Mark.OF_POINT] = 0.0
-    #: How far the path may be beside the corner at the waypoint; 0 = as the goal says.
+    #: Largest distance of the path from the segments at this corner [m]; 0 = the goal's bound.
     corner_deviation: Annotated[float, CORNER_DEVIATION, Mark.OF_POINT] = 0.0
+    #: Largest turn of the tool from its programmed orientation here [rad]; 0 = the goal's bound.
     corner_angle: Annotated[float, CORNER_ANGLE, Mark.OF_POINT] = 0.0
 
 
@@ -271,7 +275,7 @@ class SegmentColumns:
     vias: Annotated[Floats, ColumnOf('via', after='free_maxima')]
     #: (n,) whether the row has a pose on its arc
     has_via: Flags
-    #: The postures on the arcs that are not empty, by row.
+    #: The non-empty postures on the arcs, by row.
     via_postures: Annotated[Mapping[int, Posture], ColumnOf('via_posture')] = field(
         default_factory=dict
     )
@@ -347,19 +351,21 @@ class ProportionalOutput:
 
     first_waypoint: Annotated[int, FIRST_POINT]
     last_waypoint: Annotated[int, LAST_POINT]
-    #: How long before the first waypoint the output begins to follow the speed [s]; how long
-    #: before the last one it ends [s].
+    #: How long before the first waypoint the output begins to follow the speed [s].
     begin_lead: Annotated[float, SMALL_LEAD] = 0.0
+    #: How long before the last waypoint the output ceases to follow the speed [s].
     end_lead: Annotated[float, SMALL_LEAD] = 0.0
     pin: Annotated[int, Sent(always=False), Range(0, 1)]
     domain: Annotated[AnalogDomain, Sent(name='analog_domain', after='last_waypoint')] = (
         AnalogDomain.CURRENT
     )
-    #: Fraction of the range per speed of the tool [1/(m/s)], and the fraction at speed 0.
+    #: Fraction of the range per speed of the tool [1/(m/s)].
     gain: Annotated[float, Sent(always=False), Range(-1000.0, 1000.0)]
+    #: Fraction of the range at speed 0.
     offset: Annotated[float, Range(-100.0, 100.0)] = 0.0
-    #: Bounds of the output, as fractions of the range.
+    #: Lower bound of the output, a fraction of the range.
     minimum: Annotated[float, FRACTION] = 0.0
+    #: Upper bound of the output, a fraction of the range.
     maximum: Annotated[float, ALWAYS, FRACTION] = 1.0
     #: Time constant of a low-pass filter of first order for the speed [s].
     filter_time: Annotated[float, SMALL_LEAD] = 0.0
@@ -380,11 +386,13 @@ class Press:
     forces: tuple[float, ...] = ()
     #: Largest speed of the tool along each compliant axis [m/s, rad/s]; empty = the default.
     speed_limits: tuple[float, ...] = ()
-    #: How far the tool may be off the path along the other axes [m], [rad]; 0 = the default.
+    #: How far the tool may be off the path along the other axes [m]; 0 = the default.
     max_deviation: Annotated[float, ALWAYS, Range(0.0, 0.1)] = 0.0
+    #: How far the tool may be turned off the path about the other axes [rad]; 0 = the default.
     max_deviation_angle: Annotated[float, ALWAYS, Range(0.0, 0.5)] = 0.0
-    #: How far the tool may give way along compliant axes [m], [rad]; 0 = the default.
+    #: How far the tool may give way along compliant axes [m]; 0 = the default.
     max_yield: Annotated[float, ALWAYS, Range(0.0, 0.5)] = 0.0
+    #: How far the tool may give way about compliant axes [rad]; 0 = the default.
     max_yield_angle: Annotated[float, ALWAYS, Range(0.0, 1.5)] = 0.0
     damping: Annotated[float, ALWAYS, FRACTION] = 0.005
     gain_scaling: Annotated[float, ALWAYS, Range(0.0, 2.0)] = 1.0
@@ -428,8 +436,9 @@ class PathOffset:
     #: Largest offset along the path, across it and normal to both [m]; 0 = none. The upper bound,
     #: 0.1 m, is the default of the controller's own path offsets.
     limits: Annotated[Vector3, Range(0.0, 0.1, 'm')] = ZERO3
-    #: Largest speed [m/s] and acceleration [m/s^2] along each axis; 0 = the default.
+    #: Largest speed of the offset along each axis [m/s]; 0 = the default.
     speed: Annotated[float, Range(0.0, 0.1, 'm/s')] = 0.0
+    #: Largest acceleration of the offset along each axis [m/s^2]; 0 = the default.
     acceleration: Annotated[float, Range(0.0, 2.0, 'm/s^2')] = 0.0
     #: The age at which an offset is stale [s]; 0 = the default.
     timeout: Annotated[float, Range(0.0, 60.0, 's')] = 0.0
@@ -446,9 +455,9 @@ class Goal:
 
     frame_id: Annotated[str, Sent(name='trajectory.header.frame_id')] = ''
     waypoints: Annotated[Sequence[Waypoint], Sent(name='trajectory.points', always=False)]
-    #: The controlled frame: its name in the goal, and its pose in the flange; None = the robot's
-    #: active TCP.
+    #: Name of the controlled frame; '' = the frame has only a pose, or is the active TCP.
     controlled_frame: Annotated[str, Sent(name='trajectory.controlled_frame')] = ''
+    #: Pose of the controlled frame in the flange; None = the frame is the robot's active TCP.
     T_flange_controlled: Annotated[Pose | None, Mark.NOT_SENT] = None
     #: The frame of the goal in the robot's base.
     T_base_frame: Annotated[Pose, Mark.NOT_SENT] = IDENTITY
@@ -468,12 +477,12 @@ class Goal:
     presses: tuple[Press, ...] = ()
     execution: ExecutionMode = ExecutionMode.AUTO
     keep_open: bool = False
-    #: Time ahead of the arm within which points are final [s]; later points can be replaced.
+    #: Time ahead of the arm within which points are fixed [s]; later points can be replaced.
     replace_horizon: Annotated[
         float, Range(0.05, 1.0, 's', 'set it to 0.15', zero='nothing is replaced')
     ] = 0.0
     safe_outputs: tuple[SafeOutput, ...] = ()
-    #: The goal is refused if its plan falls below this fraction of the speed asked for.
+    #: The goal is refused if the planned speed falls below this fraction of the speed asked for.
     min_speed_fraction: Annotated[
         float, Range(0.0, 1.0, remedy='give a fraction', zero='not demanded')
     ] = 0.0
@@ -483,6 +492,8 @@ class Goal:
         float, DURATION, Range(0.0, unit='s', remedy=f'set 0 for {DEFAULT_STALL_TIMEOUT:g} s')
     ] = 0.0
     path_offset: PathOffset = PathOffset()
-    #: How far the path may be beside the corners of lines and arcs [m], [rad].
+    #: Largest distance of the path from lines and arcs at their corners [m], unless a segment has
+    #: its own; 0 = corners are not rounded.
     corner_deviation: Annotated[float, CORNER_DEVIATION] = 0.0
+    #: Largest turn of the tool from its programmed orientation there [rad]; 0 = the default.
     corner_angle: Annotated[float, CORNER_ANGLE] = 0.0

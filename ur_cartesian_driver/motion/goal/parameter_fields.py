@@ -9,7 +9,8 @@ The annotations with which a dataclass declares parameters, and the check of the
     max_tool_speed: Annotated[float, Range(0.0, 10.0)] = 0.25
 
 is all that declares this parameter. The node's parameters, their descriptions and the contents of
-``config/driver.yaml`` follow (:mod:`~ur_cartesian_driver.ros.parameters.parameter_table`).
+``config/driver.yaml`` follow from such declarations
+(:mod:`~ur_cartesian_driver.ros.parameters.parameter_table`).
 """
 
 from __future__ import annotations

@@ -52,13 +52,15 @@ class OffsetBand:
 
     #: Largest offset along, across and normal to the path [m].
     limits: Vector3
-    #: Largest speed [m/s] and acceleration [m/s^2] of the offset along each axis.
+    #: Largest speed of the offset along each axis [m/s].
     speed: float
+    #: Largest acceleration of the offset along each axis [m/s^2].
     acceleration: float
-    #: The age at which an offset is stale [s], and what happens then.
+    #: The age at which an offset is stale [s].
     timeout: float
+    #: What happens to a stale offset.
     on_stale: StaleOffset
-    #: Time between the rows below [s].
+    #: Time between two rows of ``axes`` and ``is_open`` [s].
     step: float
     #: (n, 3 axes, 3) the frame of the path in the base, at the times 0, step, 2 step, ...
     axes: Floats

@@ -101,8 +101,9 @@ class PlannedSegment:
     primitive: Primitive
     #: Index of the waypoint at the end of the primitive.
     waypoint: int
-    #: Length of the tool's path [m] and angle of its turn [rad], from waypoint to waypoint.
+    #: Length of the tool's path from waypoint to waypoint [m].
     length: float
+    #: Turn of the tool from waypoint to waypoint [rad].
     angle: float
     #: Expected time at full speed [s].
     duration: float

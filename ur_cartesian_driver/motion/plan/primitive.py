@@ -129,13 +129,13 @@ class SwitchOutput:
     domain: AnalogDomain = AnalogDomain.CURRENT
     #: Pose of the TCP in base at which to switch; None = when the motion before has ended.
     trigger_pose: Pose | None = None
-    #: Unit direction of the motion there, linear or angular, in the axes of the trigger pose. The
-    #: output switches when the tool crosses, in this direction, the plane through the pose.
+    #: Unit direction of the motion at the trigger pose, linear or angular, in the axes of this
+    #: pose. The output switches when the tool crosses, in this direction, the plane through it.
     trigger_direction: Vector6 = ZERO6
-    #: Whether the tool is beyond this plane when the program reads the record; the output then
-    #: switches only after the tool has been before the plane.
+    #: Whether the tool is already past this plane when the program reads the record; the output
+    #: then switches only once the tool has been in front of the plane and crosses it.
     starts_beyond: bool = False
-    #: Delay after the end of the last motion [s].
+    #: Delay after the end of the motion before [s].
     delay: float = 0.0
     #: Whether an analog output follows the speed, by the :class:`SpeedLaw` before this record,
     #: until the next record switches it.

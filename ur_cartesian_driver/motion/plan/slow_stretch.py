@@ -42,14 +42,17 @@ class SlowCause(Enum):
 class SlowStretch:
     """A stretch of the path on which the tool is slower than asked."""
 
-    #: Beginning and end: the index of a point, and the fraction of the segment to that point (of
-    #: its length; for a SPLINE, of its time).
+    #: Index of the point at the end of the segment in which the stretch begins.
     first: int
+    #: Fraction of that segment before the stretch: of its length; for a SPLINE, of its time.
     first_fraction: float
+    #: Index of the point at the end of the segment in which the stretch ends.
     last: int
+    #: Fraction of that segment before the end of the stretch.
     last_fraction: float
-    #: Speeds of the tool [m/s]: asked for, and planned at the slowest place.
+    #: Speed of the tool that is asked for [m/s].
     asked: float
+    #: Speed of the tool that is planned at the slowest place [m/s].
     lowest: float
     cause: SlowCause
     #: The explanation, as a clause.

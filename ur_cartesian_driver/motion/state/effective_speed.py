@@ -4,10 +4,10 @@
 The speed scaling of the robot program's motion, from the controller's reports.
 
 The controller reports two factors. ``target_speed_fraction`` is the speed slider.
-``speed_scaling`` is the slowdown in addition to the slider: 1 in an undisturbed motion at any
-slider, and 0 at rest. As in the manufacturer's ROS 2 driver and ``ur_rtde``, the effective speed
-is the product of both, is 0 while the program is RESUMING, and rises slowly after a pause: the
-controller reports a scaling of 1 before the arm has sped up from rest.
+``speed_scaling`` is the slowdown in addition to the slider: 1 in an undisturbed motion, wherever
+the slider is, and 0 at rest. As in the manufacturer's ROS 2 driver and ``ur_rtde``, the effective
+speed is the product of both, is 0 while the program is RESUMING, and rises slowly after a pause:
+the controller reports a scaling of 1 before the arm has sped up from rest.
 """
 
 from __future__ import annotations

@@ -50,13 +50,15 @@ class Signals:
     analog_inputs: tuple[AnalogChannel, AnalogChannel]
     analog_outputs: tuple[AnalogChannel, AnalogChannel]
     tool_analog_inputs: tuple[AnalogChannel, AnalogChannel]
-    #: Supply of the tool: the voltage setting [V], and the measured current [A].
+    #: Voltage setting of the tool's supply [V].
     tool_voltage: int = 0
+    #: Measured current of the tool's supply [A].
     tool_current: float = 0.0
     #: [degrees Celsius].
     tool_temperature: float = 0.0
     #: Mode of the tool, as the controller numbers it.
     tool_mode: int = 0
-    #: Mass of the payload [kg], and its centre of gravity in the flange [m]; NaN = not reported.
+    #: Mass of the payload [kg]; NaN = not reported.
     payload: float = nan
+    #: Centre of gravity of the payload in the flange [m]; NaN = not reported.
     payload_cog: Vector3 = (nan, nan, nan)

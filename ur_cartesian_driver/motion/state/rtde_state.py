@@ -154,11 +154,13 @@ class RobotState:
     joint_torque: Annotated[
         Vector6 | None, Rtde('actual_current_as_torque', optional=True, monitored=False)
     ] = None
-    #: Points of the running trajectory that the robot program has begun; 0 = none, or unknown.
+    #: Number of points of the running trajectory that the program has begun; 0 also if unknown.
     points_begun: Annotated[int, Rtde('output_int_register_26', optional=True)] = 0
-    #: Identity of our robot program: its version, its number, and a count of its connections.
+    #: Version of our robot program.
     program_version: Annotated[int, Rtde('output_int_register_32', optional=True)] = 0
+    #: Number of our robot program, which identifies it.
     program_number: Annotated[int, Rtde('output_int_register_33', optional=True)] = 0
+    #: Count of the connections of our robot program.
     program_run: Annotated[int, Rtde('output_int_register_34', optional=True)] = 0
     #: Token of the last request to set safe outputs that our robot program has carried out.
     safe_outputs_token: Annotated[int, Rtde('output_int_register_35', optional=True)] = 0

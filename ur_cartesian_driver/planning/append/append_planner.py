@@ -192,7 +192,7 @@ class _PartPlanner:
     # -- motions of the robot --------------------------------------------------------------------
 
     def append_moves(self, records_before: int, start_time: float) -> AppendPlan:
-        """Return a part of robot motions, planned together with the last motions before it."""
+        """Return a part made of robot motions, planned with the last motions before the part."""
         before, appended = self._before, self._appended
         replannable, q_start, time_before = (
             before.replannable,
@@ -237,7 +237,7 @@ class _PartPlanner:
         return (*old, *numbered(self._appended, first))
 
     def moves_part(self, plan: Plan, records_before: int, start_time: float) -> AppendPlan:
-        """Return a part of robot motions, the last of which is its ending."""
+        """Return a part made of robot motions, the last of which is the ending."""
         *others, last = plan.segments
         time = start_time + sum(segment.duration for segment in others)
         replannable = self._replannable(plan)
@@ -314,7 +314,7 @@ class _PartPlanner:
         self, start: SplineState, records_before: int, time_offset: float
     ) -> AppendPlan:
         """
-        Return the part of a spline that begins in a state.
+        Return a part made of spline pieces, which begins in the state ``start``.
 
         :param time_offset: motion time less client time [s].
         """
@@ -499,7 +499,7 @@ class _PartPlanner:
         *,
         timed: bool,
     ) -> AppendPlan:
-        """Return a part; its next goal also gets the counts of points and records."""
+        """Return an append plan; ``next_goal`` also gets the counts of points and records."""
         last, records = self._appended.last, records_before + _record_count(plan.segments)
         ending_records = _record_count(ending)
         # After the last motion, the robot program waits until its outputs are switched.

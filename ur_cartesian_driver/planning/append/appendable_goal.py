@@ -52,9 +52,10 @@ class AppendedPoints:
     io_commands: tuple[IOCommand, ...] = ()
     #: Whether these points are the last of the goal.
     last: bool = False
-    #: The first point that is replaced. If this and the next are None, no point is replaced.
+    #: The first point that is replaced; None = no such request.
     replace_from_point: int | None = None
-    #: The time from which the motion is replaced, on the clock of the points' times [s].
+    #: The time from which the motion is replaced, on the clock of the points' times [s]; None = no
+    #: such request.
     replace_from_time: float | None = None
 
     @property
@@ -77,7 +78,7 @@ class AppendedPoints:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplannablePoint:
-    """A point that can be planned again, with the arm's joints and the time before it."""
+    """A point that can be planned again, with joints and client time at the point before it."""
 
     waypoint: Waypoint
     segment: Segment
@@ -121,7 +122,7 @@ class AppendableGoal:
     #: The planned parts of a spline that are not passed, in the order of planning; each is valid
     #: until the next one begins.
     parts: tuple[PlannedPart, ...] = ()
-    #: All commands on these parts, each with the motion time when it is due [s].
+    #: All commands on ``parts``, each with the motion time when it is due [s].
     commands: tuple[tuple[float, IOCommand], ...] = ()
 
 

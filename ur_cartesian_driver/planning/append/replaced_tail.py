@@ -74,7 +74,7 @@ def first_replaceable(before: AppendableGoal, time: float) -> tuple[int, float]:
     """
     Return the first point that can be replaced, and the earliest time at which a tail can begin.
 
-    :param time: motion time until which the motion is final [s].
+    :param time: motion time until which the motion can no longer change [s].
     :returns: the number of the point, and the client time [s], in whole milliseconds.
     """
     client_time = ceil(1e3 * (time - before.time_offset) - 1e-6) * 1e-3
@@ -88,9 +88,9 @@ def first_replaceable(before: AppendableGoal, time: float) -> tuple[int, float]:
 
 def cut_tail(before: AppendableGoal, time: float, arm: Arm) -> AppendableGoal:
     """
-    Return a goal without its motion after a time [s]; ``before`` itself if there is none.
+    Return a goal without its motion after a time [s]; ``before`` itself if nothing is cut off.
 
-    :raises AlreadySent: the pieces at that time are no longer kept.
+    :raises AlreadySent: a piece that would have to be sent again is no longer available.
     """
     if time == inf:
         return before
@@ -129,7 +129,7 @@ def cut_tail(before: AppendableGoal, time: float, arm: Arm) -> AppendableGoal:
 
 
 def without_passed(before: AppendableGoal, time: float) -> AppendableGoal:
-    """Return a goal without the parts that were passed ``HISTORY_TIME`` before a time [s]."""
+    """Return a goal without the parts that ended over ``HISTORY_TIME`` before a time [s]."""
     first = _part_at(before, time - HISTORY_TIME)
     if first is None or first is before.parts[0]:
         return before

@@ -70,7 +70,7 @@ _MAX_SAMPLES = 32
 #: length [m] or tilt [rad], and interpolated between these points.
 _KNOT_LENGTH = 0.01
 _KNOT_TILT = pi / 36.0
-#: Length that adds as much to the size of a path as a tilt of one radian [m].
+#: Length [m] that adds as much to the size of a path as a tilt of one radian.
 _LENGTH_PER_RADIAN = 0.05
 #: Greatest number of searches; each avoids the collisions found by the earlier ones.
 _MAX_SEARCHES = 8
@@ -166,7 +166,7 @@ def choose_rotations(
 
 
 def _search_without_collisions(lattice: RotationLattice, path: _FreePath) -> RotationPath:
-    """Return the best way without collisions, or the last way found if all have collisions."""
+    """Return the best way without collisions; if no search finds one, the last way found."""
     least = path.options.min_clearance
 
     def too_close(q: Floats, more: float) -> Flags:
@@ -334,7 +334,7 @@ class _FreePath:
         begin = first = 0
         for number, (end, row) in enumerate(zip(ends.tolist(), self.knots.tolist(), strict=True)):
             change = inf
-            if first:  # no such bound on the way to the first
+            if first:  # the axis may deviate on the way to the first layer
                 share = float(tilted[first : row + 1].max()) / whole[number]
                 change = 8.0 * MAX_AXIS_DEVIATION / max(share, 1e-9)
             change = min(change, (end - begin) * _MAX_CHANGE_PER_SAMPLE / self.density)

@@ -66,14 +66,14 @@ MAX_AXIS_DEVIATION = pi / 180.0
 # The cost of an edge is the sum of the turns of all joints [rad] and of the terms that follow.
 #: Weight of the squared change of the rotation, which spreads the change evenly.
 _EVENNESS = 2.0
-#: Distances from joint limits [rad] and singularities (as a fraction of their scale) cost if they
-#: are below this.
+#: Distances from joint limits [rad] and from singularities (as fractions of their scales) that are
+#: below this add a cost.
 _WIDE_MARGIN = 0.6
 #: Weight of the cost of these distances, per unit of the path.
 _NEARNESS = 1.0
 #: Penalty per unit of the path where the planner would refuse the nearness to a singularity.
 _REFUSED = 50.0
-#: Penalty for a turn beyond the speed limit of a joint [1/rad].
+#: Penalty for the part of a turn that exceeds the speed limit of a joint [1/rad].
 _TOO_FAST = 50.0
 #: Penalty for a distance from the posture of a point [1/rad].
 _OFF_POSTURE = 20.0
@@ -499,7 +499,7 @@ class RotationLattice:
         return total[b, k, best], end[:, b, k, best], sources[best], targets
 
     def _limits(self, q: Floats, size: float) -> Floats:
-        """Return the costs of nearness to joint limits on a path of a size; inf beyond a limit."""
+        """Return the costs of nearness to joint limits on a path of ``size``; inf if exceeded."""
         low, high = self._ranges
         margin = np.minimum(q - low, high - q).min(axis=0)
         return np.where(margin < 0.0, inf, _nearness(margin) * size)

@@ -27,9 +27,9 @@ from ur_cartesian_driver.planning.geometry.curves import (
     MAX_TURN_PER_SAMPLE,
 )
 
-# Segments that continue straight on or straight back to within this angle [rad] have no circle.
+# Segments that go straight on or straight back, to within this angle [rad], have no fillet.
 _STRAIGHT = 1e-6
-# Least radius of the circle between segments that go straight back [m].
+# Least radius of the fillet between segments that go straight back [m].
 _MIN_RADIUS = 1e-9
 
 
@@ -75,7 +75,7 @@ class BlendShapes:
         self.opening = opening_rows(self.start, self.middle, self.end)
 
     def lengths(self) -> Floats:
-        """Return the lengths of the blends [m]: parabolas, or arcs, between straight lines."""
+        """Return the lengths of blends between lines [m]: of arcs (``fillet``) or parabolas."""
         arc = self._circle_radii() * (np.pi - self.opening)
         there_and_back = np.linalg.norm(self.start - self.middle, axis=1) + np.linalg.norm(
             self.end - self.middle, axis=1
@@ -153,7 +153,7 @@ def _parabola_lengths(start: Floats, waypoint: Floats, end: Floats) -> Floats:
 
     The speed is 2 |u + s w| with u = p - a, w = a - 2 p + b: the square root of a quadratic in s.
     Its integral is elementary, but has special cases. Gauss-Legendre quadrature has none: with
-    eight points it is exact to a millionth, for blends nearly straight back to a thousandth.
+    eight points its error is a millionth (a thousandth for blends that lead nearly straight back).
     """
     u, w = waypoint - start, start - 2.0 * waypoint + end
     nodes, weights = np.polynomial.legendre.leggauss(8)

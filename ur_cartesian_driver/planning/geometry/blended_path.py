@@ -59,10 +59,10 @@ class CurveSequence(Protocol):
         """
 
     def extent(self, number: int) -> tuple[float, float]:
-        """Return the length of a curve [m], and the turn of tool or leading joint on it [rad]."""
+        """Return length [m] and turn [rad] of a curve: of the leading joint on a joint line."""
 
     def locate(self, number: Indices, t: Floats) -> tuple[Indices, Floats]:
-        """Return the segments (n,) of places on curves, and the fractions (n,) of these."""
+        """Return the segment (n,) of each place on curves, and the fraction (n,) before it."""
 
 
 class CurveRows:
@@ -76,9 +76,11 @@ class CurveRows:
     def __init__(self, start: Floats, end: Floats, others: Mapping[int, SegmentCurve]) -> None:
         """Measure the lines."""
         self.start, self.end = start, end
-        #: (n,) each: length [m]; turn of the tool [rad]; travel of the leading joint [rad].
+        #: (n,) lengths [m].
         self.length = distance_rows(start, end)
+        #: (n,) turns of the tool [rad].
         self.angle = angle_rows(start[:, 3:], end[:, 3:])
+        #: (n,) travels of the leading joint on joint lines [rad], 0 on other curves.
         self.joint_travel = np.zeros(len(start))
         self.is_line = np.ones(len(start), dtype=np.bool_)
         self.is_joint_line = ~self.is_line
@@ -164,15 +166,15 @@ class BlendedPath:
         #: The distance from the waypoint at which the blend after each curve begins and ends [m],
         #: 0 = no blend; whether this blend is a circular arc between lines (``movep``).
         self.radius, self.fillet = np.zeros(n), np.zeros(n, dtype=np.bool_)
-        #: Radius of this arc [m]; inf if the blend is no arc.
+        #: Radius of the blend after each curve [m]; inf if the blend is no arc.
         self.arc_radius = np.full(n, np.inf)
-        #: Length of the blend [m]; turn of the tool in the blend [rad]; number of chords that
-        #: follow the blend closely enough.
+        #: Length of the blend after each curve [m]; turn of the tool in the blend [rad].
         self.blend_length, self.blend_angle = np.zeros((2, n))
+        #: Number of chords that follow the blend after each curve closely enough.
         self.blend_samples = np.zeros(n, dtype=np.intp)
         #: Largest distance of the robot's own blend from the modelled one (n, 2) [m], [rad]. The
         #: robot's blend may come arbitrarily close to the waypoint, or cut straight across; the
-        #: modelled one lies half-way between. On it, the tool's turn may lead or lag the position.
+        #: modelled one lies half-way between. The robot may also turn the tool earlier or later.
         self.blend_tolerance = np.zeros((n, 2))
 
     @property
@@ -219,7 +221,7 @@ class BlendedPath:
             self.blend_length[k] = np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()
 
     def extents(self, number: Indices) -> tuple[Floats, Floats]:
-        """Return the lengths of curves (n,) [m], and the turns of tool or leading joint [rad]."""
+        """Return lengths (n,) [m] and turns (n,) [rad] of curves, as :meth:`extent` does."""
         row, is_blend = number // 2, number % 2 == 1
         travel, own = self.curves.joint_travel, self.curves.joint_travel[row]
         length, turn = self.curves.length[row], np.where(own > 0.0, own, self.curves.angle[row])

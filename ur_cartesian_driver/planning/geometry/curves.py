@@ -54,8 +54,8 @@ SAME_ANGLE = 1e-6
 MIN_ARC_HEIGHT = 1e-5
 #: How far rounding to micrometres on the wire moves three points relative to each other [m].
 _ROUNDING = 1.5e-6
-#: Largest turn that this rounding may add at the end of an arc whose tangent the tool follows
-#: [rad].
+#: Largest turn that rounding on the wire may add at the end of an arc whose tangent the tool
+#: follows [rad].
 MAX_ARC_TURN_ERROR = 0.005
 #: Arcs through points that are farther apart than this [m] are refused: no arm reaches that far.
 MAX_ARC_SIZE = 1000.0
@@ -97,8 +97,8 @@ class ArcCurve:
 
         In mode FIXED the orientation of ``end`` is replaced by the one in which the arc arrives.
 
-        :raises ValueError: the three positions make no circle, or in mode FIXED an inexact one;
-            the text is a clause that gives the reason.
+        :raises ValueError: the three positions make no circle, or, in mode FIXED, a circle that
+            rounding on the wire changes too much; the text is a clause that gives the reason.
         """
         center, axis, radius = _circle(start.position, via, end.position)
         if mode is ArcMode.FIXED:
@@ -276,7 +276,7 @@ def _check_turn_error(a: Vector3, b: Vector3, c: Vector3) -> None:
 
     Rounding tilts the circle by rounding / height of the triangle. At the end of the arc this tilt
     turns the tool by 2 sin(sweep / 2) times as much. The law of sines expresses this error by the
-    distances of the via.
+    distances between start, via and end.
     """
     from_start, to_end = distance(a, b), distance(b, c)
     error = 2.0 * _ROUNDING * max(from_start, to_end, distance(a, c)) / (from_start * to_end)

@@ -3,9 +3,9 @@
 """
 Samples along the path of a goal: on parts of curves, and on the blends between them.
 
-Samples are at most 2 mm and one degree apart, and there are at least eight on each piece. Pieces
-up to 11.2 mm and 5.6 degrees have fewer, at most 1.6 mm and 0.8 degrees apart: four on a piece of
-5 mm. Where the joints turn fast,
+Samples are at most 2 mm and one degree apart, and a piece has at least eight. Only a piece up to
+11.2 mm and 5.6 degrees has fewer, which are at most 1.6 mm and 0.8 degrees apart: a piece of 5 mm
+has four. Where the joints turn fast,
 :mod:`~ur_cartesian_driver.planning.preflight.joint_path_solver` adds samples.
 """
 
@@ -28,7 +28,7 @@ T = TypeVar('T', bound=np.generic)
 #: Maximum distance between neighbouring samples [m], [rad].
 STEP_LENGTH = 0.002
 STEP_ANGLE = pi / 180.0
-#: Minimum number of samples on a piece. A short piece has fewer: enough that neighbouring samples
+#: Minimum number of samples on a piece. Only a short piece has fewer: just enough that neighbours
 #: are no farther apart than the maximum distance divided by _MIN_REFINEMENT.
 MIN_SAMPLES = 8
 _MIN_REFINEMENT = 1.25
@@ -40,7 +40,7 @@ def joined(columns: Sequence[NDArray[T]]) -> NDArray[T]:
 
 
 def counted(counts: Indices) -> tuple[Indices, Indices]:
-    """Return 0, 0, ..., 1, 1, ..., each k ``counts[k]`` times, and 1, 2, ... from 1 for each k."""
+    """Return each k ``counts[k]`` times (0, 0, 1, 1, ...), and 1 to ``counts[k]`` for each k."""
     rows = np.repeat(np.arange(len(counts)), counts)
     return rows, np.arange(1, len(rows) + 1) - np.repeat(np.cumsum(counts) - counts, counts)
 
@@ -74,11 +74,13 @@ class CurvePieces:
     path: CurveSequence
     #: Index of the waypoint at the end of the path's first segment.
     first: int
-    #: Number of each piece's curve; where the piece begins and ends on this curve: ``u`` of a
-    #: segment's curve, ``s`` of a blend.
+    #: Number of each piece's curve.
     number: Indices
+    #: Where each piece begins on its curve: ``u`` of a segment's curve, ``s`` of a blend.
     begin: Floats
+    #: Where each piece ends on its curve, likewise.
     end: Floats
+    #: Number of samples on each piece.
     sample_count: Indices
 
     @classmethod
@@ -129,12 +131,12 @@ class CurvePieces:
         return self.path.rows(self.number[piece], t)
 
     def locate(self, piece: Indices, t: Floats) -> tuple[Int32s, Floats]:
-        """Return the segments (n,) of places on pieces, and the fractions (n,) of these."""
+        """Return the segment (n,) of each place on pieces, and the fraction (n,) before it."""
         row, fraction = self.path.locate(self.number[piece], t)
         return (self.first + row).astype(np.int32), fraction
 
     def locate_one(self, k: int, t: float) -> tuple[int, float]:
-        """Return the segment of a place on a piece, and the fraction of this segment."""
+        """Return the segment of a place on a piece, and the fraction of it before the place."""
         segment, fraction = self.locate(np.array([k]), np.array([t]))
         return int(segment[0]), float(fraction[0])
 

@@ -154,7 +154,7 @@ class ToolSplinePath:
     spline: ToolSpline
     #: (n,) the number of samples that measure the extent of each piece.
     sample_count: Indices
-    #: Returns the segments (m,) at times (m,) and the fractions of them; None = each piece is one.
+    #: Returns segments (m,) and their fractions (m,) at times (m,); None = a piece is a segment.
     places: Callable[[Floats], tuple[Indices, Floats]] | None = None
 
     def rows(self, number: Indices, t: Floats) -> Floats:

@@ -146,7 +146,7 @@ class JointPathPlanner:
 
     def _run(self, k: int, stop: int) -> int:
         """
-        Solve the segments from row k up to row ``stop``; return the row with which to continue.
+        Solve the segments of rows k to ``stop - 1``; return the row with which to continue.
 
         That row is ``stop``, or k again if a segment of the run has become a joint move.
         """
@@ -173,7 +173,7 @@ class JointPathPlanner:
         return stop
 
     def _add(self, joint_path: JointPath, measures: Floats) -> None:
-        """Add a solved joint path, and continue from the configuration at its end."""
+        """Add the samples of a joint path; the next run begins in its last configuration."""
         self._parts.append(PathSamples.of(joint_path, measures))
         if len(joint_path.q):
             self._q = vector6(joint_path.q[-1].tolist())
@@ -208,7 +208,7 @@ class JointPathPlanner:
         )
 
     def _entry(self, k: int) -> Floats:
-        """Return the piece before a segment: blend, rest of the previous segment, or none."""
+        """Return the row (1, 3) of the unsolved piece before segment k; (0, 3) = none is left."""
         if k > 0 and self._path.radius[k - 1] > 0.0:
             return np.array([(2.0 * k - 1.0, 0.0, 1.0)])
         if k > 0 and self._drafts.solved_until[k - 1] < 1.0:
@@ -256,7 +256,7 @@ class JointPathPlanner:
         )
 
     def _replace(self, row: int, refusal: GoalRefused) -> None:
-        """Replace a segment by a joint move, or raise its refusal."""
+        """Replace a refused segment by a joint move; raise its refusal if that is not possible."""
         point = self._drafts.begin + row
         if not self._replaces or not isinstance(refusal, _NO_STRAIGHT_PATH):
             raise refusal
@@ -301,8 +301,8 @@ class JointPathPlanner:
         solved_until = self._drafts.solved_until[k - 1]
         if solved_until == 1.0 or self._path.curves.is_joint_line[k - 1]:
             return vector6(self._drafts.joints[k - 1].tolist())
-        # A blended waypoint may be out of reach, unless a joint line begins there: the line starts
-        # from the configuration in which the rest of the previous segment would arrive.
+        # Although the arm does not reach a blended waypoint, a joint line begins there: in the
+        # configuration in which the rest of the previous segment would arrive.
         rest = self._curve_pieces(np.array([(2.0 * k - 2.0, solved_until, 1.0)]))
         joint_path = solve_joint_path(self.kinematics, rest, self._q)
         if joint_path.refusal is not None:

@@ -74,8 +74,8 @@ class Moves(_Columns):
     acceleration: Floats
     #: Time on the wire [s]; 0 = speed and acceleration apply.
     time: Floats
-    #: For a move with a time: the fraction of the time for which it speeds up, and that for which
-    #: it brakes.
+    #: For a move with a time: the fraction of this time for which the move speeds up, and also the
+    #: fraction for which it brakes.
     ramp_part: Floats
     #: Length within which the move brakes from full speed; inf = it brakes with its acceleration.
     stops_within: Floats
@@ -90,7 +90,7 @@ class Moves(_Columns):
 
     @property
     def accelerations(self) -> Floats:
-        """Accelerations; of a move with a time, the acceleration needed from rest to rest."""
+        """Accelerations; for a move with a time, the one needed to meet it from rest to rest."""
         p = self.ramp_part
         by_time = self.length / np.maximum(p * (1.0 - p) * self.time**2, _TINY)
         return np.where(self.time > 0.0, by_time, self.acceleration)
@@ -242,7 +242,7 @@ class MoveChain:
         return np.concatenate((before[1:], np.zeros((1, 5))))
 
     def follow(self, rows: Indices) -> None:
-        """Recompute rows whose moves have changed, and the later rows that this affects."""
+        """Recompute rows whose moves have changed, and the later rows that the changes affect."""
         while len(rows):
             moves = self.moves.take(rows)
             times = _carry_out(moves, self._handed.take(rows))
@@ -316,7 +316,8 @@ def _carry_out(moves: Moves, handed: Handover) -> MoveTimes:
     peak = np.minimum(
         moves.speed, np.sqrt((2.0 * rest + enter**2 / a) / (1.0 / a + 1.0 / braking))
     )
-    # Moves with a time: blend and profile take that time and what the previous move has left.
+    # Moves with a time: blend and profile together take that time plus the remaining time of the
+    # previous move.
     timed, time = moves.time > 0.0, moves.time + handed.remaining
     left = np.maximum(
         time - ramp_time(begin, end, 1.0),

@@ -25,9 +25,9 @@ class JointSpeedBounds:
 
     #: Time of the segment at the rate that the sample with the fastest joints allows [s].
     times: Floats
-    #: Joint that is nearest to its speed limit in that sample.
+    #: Joint that is nearest to its speed limit at the sample with the fastest joints.
     joints: Indices
-    #: Fraction of the segment at that sample.
+    #: Fraction of the segment at the sample with the fastest joints.
     fractions: Floats
     #: Time of the segment at the rate that the sample with the slowest joints allows [s].
     shortest_times: Floats
@@ -45,7 +45,7 @@ class BlendSamples:
     s: Floats
     #: Time per unit of ``s`` at the joint speed limits [s].
     joint_time: Floats
-    #: Joint that needs this time.
+    #: Joint that needs ``joint_time``.
     joint: Indices
     #: Distance that the tool moves per unit of ``s`` [m].
     tool_distance: Floats
@@ -62,7 +62,7 @@ class PathSamples(NamedTuple):
     poses: Floats
     #: Distances from singularities (n, 3); inf where singularities do not matter.
     measures: Floats
-    #: Index of the waypoint at the end of the curve, or of the one that the blend rounds.
+    #: Index of the waypoint at the end of the curve; in a blend, of the waypoint that is rounded.
     waypoint: Int32s
     is_blend: Flags
     #: The parameter on the curve.

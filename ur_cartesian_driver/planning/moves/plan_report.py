@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a plan: a line for each segment, and the tightest margin of the goal."""
+"""The report of a plan: a line of text for each segment, and remarks on stops and blends."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def stop_remarks(geometries: SegmentGeometries) -> list[str]:
 
 
 def blend_remarks(goal: Goal, geometries: SegmentGeometries, timings: SegmentTimings) -> list[str]:
-    """Return the remark on the error of the planned end time, if the goal has blends."""
+    """Return the remark on the possible error of the planned end time; [] without blends."""
     if not geometries.path.has_blend_after.any() or geometries.is_optimized.any():
         return []
     planned, (least, greatest) = timings.durations.sum(), timings.bounds()

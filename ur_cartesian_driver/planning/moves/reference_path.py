@@ -90,7 +90,7 @@ def _times(
     """
     Return the expected time of each row (n,) [s].
 
-    :param number: segment of each row (n,); rows in a blend belong to the segment after it.
+    :param number: segment of each row (n,); for rows in a blend, the segment after the blend.
     """
     found, span = times.begins[number], np.maximum(path.u_leave - path.u_join, 1e-300)
     between = np.flatnonzero(~on_blend)

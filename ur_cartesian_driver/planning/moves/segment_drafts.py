@@ -80,7 +80,7 @@ class SegmentDrafts:
         self.begin, self.targets = begin, targets[begin:]
         self.segments = goal.motions[begin:]
         types = self.segments.types
-        #: (n,) type numbers: AUTO is resolved; a line or an arc that was replaced is JOINT.
+        #: (n,) type numbers; AUTO has become LINEAR, and a segment replaced by a joint move JOINT.
         self.kinds = np.where(types == SegmentType.AUTO, SegmentType.LINEAR, types)
         #: (n,) whether each segment is a straight line in joint space.
         self.is_joint_move: Flags = _IN_JOINT_SPACE[self.kinds]
@@ -118,7 +118,7 @@ class SegmentDrafts:
         self._find_blends()
 
     def make_joint_move(self, row: int) -> None:
-        """Replace a line or an arc by a joint move; the next segment begins at its waypoint."""
+        """Replace a line or an arc by a joint move; the next curve then begins at the waypoint."""
         self.kinds[row], self.is_joint_move[row] = _JOINT, True
         self._find_blends()
         after = row + 1

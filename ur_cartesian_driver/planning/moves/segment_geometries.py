@@ -24,7 +24,7 @@ class SegmentGeometries:
 
     #: Index of the waypoint at the end of the first segment.
     begin: int
-    #: (n,) type numbers as sent: AUTO is resolved; a line or an arc that was replaced is JOINT.
+    #: (n,) type numbers; AUTO has become LINEAR, and a segment replaced by a joint move JOINT.
     kinds: Int64s
     waypoints: WaypointRows
     segments: SegmentRows

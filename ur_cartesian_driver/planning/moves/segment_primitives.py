@@ -113,7 +113,7 @@ class _SpecialPrimitives:
         point, kind = geometries.begin + row, geometries.kinds[row]
         joints = vector6(geometries.joints[row].tolist())
         primitive: Primitive
-        if geometries.waits and row == 0:  # a spline at rest: no move of the robot waits
+        if geometries.waits and row == 0:  # moves cannot wait, so a spline at rest does
             primitive = Spline(
                 target=self._paths.q_start,
                 velocities=ZERO6,
@@ -133,7 +133,7 @@ class _SpecialPrimitives:
         return primitive
 
     def _q_near(self, row: int, joints: Joints) -> Joints:
-        """Return the chosen solution, or the full posture of the point if it selects it."""
+        """Return the point's full posture if it selects the chosen solution, else the solution."""
         posture = self._postures.get(row)
         wanted = posture and full_posture(named_joints(posture, self._options.tf_prefix))
         if wanted:

@@ -91,7 +91,7 @@ class SegmentTimings:
         self._geometries, self._options, self._model = geometries, options, model
         self._samples = blend_samples
         # Times per unit of the blend's parameter [s]: at the tool's speed limit (_tool_time), and
-        # at the speed whose arc needs the greatest linear acceleration (_arc_time).
+        # at the speed at which the blend's arc needs the maximum linear acceleration (_arc_time).
         distance = blend_samples.tool_distance
         self._tool_time = distance / (options.max_tool_speed or inf)
         radius = geometries.path.arc_radius[blend_samples.index - geometries.begin]
@@ -180,7 +180,7 @@ class SegmentTimings:
         self.wire_times = moves.time
 
     def _at_rate(self, rows: Indices, rate: Floats) -> Moves:
-        """Return the moves at given rates; beyond the greatest speed, their acceleration grows."""
+        """Return the moves at given rates; rates above the greatest speed raise accelerations."""
         moves, speed = self._moves.take(rows), self._speed[rows]
         asked = rate * moves.length
         more = np.maximum(asked / speed, 1.0) ** 2
@@ -190,7 +190,7 @@ class SegmentTimings:
         return moves
 
     def _allow_acceleration(self) -> None:
-        """Raise the greatest rates of moves that meet times by speed to the acceleration limit."""
+        """Raise the greatest rates of moves that meet times by speed, as acceleration allows."""
         self._max_rate = np.where(
             self._timed | np.isnan(self._time),
             self._max_rate,
@@ -198,7 +198,7 @@ class SegmentTimings:
         )
 
     def _slow_down(self) -> bool:
-        """Slow down the moves that exceed limits when blended; return whether there are any."""
+        """Slow down the moves that exceed limits when blended; return whether any move does."""
         times = self.chain.times
         over = np.maximum(
             np.maximum(times.cruise, times.enter) / self._speed,
@@ -226,7 +226,7 @@ class SegmentTimings:
         return bool(len(rows))
 
     def _slow_blends(self, rate: Floats, speed: Floats) -> None:
-        """Lower the rates and speeds of moves whose blends are too fast for tool or joints."""
+        """Lower, in place, the rates and speeds of moves whose blends exceed a limit."""
         samples, times = self._samples, self.chain.times
         after = samples.index - self._geometries.begin + 1
         begin, end = times.begin_rate[after], times.end_rate[after]
@@ -290,7 +290,7 @@ class SegmentTimings:
         least = shortest_duration(between, speed, acceleration, ramps)
         greatest = shortest_duration(moves.length, speed, acceleration, 2.0)
         tool_speed = speed * np.maximum(path.curves.length, 1e-9) / moves.length
-        # A blend with legs of length r and a chord c is at most r + c / 2 long: a bound on c.
+        # A blend with legs of length r and a chord c is at most r + c / 2 long, which bounds c.
         across = np.where(after, 2.0 * np.maximum(path.blend_length - path.radius, 0.0), 0.0)
         least[:-1] += across[:-1] / np.maximum(tool_speed[:-1], tool_speed[1:])
         return (
@@ -319,7 +319,7 @@ class SegmentTimings:
         # A blend that is too small for the requested speed is refused, not passed slowly.
         asked = np.where(self._is_slowed_in_arc(), requests.speed, self.velocities)
         too_small = needs_a_cycle & (path.radius < asked * self._model.control_cycle)
-        # At the acceleration limit, half a turn on such an arc takes less than a control cycle.
+        # On a smaller arc, half a turn at the acceleration limit takes less than a control cycle.
         turns_back = path.has_blend_after & (
             path.arc_radius
             < self._options.max_linear_acceleration * (self._model.control_cycle / pi) ** 2

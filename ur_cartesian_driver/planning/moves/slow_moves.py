@@ -27,7 +27,8 @@ from ur_cartesian_driver.planning.request.goal_fields import OPTIMIZED_TYPES, ty
 _IS_FREE = type_table((SegmentType.JOINT, *OPTIMIZED_TYPES))
 #: The path reverses if the dot product of its unit directions before and after is at most this.
 _REVERSAL = -0.98
-#: Fraction of ``slower_by`` that is allowed in blends made of chords, as their speeds are means.
+#: Fraction of ``slower_by`` that is tolerated in blends sampled by chords: the speed of a chord is
+#: a mean, above the lowest speed.
 _CHORD_PART = 0.5
 _TINY = 1e-12
 #: Rows of the reference path whose times differ by less than this [s] count as equal.
@@ -107,7 +108,7 @@ class _SlowMoves:
         return turns
 
     def _ramps(self) -> tuple[Floats, Floats]:
-        """Return where on its profile each move (n,) becomes fast enough, and too slow again."""
+        """Return the profile distances (n,) at which moves become fast enough, and slow again."""
         times = self._timings.chain.times
         full = times.length - times.tail
         slow = (1.0 - self._slower_by) * times.cruise

@@ -23,7 +23,7 @@ from ur_cartesian_driver.planning.geometry.curves import SAME_POSITION
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.options import PlanningOptions
 
-#: Smallest length, for a segment to a first point where the robot already is.
+#: Lower bound of lengths, for a first segment that ends where the robot already is.
 _MIN_LENGTH = 1e-9
 
 
@@ -48,7 +48,7 @@ class SpeedLimits:
         )
         travel = np.where(curves.is_joint_line, curves.joint_travel, curves.angle)
         length = np.where(self.is_turn, travel, curves.length)
-        # An OPTIMIZED move is led by the time that it takes if some joint is always at its limit.
+        # An OPTIMIZED move has as leading quantity its time with some joint always at its limit.
         length = np.where(self.is_optimized, self._bounds.times_at_limits, length)
         #: Length of the leading quantity: [m], [rad], or for an OPTIMIZED move [s].
         self.length: Floats = np.maximum(length, _MIN_LENGTH)

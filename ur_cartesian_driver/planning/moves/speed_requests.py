@@ -43,9 +43,9 @@ _UNMEASURED_TURNS = type_table((SegmentType.CIRCULAR, SegmentType.PROCESS))
 _PEAK, _PEAK_OF_TURN = 1.0 / (1.0 - RAMP_SHARE), 2.0
 #: Acceleration limit of a segment without motion, which has no limit of its own.
 _UNLIMITED = 1e9
-#: Times that are longer by less than this factor get no remark.
+#: Times that exceed the wanted ones by less than this factor get no remark.
 _NOTICEABLY = 1.001
-#: Speeds that limits lower by less than this factor get no remark.
+#: Speeds that limits reduce to at least this fraction of the wanted ones get no remark.
 _ROUNDED = 1.0 - 1e-9
 #: Smallest speed and acceleration in computations; 1 / 1e-310 overflows.
 _TINY = 1e-300
@@ -78,7 +78,8 @@ class SpeedRequests:
     The requested speeds and times of moves, in the lengths that the robot uses; columns (n,).
 
     :param running: the first segment as it was planned before, if it has already been sent.
-    :raises InvalidGoal: it is not known how fast the robot would run a segment.
+    :raises InvalidGoal: a CIRCULAR or PROCESS segment on which the turn leads has a time, but the
+        robot's speed on such segments is not known.
     """
 
     #: Greatest speeds.
@@ -136,7 +137,7 @@ class SpeedRequests:
             self._request_again(running)
 
     def source(self, row: int) -> str:
-        """Return the source of a segment's speed or time."""
+        """Return the source of a segment's speed or time; '' if the segment is already running."""
         point = self.geometries.begin + row
         if self._is_running and row == 0:
             return ''
@@ -245,7 +246,7 @@ class SpeedRequests:
                 np.linalg.norm(twists[:, 3:], axis=1),
             )
         # One number limits translation and turn. Since the turn leads, this number can be the
-        # default of the turn [rad/s], but no more than the greatest tool speed [m/s].
+        # default angular velocity [rad/s], but not above the greatest tool speed [m/s].
         fastest = options.max_tool_speed or options.angular_velocity
         both = max(options.linear_velocity, min(options.angular_velocity, fastest))
         choices = (

@@ -97,7 +97,7 @@ class Clearance:
 
     def check(self, q: Floats, q_start: Joints) -> ClearanceResult:
         """
-        Return the first row that is too close, and the smallest distance.
+        Return the first violation, the first warning and the smallest distance.
 
         :param q: (n, 6) [rad], all configurations of a goal, in order of time.
         :param q_start: the start configuration; pairs that are too close there may separate.
@@ -216,7 +216,7 @@ class _InitialViolations:
 
 
 def _is_receding(values: Floats, reached: Floats) -> tuple[Floats, Flags]:
-    """Return the largest value of each column, and which values are no less than all before."""
+    """Return each column's largest value, and whether each value is no less than those before."""
     largest = np.maximum.accumulate(np.vstack([reached, values]))
     receding: Flags = values >= largest[:-1] - _RECEDING_TOLERANCE
     return largest[-1], receding
@@ -231,8 +231,9 @@ class _SelfCollisionChecker:
         self._bodies, self._tcp, self._options = bodies, T_flange_tcp, options
         self._name = bodies.arm.model.name
         self._bound = options.min_clearance
-        #: The minimum distance of each pair; whether a smaller distance is refused.
+        #: The minimum distance of each pair.
         self.bounds = np.full(len(bodies.pairs), self._bound)
+        #: Whether a distance below its bound is refused.
         self.refuses = refuses_self_collision(self._name, options)
 
     @cached_property
@@ -296,7 +297,7 @@ class _SelfCollisionChecker:
 
 
 def refuses_self_collision(name: str, options: PlanningOptions) -> bool:
-    """Return whether goals are refused in which an arm of a model comes too close to itself."""
+    """Return whether a goal is refused if it brings an arm of a model too close to itself."""
     choice = options.self_collision
     return choice == 'refuse' or (choice == 'auto' and name in MODELS_WITH_MESHES)
 
@@ -316,7 +317,7 @@ def self_collision_remark(name: str, options: PlanningOptions) -> str:
 
 
 class _PlaneChecker:
-    """The links beyond the base, the tool and the TCP, against the workspace planes."""
+    """The TCP, the tool and all links but the base, against the workspace planes."""
 
     def __init__(
         self, bodies: CollisionBodies, arm: Arm, T_flange_tcp: Pose, planes: Sequence[Plane]
@@ -340,7 +341,7 @@ class _PlaneChecker:
         return f'{self._names[which]} and the plane "{self._planes[number].name}"'
 
     def measure(self, q: Floats, pending: Flags) -> tuple[Floats, Floats]:
-        """Return the heights of links and TCP above the planes (n, columns), as both results."""
+        """Return the heights of links and TCP above the planes, the same (n, columns) twice."""
         low = self._bodies.heights(q, self._normals)[:, :, self._moving]
         links = np.minimum.reduceat(low, self._begins, axis=2)
         tcp = np.array(self._arm.frames_rows(q).point(self._tcp))

@@ -3,11 +3,11 @@
 """
 Solve the joint path along sampled curves, or find why the arm cannot follow them.
 
-All samples of a goal are solved together. Between two samples the arm may move farther than they
-show: near a singularity joints swing round within a millimetre, and after a long step the closest
-solution then belongs to another branch. So where a joint turns far from one sample to the next,
-where the branch changes, or where there is no solution, samples are added in between, down to
-2 um apart. A jump that then remains is real.
+All samples of a goal are solved together. Between two samples the arm can move farther than their
+solutions suggest: near a singularity, joints swing round within a millimetre, and after so long a
+step the closest solution belongs to another branch. So samples are added, down to 2 um apart, if
+a joint turns far from one sample to the next, the branch changes, or there is no solution. A jump
+that then remains is real.
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ _MIN_ANGLE = 2e-5
 _MAX_JUMP = 0.5
 #: Configurations that differ by less than this [rad] are the same.
 _SAME = 1e-6
-#: Number of samples in the first block after a refinement; each later block is _GROWTH times as
-#: long.
+#: Number of samples in the first block after a refinement.
 _FIRST_BLOCK = 64
-#: Number of samples that measure how far a joint would go beyond its range.
+#: Number of samples on the rest of a piece that show how far a joint would leave its range.
 _SAMPLES_BEYOND = 16
+#: A block that is solved to its end is followed by one that is longer by this factor.
 _GROWTH = 8
 
 
@@ -58,17 +58,21 @@ class JointPath:
     """The samples that the arm reaches on consecutive pieces, with their joint positions."""
 
     pieces: CurvePieces
-    #: (n,) number of the piece, not decreasing; (n,) parameter on it; (n, 7) TCP pose in base;
-    #: (n, 6) joint positions [rad].
+    #: (n,) number of each sample's piece, not decreasing.
     piece: Indices
+    #: (n,) curve parameter on this piece.
     t: Floats
+    #: (n, 7) TCP poses in base.
     poses: Floats
+    #: (n, 6) joint positions [rad].
     q: Floats
-    #: Why the arm does not reach all samples (None = it reaches them); segment of this refusal.
+    #: Why the arm does not reach all samples; None = it reaches them.
     refusal: GoalRefused | None = None
+    #: Segment of the refusal; -1 = none.
     refused_segment: int = -1
-    #: (n,) segment of each sample; (n,) fraction of this segment.
+    #: (n,) segment of each sample.
     segments: Int32s = field(init=False)
+    #: (n,) fraction of this segment.
     fractions: Floats = field(init=False)
 
     def __post_init__(self) -> None:
@@ -95,9 +99,9 @@ class _Refinement:
     t: list[float]
     poses: list[Pose]
     q: list[Joints]
-    #: The parameter at which the path cannot go on; the solution there to which the arm would have
-    #: to jump, None = there is none.
+    #: The curve parameter at which the arm cannot follow any farther; None = it can.
     stop: float | None = None
+    #: The solution at ``stop``, to which the arm would have to jump; None = there is no solution.
     jump: Joints | None = None
 
     def samples(self, piece: int) -> _Samples:
@@ -170,7 +174,7 @@ def _solve_block(kinematics: TcpKinematics, poses: Floats, q: Joints) -> tuple[F
     branch = branch_measures(kinematics.arm, np.concatenate([[q], path.q])).branch
     bad = (path.step > _MAX_STEP) | (np.diff(branch) != 0) | ~path.found
     lost = np.flatnonzero(~path.found)
-    if len(lost):  # the next block continues there
+    if len(lost):  # the next block begins after the first sample without a solution
         stop = int(lost[0]) + 1
         return path.q[:stop], np.flatnonzero(bad[:stop]).tolist()
     return path.q, np.flatnonzero(bad).tolist()
@@ -183,7 +187,7 @@ def _refine(
     row: int,
     q: Joints,
 ) -> _Refinement:
-    """Return samples after the previous row up to a row, as dense as the joint motion requires."""
+    """Return samples from ``row - 1`` (excluded) to ``row``, as dense as the joints require."""
     k = int(samples.piece[row])
     length, turn = pieces.extent(k)
     is_first = row == 0 or samples.piece[row - 1] != k
@@ -225,7 +229,8 @@ def _refusal_at(
         return kinematics.discontinuity_error(pose, q, refinement.jump, where, poses_beyond), index
     refusal = kinematics.no_solution_error(pose, where)
     if not pieces.is_blend[k] and fraction < 1.0:
-        # Here the value is only just beyond its bound; the value at the waypoint says more.
+        # Where the path becomes unreachable, the refused distance is only just out of bounds; the
+        # distance at the waypoint is more helpful in the refusal.
         end = pieces.pose(k, 1.0)
         at_end = kinematics.no_solution_error(end, where, 'at the point ')
         if type(at_end) is type(refusal) and kinematics.solution(end, q) is None:
@@ -257,7 +262,7 @@ def _may_leave_line(kinematics: TcpKinematics, q: Joints, q_next: Joints) -> boo
 
 
 def max_path_length(kinematics: TcpKinematics) -> float:
-    """Return the length [m] beyond which the arm can follow no line or arc to its end."""
+    """Return an upper bound [m] on the length of lines and arcs that the arm can follow."""
     # In a ball of radius r a circle is no longer than 2 pi r.
     return (
         2.0

@@ -3,12 +3,12 @@
 """
 The band in which path offsets may move the tool (``path_offset``): its frames, gaps and checks.
 
-The frame of the path turns with the path. No offset is possible where this turn alone would move a
-displaced tool with more than the speed or acceleration of offsets: in corners where the arm stops,
-and in arcs that are too tight. The offset fades out before these places, and before the end of the
+The frame of the path turns with the path. No offset is possible where this turn alone would exceed
+the speed or acceleration of offsets for a displaced tool: in corners where the arm stops, and in
+arcs that are too tight. The offset fades out before these places, and before the end of the
 path.
 
-The corners of the band are checked along the whole path, like the path itself before.
+The corners of the band are checked along the whole path, as the path itself was before.
 """
 
 from __future__ import annotations
@@ -136,7 +136,7 @@ def path_joints(
     """
     Return the joint positions along a path (n, 6) [rad], and their speeds [rad/s].
 
-    :param start: the joint positions before the path.
+    :param start: the joint positions before the first sample [rad].
     :raises GoalRefused: a pose has no solution.
     """
     solved = solve_path(kinematics.arm, compose_rows(path.poses, kinematics.T_tcp_flange), start)
@@ -150,7 +150,7 @@ def path_joints(
 
 
 def fade_time(limit: float, speed: float, acceleration: float) -> float:
-    """Return the longest time in which an offset at its limit fades out [s]."""
+    """Return the longest time that an offset at its limit takes to fade out [s]."""
     # The offset brakes, comes back from where it stopped, and brakes again; braking uses less than
     # the allowed acceleration.
     return _FADE_MARGIN * (2.2 * speed / acceleration + limit / speed) + 2.0 * STEP
@@ -323,7 +323,7 @@ class OffsetBandCheck:
             there = nearest_rows(
                 kinematics.arm, compose_rows(poses, kinematics.T_tcp_flange), before
             )
-            lost = ~(np.abs(there - before).max(axis=1) < _MAX_CHANGE)  # NaN is lost
+            lost = ~(np.abs(there - before).max(axis=1) < _MAX_CHANGE)  # NaN, too
             if lost.any():
                 row = int(np.argmax(lost))
                 pose, where = pose_from_row(poses[row].tolist()), self._where(row)
@@ -339,7 +339,7 @@ class OffsetBandCheck:
         on_path, displaced = (singularity_distance_rows(arm, rows) for rows in (q, there))
         for k, measure in enumerate(SINGULARITY_MEASURES):
             bound = float(getattr(self.options, measure.option))
-            # A path that is itself within the bound, as at its start, has been accepted.
+            # Where the path itself is within the bound (possible at its start), it was accepted.
             near = (displaced[:, k] < bound) & (on_path[:, k] >= bound)
             if near.any():
                 row = int(np.argmax(near))
@@ -353,7 +353,7 @@ class OffsetBandCheck:
     def _check_joint_speeds(self, q: Floats, there: Floats, joint_speeds: Floats) -> None:
         times = self.reference.time
         steps = np.maximum(np.diff(times), 1e-6)[:, None]
-        # A displaced arm may have to turn faster. While the band is closed, it is not displaced.
+        # A displaced arm may have to turn faster. The arm is not displaced in a closed band.
         is_open = np.array([self.band.opens(time) for time in times[1:].tolist()])
         extra = np.abs(np.diff(there - q, axis=0) / steps) * is_open[:, None]
         speeds = joint_speeds.copy()
@@ -376,7 +376,7 @@ class OffsetBandCheck:
 
 
 def offset_remarks(band: OffsetBand, duration: float) -> list[str]:
-    """Return the report line about a band; ``duration`` is that of the motion [s]."""
+    """Return the report line about the band of a motion that takes ``duration`` [s]."""
     limits = ', '.join(
         f'{1e3 * limit:g} mm {name}'
         for name, limit in zip(OFFSET_AXES, band.limits, strict=True)

@@ -38,7 +38,8 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import Posture
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
-#: Largest distance of a named joint from the chosen solution at arrival, with full turns [rad].
+#: An arm arrives in a posture if each named joint is at most this far from the chosen solution
+#: [rad]. Full turns are not ignored.
 ARRIVAL_TOLERANCE = 0.01
 #: A solution continues a configuration if no joint turns farther than this [rad].
 _MAX_CONTINUED_STEP = 0.5
@@ -67,7 +68,7 @@ class TcpKinematics:
         return T_base_tcp @ self.T_tcp_flange
 
     def solution(self, T_base_tcp: Pose, q_near: Joints) -> Joints | None:
-        """Return the solution nearest to a configuration, None if there is none."""
+        """Return the solution nearest to a configuration; None if none is within the limits."""
         return nearest(self.arm, self.flange(T_base_tcp), q_near)
 
     def nearest(self, T_base_tcp: Pose, q_near: Joints, where: str) -> Joints:
@@ -104,7 +105,7 @@ class TcpKinematics:
 
     def no_solution_error(self, T_base_tcp: Pose, where: str, there: str = '') -> GoalRefused:
         """
-        Return the refusal of a pose without a solution: out of reach, or beyond joint limits.
+        Return the refusal of a pose without a solution: out of reach, or outside joint limits.
 
         :param there: a phrase that names the place of the pose if this is not ``where``.
         """
@@ -179,7 +180,7 @@ class TcpKinematics:
         self, T_base_tcp: Pose, posture: Posture, q: Joints, where: str, tf_prefix: str
     ) -> tuple[Joints, str]:
         """
-        Return the solution that a posture selects, and a clause on how ``q`` misses it, or ''.
+        Return the solution that a posture selects, and how ``q`` misses it ('' if it does not).
 
         Errors as for :meth:`nearest`.
         """
@@ -193,7 +194,9 @@ class TcpKinematics:
         """
         Return a clause that says how a path misses the posture of a point; '' if it does not.
 
-        :param q: the configuration in which the path arrives [rad]. Errors as for :meth:`nearest`.
+        Errors as for :meth:`nearest`.
+
+        :param q: the configuration in which the path arrives [rad].
         """
         where = point_field(index, 'pose')
         chosen, clause = self.compare_posture(T_base_tcp, posture, q, where, tf_prefix)
@@ -213,7 +216,7 @@ class TcpKinematics:
             yield q[k]
 
     def _continue_branch(self, T_base_tcp: Pose, q: Joints) -> Joints | None:
-        """Return the solution that continues a configuration, regardless of joint limits."""
+        """Return the solution that continues ``q``, ignoring joint limits; None if none does."""
 
         def around(found: Joints) -> Joints:
             return vector6(

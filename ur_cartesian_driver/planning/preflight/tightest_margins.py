@@ -28,11 +28,11 @@ from ur_cartesian_driver.planning.geometry.samples import first_least
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.joint_path_solver import describe_location, JointPath
 
-#: Within this length and turn from a start at rest [m], [rad] the arm is allowed to be singular.
+#: Length of path [m] after a start at rest on which the arm is allowed to be near a singularity.
 START_LENGTH = 0.001
+#: Turn [rad] after a start at rest during which the arm is allowed to be near a singularity.
 START_ANGLE = 0.01
-#: Beyond, the arm is allowed to be singular while its distance from the singularity only grows;
-#: it may shrink by this rounding.
+#: Rounding error by which the distance from a singularity may shrink and still counts as growing.
 _ROUNDING = 1e-9
 
 
@@ -70,12 +70,15 @@ _QUANTITIES = (
 class TightestMargins(Rows[str]):
     """The smallest distances of segments from singularities and joint limits, in words."""
 
-    #: (n,) each: the segment; the number of the singularity, or 3 + the number of the joint; the
-    #: distance; the fraction of the segment; the distance as a fraction of its scale.
+    #: (n,) the segment of each margin.
     segments: Int32s
+    #: (n,) the number of the nearest singularity, or 3 + the number of the joint.
     kinds: Indices
+    #: (n,) the distance from it [m] or [rad].
     values: Floats
+    #: (n,) the fraction of the segment at which this distance is smallest.
     fractions: Floats
+    #: (n,) the distance as a fraction of its scale.
     normalized: Floats
 
     def __len__(self) -> int:
@@ -184,10 +187,10 @@ def _format_below(value: float, bound: float) -> str:
 
 def _is_leaving(joint_path: JointPath, rows: Indices, measures: Floats) -> Flags:
     """
-    Return for the samples of a segment whether it leaves each singularity (n, 3) at its start.
+    Return whether each sample of a segment is allowed to be near each singularity (n, 3).
 
-    The goal does not choose where the robot is. So no distance is too small close to a start at
-    rest, nor farther on while the distance only grows.
+    The goal does not choose where the robot is. So close to a start at rest, any distance from a
+    singularity is allowed, and so it is after that, while the distance only grows.
     """
     number, pieces = int(joint_path.piece[rows[0]]), joint_path.pieces
     excused = np.zeros((len(rows), len(SINGULARITY_MEASURES)), dtype=np.bool_)
@@ -201,10 +204,12 @@ def _is_leaving(joint_path: JointPath, rows: Indices, measures: Floats) -> Flags
 
 def is_leaving_rows(measures: Floats, length: Floats, angle: Floats, *, rests: bool) -> Flags:
     """
-    Return for the samples of a motion whether it leaves each singularity (n, 3) at its start.
+    Return whether each sample of a motion is allowed to be near each singularity (n, 3).
 
-    :param length: (n,) the path length since the start [m]; ``angle``: the turn since then [rad].
-    :param rests: whether the motion starts at rest.
+    :param length: (n,) the path length since the start [m].
+    :param angle: (n,) the turn since the start [rad].
+    :param rests: whether the motion starts at rest. If not, nearness is allowed only while the
+        distance has grown since the start.
     """
     at_start = (rests & (length <= START_LENGTH) & (angle <= START_ANGLE))[:, None]
     grows = np.diff(measures, axis=0, prepend=0.0) >= -_ROUNDING

@@ -48,8 +48,9 @@ class RetargetedGoal:
 
     goal: GoalTable
     state: RobotState
-    #: This transform and the next are as in :class:`~ur_cartesian_driver.motion.plan.plan.Plan`.
+    #: The temporary TCP; None = the active TCP stays.
     T_flange_tcp: Pose | None = None
+    #: The controlled frame in the TCP of the motion: IDENTITY unless the TCP must not change.
     T_tcp_controlled: Pose = IDENTITY
     remarks: tuple[str, ...] = ()
 

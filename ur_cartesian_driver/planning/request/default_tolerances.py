@@ -30,7 +30,7 @@ def named_tolerances(goal: Goal) -> tuple[tuple[str, Tolerance], tuple[str, Tole
 
 
 def apply_default_tolerances(goal: G, options: PlanningOptions) -> G:
-    """Return the goal with parameters in place of zero tolerances; 0 then means no limit."""
+    """Return the goal with parameters in place of zeros; a tolerance that stays 0 is no limit."""
     path, end = (
         _with_defaults(tolerance, name, options) for name, tolerance in named_tolerances(goal)
     )

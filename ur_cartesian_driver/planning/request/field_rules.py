@@ -54,7 +54,7 @@ def check_record(
 
     :param where: name of the record in the refusal.
     :param kind: the class that declares the fields; None = the class of the record.
-    :param nan_in_rates: whether a rate can be NaN, so that the driver chooses it.
+    :param nan_in_rates: whether NaN is accepted as a rate; the driver then chooses the rate.
     :raises InvalidGoal: a value is not accepted; the text names field, value and bound.
     """
     for each in goal_fields(type(record) if kind is None else kind):

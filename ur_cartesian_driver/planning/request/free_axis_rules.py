@@ -14,12 +14,12 @@ from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import segment_field
 
-#: Tolerance [rad] for a range of a full turn, because clients write it with few digits.
+#: Tolerance [rad] for a range of a full turn, because clients write 2 pi with few digits.
 _ROUNDING = 1e-3
 
 
 def check_free_axes(goal: GoalTable, options: PlanningOptions) -> None:
-    """Refuse invalid ranges, different free axes, and free axes where nothing can be chosen."""
+    """Refuse invalid ranges, different free axes, and free axes with FIXED arcs or keep_open."""
     segments = goal.segments
     free = segments.free_axes != FreeAxis.NONE
     low, high = segments.free_minima, segments.free_maxima

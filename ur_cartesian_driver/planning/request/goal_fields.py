@@ -41,9 +41,10 @@ def segment_field(index: int, field: str = '') -> str:
 
 def resolve_execution_mode(goal: GoalTable) -> ExecutionMode:
     """
-    Return the execution mode.
+    Return the execution mode of a goal.
 
-    AUTO is SPLINE if only that rounds corners, or meets twists or accelerations.
+    AUTO becomes SPLINE for a goal with rounded corners, or with times and with twists or
+    accelerations at inner points; else PRIMITIVES.
     """
     if goal.execution != ExecutionMode.AUTO:
         return ExecutionMode(goal.execution)

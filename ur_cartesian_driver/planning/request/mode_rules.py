@@ -20,9 +20,9 @@ class ModeRule:
     field: str
     #: Whether a mode with given traits can honour the field.
     is_able: Callable[[ModeTraits], bool]
-    #: Why the other modes cannot: a clause with ``{mode}`` and ``{value}``.
+    #: Why a mode cannot honour the field: a clause with ``{mode}`` and the field's ``{value}``.
     problem: str
-    #: A remedy other than a change of mode; appended to the one that names the able modes.
+    #: A second remedy, appended to the advice to choose a mode that can honour the field.
     remedy: str = ''
 
 

@@ -52,8 +52,8 @@ def _check_controller_offsets(goal: GoalTable, options: PlanningOptions) -> None
     """
     Refuse offsets that the controller cannot add to its own motions.
 
-    :raises NotAvailable: the robot's software may have no offsets, the goal also presses, or a
-        segment is OPTIMIZED.
+    :raises NotAvailable: the robot's software is not known to have path offsets, the goal also
+        presses, or a segment is OPTIMIZED.
     """
     if not options.path_offset_known:
         raise NotAvailable(

@@ -27,7 +27,7 @@ _TYPES = (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.PROCESS, SegmentType
 
 
 def corner_bounds(goal: GoalTable) -> Floats:
-    """Return how far the path may be beside each point (n, 2) [m], [rad]; 0 = the arm stops."""
+    """Return the allowed deviations of the path at points (n, 2) [m], [rad]; 0 = the arm stops."""
     segments = goal.motions
     deviation = np.where(
         segments.corner_deviations > 0.0, segments.corner_deviations, goal.corner_deviation
@@ -41,7 +41,7 @@ def corner_bounds(goal: GoalTable) -> Floats:
 
 
 def check_rounded(goal: GoalTable, options: PlanningOptions) -> None:
-    """Refuse what rounded corners exclude."""
+    """Refuse a goal with rounded corners if its mode, times or segments exclude them."""
     if not is_rounded(goal):
         return
     mode = resolve_execution_mode(goal)

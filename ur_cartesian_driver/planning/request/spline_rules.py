@@ -23,11 +23,11 @@ from ur_cartesian_driver.planning.request.goal_fields import (
 
 #: Shortest time from point to point [s].
 MIN_SPLINE_TIME = 0.001
-#: Largest coordinate of a point [m]. Numbers beyond this and the next two must be mistakes.
+#: Largest plausible coordinate of a point [m].
 MAX_POINT_COORDINATE = 1000.0
-#: Largest component of a twist [m/s], [rad/s].
+#: Largest plausible component of a twist [m/s], [rad/s].
 MAX_TWIST = 100.0
-#: Largest component of an acceleration [m/s^2], [rad/s^2].
+#: Largest plausible component of an acceleration [m/s^2], [rad/s^2].
 MAX_ACCELERATION = 10_000.0
 
 _USE_PRIMITIVES = 'set execution to PRIMITIVES (which ignores twists and accelerations at points)'

@@ -3,9 +3,9 @@
 """
 The lines and arcs of a goal as polylines, from stop to stop.
 
-Arcs and turns become chains of chords, which rounding makes smooth again: at the places between
-the programmed points within a hundredth of a millimetre, at the points within the bounds that the
-goal gives its corners.
+Arcs and turns become chains of chords, which rounding (:mod:`~.rounded_path`) makes smooth again.
+The result deviates from the programmed path by at most a hundredth of a millimetre between the
+points, and at the points by at most the bounds that the goal sets for its corners.
 """
 
 from __future__ import annotations
@@ -30,28 +30,30 @@ from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.planning.request.validate import arc_through_via
 from ur_cartesian_driver.planning.rounded.rounded_path import Polyline
 
-#: A turn of the tool [rad] counts as its arc at this distance [m] in the length along the path.
+#: Radius [m] at which a turn of the tool is measured as the length of an arc, for ``s``.
 TURN_RADIUS = 0.05
-#: How far the set-points may be beside lines, arcs and turns between corners [m], [rad].
+#: Allowed deviations of the set-points from lines, arcs and turns between corners [m], [rad].
 CURVE_BOUNDS = 1e-5, 2e-4
-#: Chords of arcs: their error [m], and the turn of one [rad].
+#: Greatest distance of a chord from its arc [m].
 _CHORD_ERROR = 2e-6
+#: Greatest turn of the tool along a chord [rad].
 _CHORD_TURN = radians(2.0)
-#: Shorter steps carry the tool nowhere [m].
+#: Steps shorter than this [m] count as no motion.
 _NO_STEP = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ProgrammedSection:
-    """The programmed path from rest to rest."""
+    """A section of the programmed path, from rest to rest."""
 
     polyline: Polyline
-    #: The segments of the goal (k,) in order, and where each of them ends.
+    #: (k,) the segments of the goal that the section contains, in order.
     segments: Indices
+    #: (k,) the place s at which each of these segments ends.
     ends: Floats
 
     def locate(self, s: Floats) -> tuple[Indices, Floats]:
-        """Return the segments (m,) in which places are, and the fractions of them."""
+        """Return the segment of each place s (m,), and the fraction of the segment there (m,)."""
         row = np.minimum(np.searchsorted(self.ends, s, side='left'), len(self.ends) - 1)
         begin = np.where(row > 0, self.ends[row - 1], self.polyline.s[0])
         length = np.maximum(self.ends[row] - begin, _NO_STEP)
@@ -66,12 +68,12 @@ def programmed_sections(
     stops: Collection[int],
 ) -> list[ProgrammedSection]:
     """
-    Return the path of a goal from stop to stop.
+    Return the sections of a goal's path, one from each stop to the next.
 
-    :param targets: (n, 7) its points in base.
-    :param start: the tool at the beginning in base.
-    :param corners: (n, 2) how far the path may be beside each point [m], [rad]; 0 = a stop.
-    :param stops: other points at which it stops.
+    :param targets: (n, 7) the poses of the goal's points in base.
+    :param start: pose of the tool in base at the beginning.
+    :param corners: (n, 2) allowed deviations of the path at each point [m], [rad]; 0 = a stop.
+    :param stops: further points at which the arm stops.
     """
     curves = _curves(goal, targets, start)
     n = len(targets)

@@ -3,20 +3,21 @@
 """
 A polyline of poses with rounded corners, in closed form.
 
-The polyline x(s) is in R^7: positions and unit quaternions, whose chords are short enough to be
-taken for arcs. At its vertex j the derivative jumps by d_j. Averaged with the kernel
-k(u) = 15/16 (1 - u^2)^2 over a width w_j to both sides, a corner alone becomes
+The polyline x(s) is in R^7: positions and unit quaternions. It turns the tool so little per chord
+that the chord between two quaternions can be taken for their arc. A value of s is a *place*. At
+the vertex j, the derivative of x(s) jumps by d_j. Averaging with the kernel
+k(u) = 15/16 (1 - u^2)^2 over a width w_j on both sides turns a single corner into
 
-    x(s) + d_j w_j E((s - s_j) / w_j),    E(u) = G(u) - max(u, 0),    G'' = k,
+    x(s) + d_j w_j E((s - s_j) / w_j),    E(u) = G(u) - max(u, 0),    G'' = k.
 
-which leaves the polyline only within the width, by d_j w_j E(0) at most. Corners add up, so the
-same sum also holds where widths overlap: a chain of short chords becomes one smooth curve. All of
-it is three times continuously differentiable, and its second derivative is the sum of the kernels
-d_j k / w_j: curvature that grows from 0 and falls back to 0.
+This curve leaves the polyline only within the width, by at most d_j w_j E(0). The terms of several
+corners are added, even if their widths overlap: a chain of short chords becomes one smooth curve.
+The curve is three times continuously differentiable. Its second derivative is the sum of the terms
+d_j k((s - s_j) / w_j) / w_j, so the curvature grows from 0 at a corner and falls back to 0.
 
-Widths are as large as the bounds of the vertices allow: first each as if its neighbours had the
-same width, which settles chains, then shortened together wherever the true sum still exceeds a
-bound.
+Widths are as large as the bounds of the vertices allow. First, each width is fitted in rounds to
+the deviation at its own vertex. Then, wherever the deviation still exceeds a bound, all widths
+that reach the place are shortened together.
 """
 
 from __future__ import annotations
@@ -29,29 +30,33 @@ import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 
-#: Deviation of a corner from the polyline, as a part of jump times width.
+#: E(0): deviation of a single corner from the polyline, as a fraction of jump times width.
 PEAK = 5.0 / 32.0
-#: The least width that samples resolve [m], and the ratio of the levels of density.
+#: Corners are grouped by width for the spacing of samples: this width [m] begins a group.
 MIN_WIDTH = 2e-6
+#: Ratio of the widths at the two ends of such a group.
 _RATIO = 1.5
-#: Part of a bound that is aimed at, so that few sums exceed it; rounds, and steps of a round.
+#: Fraction of a bound to which widths are fitted, so that few deviations exceed the bound.
 _AIM = 0.95
+#: Number of rounds of this fit.
 _ROUNDS = 10
+#: Smallest and greatest factor on a width in a round.
 _STEPS = 0.5, 1.3
-#: With more corners than this within a width, samples may be this much farther apart.
+#: If more than ``_MANY`` corners lie within a corner's width, samples are farther apart by the
+#: factor ``_SMOOTHER``.
 _MANY, _SMOOTHER = 5, 2.4
-#: Largest change of the width along the path.
+#: Largest change of the width per unit of s.
 _MAX_SLOPE = 0.5
-#: How much widths are shortened at a time where a sum exceeds its bound.
+#: Factor on widths each time that they are shortened because a bound is exceeded.
 _SHORTENING = 0.85
-#: Smaller jumps are rounding.
+#: Jumps smaller than this are rounding errors.
 _NO_JUMP = 1e-9
-#: Pairs of corners and samples at a time, which bounds the memory.
+#: Number of pairs of a corner and a sample that are processed at once, which bounds the memory.
 _PAIRS = 1_000_000
 
 
 class PathRows(NamedTuple):
-    """A curve in R^7 and its first three derivatives by s at m places, (m, 7) each."""
+    """A curve in R^7 at m places, and its first three derivatives by s; (m, 7) each."""
 
     x: Floats
     d1: Floats
@@ -63,16 +68,16 @@ class PathRows(NamedTuple):
 class Polyline:
     """A polyline from rest to rest."""
 
-    #: (n,) increasing; any length that combines travel [m] and turn.
+    #: (n,) places of the vertices, increasing: a length [m] that combines travel and turn.
     s: Floats
-    #: (n, 7) positions [m] and quaternions x y z w of one hemisphere.
+    #: (n, 7) positions [m] and quaternions x y z w, all in the same hemisphere.
     rows: Floats
-    #: (n, 2) how far the rounded path may be beside each vertex [m], [rad].
+    #: (n, 2) allowed deviations of the rounded path at each vertex [m], [rad].
     bounds: Floats
 
     @property
     def slopes(self) -> Floats:
-        """(n - 1, 7) the derivative on each chord."""
+        """(n - 1, 7) the derivative by s on each chord."""
         slopes: Floats = np.diff(self.rows, axis=0) / np.diff(self.s)[:, None]
         return slopes
 
@@ -81,7 +86,7 @@ class RoundedPath:
     """
     A polyline whose corners are rounded within their bounds. Immutable.
 
-    :param max_width: rounding needs no larger width than this.
+    :param max_width: greatest width of a corner.
     """
 
     def __init__(self, polyline: Polyline, max_width: float) -> None:
@@ -94,18 +99,18 @@ class RoundedPath:
         self._slopes = slopes
         self._places = polyline.s[corners]
         self._jumps = jumps[corners - 1]
-        #: The columns of R^7 that have any corner: a tool that does not turn saves four.
+        #: The columns of R^7 that have corners; the quaternion has none if the tool never turns.
         self._columns = np.flatnonzero(self._jumps.any(axis=0))
         self._bounds = polyline.bounds[corners]
         self.corners: Indices = corners
-        #: (c,) to both sides of each corner.
+        #: (c,) the width on each side of each corner.
         self.widths = self._choose(max_width)
         self._shorten()
 
     # ---- the curve ----------------------------------------------------------------------------
 
     def rows(self, s: Floats) -> PathRows:
-        """Return the curve at places (m,), which must not decrease."""
+        """Return the curve at places (m,), which must be in ascending order."""
         x, d1 = self._on_polyline(s)
         d2, d3 = np.zeros_like(x), np.zeros_like(x)
         for corner, sample in self._pairs(s, self._places, self.widths):
@@ -128,10 +133,10 @@ class RoundedPath:
 
     def spacing(self, places: Floats, part: float, longest: float) -> Floats:
         """
-        Return how dense samples have to be between consecutive places (m,), (m - 1,).
+        Return the spacing of samples (m - 1,) between consecutive places (m,).
 
-        :param part: of the least width that reaches there.
-        :param longest: spacing where nothing is rounded.
+        :param part: the spacing as a fraction of the smallest width that reaches the interval.
+        :param longest: the spacing where nothing is rounded.
         """
         found = np.full(len(places) - 1, longest)
         begin, end = self._places - self.widths, self._places + self.widths
@@ -150,7 +155,7 @@ class RoundedPath:
         return found
 
     def sharp_corners(self) -> Floats:
-        """Return the places of corners that are rounded by themselves, not as one of a chain."""
+        """Return the places of corners that are rounded alone, not as part of a chain."""
         return self._places[self._is_sharp()]
 
     def _is_sharp(self) -> Flags:
@@ -162,7 +167,7 @@ class RoundedPath:
     # ---- widths -------------------------------------------------------------------------------
 
     def _choose(self, max_width: float) -> Floats:
-        """Return widths with which each corner just keeps its own bound."""
+        """Return widths with which the deviation at each corner about reaches its bound."""
         s, places = self.polyline.s, self._places
         largest = np.minimum(np.minimum(places - s[0], s[-1] - places), max_width)
         alone = self._bounds / np.maximum(PEAK * _sizes(self._jumps), 1e-12)
@@ -174,14 +179,14 @@ class RoundedPath:
         return widths
 
     def _evened(self, widths: Floats) -> Floats:
-        """Return widths lowered until neighbours differ little: only then does noise cancel."""
+        """Return widths, lowered so that neighbours differ little and their deviations cancel."""
         rise = _MAX_SLOPE * self._places
         before = np.minimum.accumulate(widths - rise) + rise
         after = np.minimum.accumulate((widths + rise)[::-1])[::-1] - rise
         return np.minimum(before, after)
 
     def _excess(self, at: Floats, widths: Floats, bounds: Floats) -> Floats:
-        """Return the deviations at places (m,), as parts of their bounds (m, 2)."""
+        """Return the deviation at each place (m,) as a fraction of its bounds (m, 2)."""
         deviation = np.zeros((len(at), 7))
         for corner, sample in self._pairs(at, self._places, widths):
             w = widths[corner]
@@ -191,7 +196,7 @@ class RoundedPath:
         return largest
 
     def _shorten(self) -> None:
-        """Shorten widths until every place keeps the bound of a corner that reaches there."""
+        """Shorten widths until each place keeps the largest bound of the corners that reach it."""
         s = self.polyline.s
         places = at = np.sort(np.concatenate([s[1:-1], 0.5 * (s[1:] + s[:-1])]))
         while True:
@@ -202,7 +207,7 @@ class RoundedPath:
             if not len(bad):
                 if at is places:
                     return
-                at = places  # corners that compensated each other may have lost their balance
+                at = places  # corners whose deviations cancelled may no longer do so
                 continue
             reach = np.searchsorted(bad, self._places + self.widths) > np.searchsorted(
                 bad, self._places - self.widths
@@ -211,13 +216,13 @@ class RoundedPath:
             at = bad
 
     def deviations(self, s: Floats) -> Floats:
-        """Return how far the curve is from the polyline at places (m,), (m, 2) [m], [rad]."""
+        """Return the curve's deviations from the polyline (m, 2) [m], [rad] at places (m,)."""
         deviation = self.rows(s).x - self._on_polyline(s)[0]
         return _sizes(deviation)
 
     @staticmethod
     def _pairs(s: Floats, places: Floats, widths: Floats) -> Iterator[tuple[Indices, Indices]]:
-        """Yield the corners and the samples (p,) that they reach, some pairs at a time."""
+        """Yield pairs of a corner and a sample within its width, as two arrays (p,) at a time."""
         low = np.searchsorted(s, places - widths, side='right')
         count = np.maximum(np.searchsorted(s, places + widths, side='left') - low, 0)
         ends = np.cumsum(count)
@@ -233,7 +238,7 @@ class RoundedPath:
 
 
 def _kernel_sums(u: Floats, w: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return what a corner adds to the curve and its derivatives, for a jump of 1."""
+    """Return the terms that a corner with a jump of 1 adds to the curve and its derivatives."""
     u2 = u * u
     rest = 1.0 - u2
     step = 0.5 + 0.9375 * u * (1.0 - u2 * (2.0 / 3.0 - u2 / 5.0))

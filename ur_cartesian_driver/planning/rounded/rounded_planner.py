@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From lines and arcs with rounded corners to joint spline pieces.
+Plan joint spline pieces for lines and arcs with rounded corners.
 
-Programmed path -> rounded path -> time law -> the tool over time, by knots at least
-:data:`MIN_PIECE_TIME` apart -> the arm along it and its joint polynomials, as for any spline
-(:mod:`~ur_cartesian_driver.planning.spline.spline_path`).
+The steps: programmed path -> rounded path -> time law -> tool spline, with knots at least
+:data:`MIN_PIECE_TIME` apart -> the arm along this spline and the joint polynomials, as for any
+spline (:mod:`~ur_cartesian_driver.planning.spline.spline_path`).
 """
 
 from __future__ import annotations
@@ -48,38 +48,41 @@ from ur_cartesian_driver.planning.spline.joint_polynomials import (
 )
 from ur_cartesian_driver.planning.spline.spline_path import solve_spline_path, SplinePath
 
-#: Shortest piece [s]: what the robot program and its sockets take for any time.
+#: Shortest time of a piece [s] that robot program and sockets sustain over any number of pieces.
 MIN_PIECE_TIME = 0.02
-#: Pieces that the first try joins.
+#: Number of shortest pieces that are joined into one at first; the result is split as necessary.
 _JOINED = 8
-#: What the pieces may add to the deviation of the path [m], and as a part of a corner's bound.
+#: Greatest deviation that the pieces may add to that of the path [m].
 PIECE_TOLERANCE = 1e-5
+#: Greatest such deviation as a fraction of the smallest bound of a corner.
 _PIECE_PART = 0.2
-#: The part of that which the tool's own polynomials may take; the rest is the joints'.
+#: Fraction of this deviation that is allowed to the tool spline; the joints get the remainder.
 _TOOL_PART = 0.3
-#: How far the acceleration of pieces longer than the shortest may be off, as a part of its limit.
+#: Greatest error of the acceleration, as a fraction of its limit, on pieces that can be split.
 _ACCELERATION_PART = 0.02
-#: The part of the jerk limit that the law aims at: its pieces have a little more.
+#: Fraction of the jerk limit at which the law aims, because the pieces have a little more jerk.
 _JERK_PART = 0.97
-#: Corners need no larger width than the tool's travel in this time [s], or this length [m].
+#: Corners get no larger width than the tool travels in this time [s].
 _WIDTH_TIME = 0.25
+#: Widths up to this [m] are allowed even if the tool is slower.
 _SLOW_WIDTH = 0.001
-#: How often the law is slowed around pieces that are too coarse, and by how much at least.
+#: Greatest number of times that the law is slowed around pieces that are too coarse.
 _TRIES = 6
 _SLOWER = 1.5
 #: Samples inside each piece that measure its accelerations, and how far these may be above.
 _SAMPLES_INSIDE = 5
+#: Greatest acceptable ratio of these accelerations to their limits.
 _CLOSE_ENOUGH = 1.017
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RoundedMotion:
-    """A rounded path over time that passed all checks of the arm."""
+    """The motion along a rounded path, after all checks."""
 
     laws: Sequence[SectionLaw]
     limits: ToolLimits
     kinematics: TcpKinematics
-    #: When each section begins [s].
+    #: (k,) when each section begins [s].
     begins: Floats
     places: Places
     path: SplinePath
@@ -89,7 +92,7 @@ class RoundedMotion:
 
     @cached_property
     def reference(self) -> ReferencePath:
-        """The path of the tool, with the segments of the goal."""
+        """The path of the tool, whose rows name the segments of the goal."""
         path = self.path
         poses = path.poses.copy()
         keep_hemisphere(poses)
@@ -110,10 +113,11 @@ def plan_rounded_path(
     """
     Return the motion along a goal's lines and arcs with rounded corners.
 
-    :param targets: (n, 7) its points in base.
-    :param start: the tool at the beginning in base, with the arm at ``q_start`` [rad], at rest.
-    :param stops: points at which the arm stops, beside those without corner_deviation.
-    :raises GoalRefused: the arm cannot follow.
+    :param targets: (n, 7) the poses of the goal's points in base.
+    :param start: pose of the tool in base at the beginning, where the arm is at rest.
+    :param q_start: joint positions at the beginning [rad].
+    :param stops: points at which the arm stops in addition to those without corner_deviation.
+    :raises GoalRefused: the arm cannot follow the path, or the joints not closely enough.
     """
     bounds = corner_bounds(goal)
     given = bounds[bounds[:, 0] > 0.0, 0]
@@ -159,7 +163,7 @@ def plan_rounded_path(
 def _tool_limits(
     goal: GoalTable, targets: Floats, start: Pose, options: PlanningOptions
 ) -> ToolLimits:
-    """Return what the segments (n,) ask for, and the limits of the driver."""
+    """Return the limits of the tool on the segments (n,), from the goal and the options."""
     before = np.concatenate([[start.row()], targets[:-1]])
     turns_only = (distance_rows(before, targets) < 1e-6) & (
         angle_rows(before[:, 3:], targets[:, 3:]) > 0.0
@@ -200,7 +204,7 @@ def _fit(
     begins = np.cumsum(durations) - durations
     knots = [_knots(law, _TOOL_PART * tolerance) for law in laws]
     tool = [_tool_at(law, t) for law, t in zip(laws, knots, strict=True)]
-    # A section begins where the one before it ends.
+    # The first row of a section is left out if it repeats the last one of the section before.
     join = [slice(1 if i else 0, None) for i in range(len(laws))]
     spline = ToolSpline.through(
         ToolPoints(
@@ -241,10 +245,10 @@ def _fit(
 
 
 def _knots(law: SectionLaw, tolerance: float) -> Floats:
-    """Return the times between which quintics follow the tool, as few as possible."""
+    """Return the knots [s] between which quintics follow the tool, as few as possible."""
     count = max(1, int(law.duration / MIN_PIECE_TIME))
     step = law.duration / count
-    # The first piece is short, so that an output may follow it soon.
+    # The first piece is short, so that an output can be sent soon after the start.
     ends = np.unique(np.concatenate([[0, 1], np.arange(_JOINED, count, _JOINED), [count]]))
     open_rows = np.arange(len(ends) - 1)
     while len(open_rows):
@@ -265,12 +269,14 @@ def _knots(law: SectionLaw, tolerance: float) -> Floats:
 
 def _deviations(law: SectionLaw, times: Floats, rows: Indices, tolerance: float) -> Floats:
     """
-    Return by how much quintics between times deviate from the law (r,), as parts of the bounds.
+    Return the deviations of quintics from the law (r,), as fractions of their bounds.
 
-    :param tolerance: of the position [m]; for turns, of the arc at ANGLE_TOLERANCE_RADIUS.
+    :param times: the knots of the quintics [s].
+    :param rows: (r,) the knot at which each quintic begins.
+    :param tolerance: bound on the position [m]; for turns, on the arc at ANGLE_TOLERANCE_RADIUS.
     """
     ends = np.unique(np.concatenate([rows, rows + 1]))
-    # Pieces between rows that are not asked for are made as well, and left out.
+    # The spline also has pieces across the gaps between ``rows``; these are not compared.
     spline = ToolSpline.through(_tool_at(law, times[ends]))
     part = np.arange(1, _JOINED) / _JOINED
     t = (times[rows][:, None] + np.diff(times)[rows][:, None] * part).ravel()
@@ -292,7 +298,7 @@ def _deviations(law: SectionLaw, times: Floats, rows: Indices, tolerance: float)
 
 
 def _tool_at(law: SectionLaw, t: Floats) -> ToolPoints:
-    """Return the tool at times since the section began (m,)."""
+    """Return pose and rates of the tool at times (m,) since the beginning of the section [s]."""
     s, v, a = law.law.at(t)
     rows = law.path.rows(s)
     poses, w1, w2 = tool_rows(rows)
@@ -309,13 +315,13 @@ def _tool_at(law: SectionLaw, t: Floats) -> ToolPoints:
 
 
 class Places:
-    """Finds the segments in which the tool is at a time."""
+    """Finds the segment on which the tool is at a given time."""
 
     def __init__(self, laws: Sequence[SectionLaw], begins: Floats) -> None:
         self._laws, self._begins = laws, begins
 
     def __call__(self, times: Floats) -> tuple[Indices, Floats]:
-        """Return the segments (m,) and the fractions of them."""
+        """Return the segment at each time (m,) [s], and the fraction of the segment (m,)."""
         number = np.clip(
             np.searchsorted(self._begins, times, side='left') - 1, 0, len(self._laws) - 1
         )
@@ -328,7 +334,7 @@ class Places:
         return segments, fractions
 
     def point_times(self, points: int) -> Floats:
-        """Return when the points of the goal are passed (n,) [s]."""
+        """Return the times (n,) [s] at which the points of the goal are passed."""
         times = np.zeros(points)
         for law, begin in zip(self._laws, self._begins.tolist(), strict=True):
             times[law.section.segments] = begin + law.law.times_of(law.section.ends)
@@ -337,7 +343,7 @@ class Places:
 
 
 def _coarse_times(motion: RoundedMotion, tolerance: float, options: PlanningOptions) -> Floats:
-    """Return begin and end (k, 2) of the pieces that do not follow the law closely [s]."""
+    """Return begin and end (k, 2) [s] of the pieces that do not follow the law closely enough."""
     pieces = motion.polynomials
     bounds = (1.0 - _TOOL_PART) * tolerance * np.array([1.0, 1.0 / ANGLE_TOLERANCE_RADIUS])
     coarse = (pieces.deviations > bounds).any(axis=1)
@@ -346,7 +352,7 @@ def _coarse_times(motion: RoundedMotion, tolerance: float, options: PlanningOpti
 
 
 def _acceleration_excess(motion: RoundedMotion, options: PlanningOptions) -> Floats:
-    """Return the accelerations inside pieces (n,), as parts of their limits."""
+    """Return the greatest ratio, inside each piece (n,), of an acceleration to its limit."""
     pieces, kinematics = motion.polynomials, motion.kinematics
     part = np.arange(1, _SAMPLES_INSIDE + 1) / (_SAMPLES_INSIDE + 1)
     t = (pieces.times[:-1, None] + np.diff(pieces.times)[:, None] * part).ravel()
@@ -372,7 +378,7 @@ def _check_postures(
     kinematics: TcpKinematics,
     options: PlanningOptions,
 ) -> None:
-    """Refuse a point at which the arm is not in the posture that it names."""
+    """Refuse a point if the arm does not pass it in the point's posture."""
     times = motion.path.times
     for i, posture in sorted(goal.waypoints.postures.items()):
         row = min(int(np.searchsorted(times, motion.point_times[i])), len(times) - 1)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a plan with rounded corners says of itself: pieces, corners, and where the tool is slow."""
+"""The report of a plan with rounded corners: pieces, corners, and where the tool is slow."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SlowStretch
 from ur_cartesian_driver.planning.rounded.rounded_planner import RoundedMotion
 from ur_cartesian_driver.planning.rounded.section_law import SectionLaw
 
-#: A tool that is slower by less than this fraction has the speed that was asked.
+#: The requested speed counts as kept if the tool is slower by at most this fraction.
 _KEPT = 0.01
-#: Directions with a smaller product reverse.
+#: The path reverses if the dot product of its unit directions before and after is below this.
 _REVERSAL = -0.5
 
 
@@ -25,15 +25,15 @@ class RoundedReport:
     """
     The rows and lines of a plan with rounded corners.
 
-    :param goal: for the TCP with which it runs.
+    :param goal: the goal, expressed for the TCP with which it runs.
     """
 
     def __init__(self, goal: GoalTable, motion: RoundedMotion) -> None:
-        """Keep what is reported on."""
+        """Store goal and motion."""
         self._goal, self._motion = goal, motion
 
     def segments(self) -> PlannedRows:
-        """Return the pieces; each belongs to the first point that it does not pass."""
+        """Return the pieces, each with the first point that is passed at its end or later."""
         motion, polynomials = self._motion, self._motion.polynomials
         path, ends = motion.path, polynomials.times[1:]
         durations = np.round(np.diff(polynomials.times), 6)
@@ -59,7 +59,7 @@ class RoundedReport:
         )
 
     def _lines(self, waypoints: Int32s) -> list[str]:
-        """Return a line for each piece, empty but for the last ones before points."""
+        """Return the text of each piece: a line for each point that is passed on it, or ''."""
         motion = self._motion
         deviations = self.corner_deviations()
         passed = np.searchsorted(
@@ -80,7 +80,7 @@ class RoundedReport:
         return lines
 
     def corner_deviations(self) -> Floats:
-        """Return how far beside each point the tool passes (n,) [m]; -1 where it stops."""
+        """Return the distance (n,) [m] by which the tool misses each point; -1 = it stops."""
         found = np.full(len(self._motion.point_times), -1.0)
         for law in self._motion.laws:
             section = law.section
@@ -107,7 +107,7 @@ class RoundedReport:
         ]
 
     def _kept_length(self) -> float:
-        """Return the part of the length on which the tool has its speed."""
+        """Return the fraction of the path length on which the tool has the requested speed."""
         kept = total = 0.0
         for law in self._motion.laws:
             speed, asked, step = _speeds(law)
@@ -117,9 +117,10 @@ class RoundedReport:
 
     def slow_stretches(self, slower_by: float) -> tuple[SlowStretch, ...]:
         """
-        Return where the tool is slower than asked.
+        Return the stretches on which the tool is slower than requested.
 
-        :param slower_by: fraction of the speed that counts as slower.
+        :param slower_by: a speed is too low if it is more than this fraction below the requested
+            one.
         """
         return tuple(
             stretch
@@ -129,7 +130,7 @@ class RoundedReport:
 
 
 def _speeds(law: SectionLaw) -> tuple[Floats, Floats, Floats]:
-    """Return speeds of the tool and those asked [m/s], and the ways between (m,) [m]."""
+    """Return, at each sample (m,), actual and requested tool speed [m/s] and step length [m]."""
     samples = law.samples
     rate = law.law.at(law.law.times_of(samples.s)).v
     length = np.linalg.norm(samples.x1, axis=1)

@@ -1,12 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The time law of a rounded path: speed, acceleration and jerk of the tool, and of each joint.
+The time law of a section of a rounded path, within the limits of tool and joints.
 
-Limits are evaluated at places a fraction of a corner's width apart. The law is found twice: once
-to know how far the window of its average reaches, then with speeds lowered over that window.
-Averaging mixes accelerations of neighbouring places, so the result is measured, and limits are
-tightened around the places where one is exceeded until none is.
+Limits are evaluated at places that are a fraction of a corner's width apart. A first law gives the
+times of the places, and so the places that the averaging window reaches from each; the next law is
+found with each speed limit lowered to the least one in the window. Averaging mixes accelerations
+of neighbouring places, so the averaged law is measured. Limits are tightened around places where
+one is exceeded, until none is or the greatest number of rounds is reached.
 """
 
 from __future__ import annotations
@@ -38,12 +39,13 @@ from ur_cartesian_driver.planning.rounded.time_law import (
     TimeLaw,
 )
 
-#: Places per width of a corner, and the distance of places where nothing is rounded [m].
+#: Distance between places at a corner, as a fraction of the corner's width.
 _DENSITY = 1.0 / 4.0
+#: Distance between places where nothing is rounded [m].
 _SPACING = 0.002
-#: The window of the average [s]: long enough for the acceleration to be continuous on the wire.
+#: Shortest averaging window [s]: long enough for the acceleration to be continuous on the wire.
 _MIN_WINDOW = 0.02
-#: The part of the limits of acceleration that the law aims at, for what averaging adds.
+#: Fraction of the acceleration limits at which the law aims, because averaging adds a little.
 _AIM = 0.985
 #: How often limits are tightened; the power of the excess by which they are, a smaller one where
 #: the excess is far from 1, because jerk grows with a higher power of the speed; an extra factor;
@@ -61,7 +63,7 @@ _NEARLY = 1e-10
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ToolLimits:
-    """What the segments (k,) of a section ask of the tool, and its largest jerk [m/s^3]."""
+    """The limits of the tool in each row (k,), a segment or a place, and of its jerk [m/s^3]."""
 
     speeds: Floats
     turn_rates: Floats
@@ -70,7 +72,7 @@ class ToolLimits:
     jerk: float
 
     def at(self, *rows: Indices) -> ToolLimits:
-        """Return the least limits of some segments in each row (m,)."""
+        """Return the limits in m rows, each the least of those in ``rows``, arrays (m,)."""
         return replace(
             self,
             **{
@@ -82,20 +84,26 @@ class ToolLimits:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CurveSamples:
-    """A rounded path at m places: derivatives by s of the tool in base, and of the joints."""
+    """A rounded path at m places: tool in base and joints, with their derivatives by s."""
 
     s: Floats
     poses: Floats
-    #: (m, 3) each, of the position.
+    #: (m, 3) first derivative of the position.
     x1: Floats
+    #: (m, 3) second derivative of the position.
     x2: Floats
+    #: (m, 3) third derivative of the position.
     x3: Floats
-    #: (m, 3) angular velocity by s, and its derivative.
+    #: (m, 3) turn of the tool per unit of s.
     w1: Floats
+    #: (m, 3) derivative of ``w1``.
     w2: Floats
-    #: (m, 6) each; empty where the arm cannot follow, which the plan's own check will say.
+    #: (m, 6) joint positions [rad]. If the arm cannot follow the whole path, ``q``, ``q1`` and
+    #: ``q2`` are (m, 0); a later check of the plan refuses the path.
     q: Floats
+    #: (m, 6) first derivative of the joint positions.
     q1: Floats
+    #: (m, 6) second derivative of the joint positions.
     q2: Floats
 
     @property
@@ -107,7 +115,7 @@ class CurveSamples:
 def sample_curve(
     path: RoundedPath, s: Floats, kinematics: TcpKinematics, q_start: Joints
 ) -> CurveSamples:
-    """Return a path at places (m,)."""
+    """Return the samples of a path at places (m,)."""
     rows = path.rows(s)
     poses, w1, w2 = tool_rows(rows)
     x1, x2, x3 = rows.d1[:, :3], rows.d2[:, :3], rows.d3[:, :3]
@@ -129,7 +137,7 @@ def sample_curve(
 
 
 def tool_rows(rows: PathRows) -> tuple[Floats, Floats, Floats]:
-    """Return poses (m, 7), and the angular velocity by s and its derivative (m, 3) in base."""
+    """Return poses (m, 7), turns per unit of s (m, 3) and their derivatives (m, 3) in base."""
     quaternions = rows.x[:, 3:]
     inverse = (
         conjugate_rows(quaternions) / np.einsum('ij,ij->i', quaternions, quaternions)[:, None]
@@ -145,7 +153,7 @@ class SectionLaw:
     """
     The rounded path of a section over time.
 
-    :param q_start: the configuration at its beginning [rad].
+    :param q_start: the configuration at the beginning of the section [rad].
     """
 
     def __init__(
@@ -161,26 +169,26 @@ class SectionLaw:
         self.section, self.path = section, path
         self.samples = sample_curve(path, places(path, section.ends), kinematics, q_start)
         row = self._rows(self.samples.s)
-        #: At each place; where segments meet, the lower ones, because a step begins there.
+        # Where two segments meet, the lower limits apply, because the next step is in the second.
         after = np.minimum(row + np.isin(self.samples.s, section.ends), len(section.ends) - 1)
         self._limits_at = tool.at(row, after)
         self._tool, self._options, self._model = tool, options, kinematics.arm.model
         self.window = max(_MIN_WINDOW, 2.0 * float(tool.accelerations.max()) / tool.jerk)
-        #: What bounds ds/dt at each place, by name (m,).
+        #: By name of a limit: the greatest ds/dt that it allows at each place (m,).
         self.caps = self._caps()
         m = len(self.samples.s)
-        #: By how much limits are tightened at each place, for lack of agreement after averaging.
+        #: Factor by which limits are tightened at each place if the averaged law exceeds them.
         self._tightened = np.ones(m)
         self.law = self._fitted()
 
     @property
     def duration(self) -> float:
-        """From rest to rest [s]."""
+        """The time from rest to rest [s]."""
         return self.law.duration
 
     @property
     def asked(self) -> Floats:
-        """The speed of the tool that the segments ask for at each place (m,) [m/s]."""
+        """The requested speed of the tool at each place (m,) [m/s]."""
         return self._limits_at.speeds
 
     def acceleration_bounds(self, t: Floats) -> tuple[Floats, Floats]:
@@ -189,17 +197,17 @@ class SectionLaw:
         return self._tool.accelerations[row], self._tool.turn_accelerations[row]
 
     def _rows(self, s: Floats) -> Indices:
-        """Return the rows of the tool's limits at places (m,)."""
+        """Return, for places (m,), the rows that their segments have in the tool's limits."""
         segments, _ = self.section.locate(s)
         rows: Indices = segments - self.section.segments[0]
         return rows
 
     def slow_around(self, times: Floats, factor: float) -> None:
         """
-        Find another law that is slower at times.
+        Replace the law by one that is slower in some periods.
 
-        :param times: (k, 2) begin and end, since the beginning [s].
-        :param factor: by which accelerations have to fall there.
+        :param times: (k, 2) begin and end of each period since the beginning of the section [s].
+        :param factor: factor by which the limits of acceleration are tightened there.
         """
         before = self.law.times
         inside = np.zeros(len(self.samples.s), dtype=np.bool_)
@@ -269,7 +277,7 @@ class SectionLaw:
         return np.sort(np.concatenate([law.sampled_times, around.ravel()]))
 
     def excess(self, law: TimeLaw) -> Floats:
-        """Return the largest measured value at each place, as a part of its limit (m,)."""
+        """Return the greatest ratio, at each place (m,), of a measured quantity to its limit."""
         samples, tool, options = self.samples, self._tool, self._options
         t = self._measured_times(law)
         s, v, a = law.at(t)
@@ -307,7 +315,7 @@ def places(path: RoundedPath, ends: Floats) -> Floats:
     """
     Return the places at which a path is sampled, denser where it is curved.
 
-    :param ends: places that are among them.
+    :param ends: places that are always included.
     """
     s = path.polyline.s
     edges = np.concatenate([s[path.corners] - path.widths, s[path.corners] + path.widths])
@@ -318,9 +326,9 @@ def places(path: RoundedPath, ends: Floats) -> Floats:
     )
     count = max(16, int(np.ceil(density[-1])))
     found = np.interp(np.linspace(0.0, density[-1], count + 1), density, marks)
-    # The sharpest curvature is in the middle of a corner.
+    # The middles of corners are included, because curvature is greatest there.
     every = np.unique(np.concatenate([found, ends, path.sharp_corners()]))
-    # Places that nearly coincide make steps of rounding errors.
+    # Steps between places that nearly coincide would consist of rounding errors.
     apart = np.append(True, np.diff(every) > _NEARLY)
     apart |= np.isin(every, ends)
     kept: Floats = every[apart]
@@ -328,7 +336,7 @@ def places(path: RoundedPath, ends: Floats) -> Floats:
 
 
 def _corner_speed(first: Floats, second: Floats, bound: Floats) -> Floats:
-    """Return ds/dt (m,) at which the acceleration across the path is all that is allowed."""
+    """Return the ds/dt (m,) at which the acceleration across the path reaches ``bound``."""
     square = np.maximum(np.einsum('ij,ij->i', first, first), _TINY)
     across = second - (np.einsum('ij,ij->i', first, second) / square)[:, None] * first
     speed: Floats = np.sqrt(bound / np.maximum(np.linalg.norm(across, axis=1), _TINY))

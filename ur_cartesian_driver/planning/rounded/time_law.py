@@ -5,14 +5,14 @@ The fastest time law along a path from rest to rest.
 
 With y = ds/dt squared and u = d2s/dt2, a speed limit bounds y, and each acceleration limit bounds
 u between two functions of y: for a joint |q' u + q'' y| <= a, for the tool |x' u + x'' y| <= a.
-The largest speeds from which the arm can still slow down in time are found backwards from the end,
-then the arm accelerates forwards as fast as they allow (Pham and Pham, A new approach to
-time-optimal path parameterization based on reachability analysis, 2018).
+The largest speeds from which the arm can still slow down in time are found backwards from the end;
+then the arm accelerates forwards as fast as these speeds and the limits allow (Pham and Pham, A
+new approach to time-optimal path parameterization based on reachability analysis, 2018).
 
 This law jumps from one acceleration to another. :class:`TimeLaw` is its moving average over a
-window of time, which bounds the jerk along the path. An average is never above the values in its
-window, so speed limits are kept if each is first lowered to the least one that the window reaches
-(:func:`lowered_over`).
+window of time, which bounds the jerk along the path. An average never exceeds the greatest value
+in its window, so speed limits are kept if each is first lowered to the least one that the window
+reaches (:func:`lowered_over`).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 
-# Halvings that find the largest speed at a place at which any acceleration is allowed.
+# Number of halvings in a bisection.
 _HALVINGS = 30
 _TINY = 1e-12
 # Newton's method finds times of places, unless the law nearly rests there [1/s].
@@ -37,13 +37,15 @@ _NO_SPEED = 1e-9
 class LawLimits:
     """The limits at m places of a path."""
 
-    #: (m,) of ds/dt
+    #: (m,) greatest ds/dt.
     speed: Floats
-    #: (m, k) of joints: |first u + second y| <= bound
+    #: (m, k) q' of k joints in |q' u + q'' y| <= a.
     first: Floats
+    #: (m, k) q'' of these joints.
     second: Floats
+    #: (m, k) a of these joints.
     bound: Floats
-    #: (m, 3) vectors of the tool: |first u + second y| <= bound, one entry each.
+    #: For each vector of the tool: x' (m, 3), x'' (m, 3) and a (m,) in |x' u + x'' y| <= a.
     vectors: tuple[tuple[Floats, Floats, Floats], ...]
 
 
@@ -51,7 +53,7 @@ _Row: TypeAlias = tuple[list[tuple[float, float]], list[tuple[float, float, floa
 
 
 class _Bounds:
-    """Bounds of u by y: c - d y for joints, sqrt(r^2 - (n y)^2) - m y for vectors."""
+    """Bounds of u for a given y: +-c - d y of joints, +-sqrt(r^2 - (n y)^2) - m y of vectors."""
 
     def __init__(self, limits: LawLimits) -> None:
         self.r: list[Floats] = []
@@ -74,7 +76,7 @@ class _Bounds:
         self.d = np.sign(first) * second / size
 
     def _joints_that_matter(self, limits: LawLimits) -> Flags:
-        """Return which joints may reach their limits within those of the vectors."""
+        """Return whether each joint (k,) might reach its limit within the vectors' limits."""
         y = (limits.speed**2)[:, None]
         largest = np.minimum.reduce(
             [np.full(len(y), inf)]
@@ -102,7 +104,7 @@ class _Bounds:
         ]
 
     def range(self, y: Floats) -> tuple[Floats, Floats]:
-        """Return the least and the largest u at each place (m,); NaN where there is none."""
+        """Return least and largest u (m,) at each place; NaN or least > largest = none allowed."""
         high = (self.c - self.d * y[:, None]).min(axis=1, initial=inf)
         low = (-self.c - self.d * y[:, None]).max(axis=1, initial=-inf)
         for r, m, n in zip(self.r, self.m, self.n, strict=True):
@@ -113,9 +115,9 @@ class _Bounds:
 
 def fastest_law(s: Floats, limits: LawLimits) -> Floats:
     """
-    Return the square of ds/dt at places (m,), 0 at both ends.
+    Return the square of the greatest possible ds/dt at places (m,); it is 0 at both ends.
 
-    :param s: increasing.
+    :param s: the places (m,), increasing.
     """
     bounds = _Bounds(limits)
     y = _possible(bounds, limits.speed**2)
@@ -126,7 +128,7 @@ def fastest_law(s: Floats, limits: LawLimits) -> Floats:
 
 
 def _possible(bounds: _Bounds, y: Floats) -> Floats:
-    """Return the largest y (m,) up to those given at which some u is allowed."""
+    """Return the largest y (m,), but at most the given ones, at which some u is allowed."""
     low, high = bounds.range(y)
     rows = np.flatnonzero(~(low <= high))
     if not len(rows):
@@ -144,7 +146,7 @@ def _possible(bounds: _Bounds, y: Floats) -> Floats:
 
 
 def _slow_down(bounds: _Bounds, y: Floats, step: Floats) -> Floats:
-    """Return the largest y from which the arm can slow down to the next."""
+    """Return the given y (m,), lowered until the arm can slow down from each to the next."""
     low, _ = bounds.range(y)
     steep = np.flatnonzero(y[:-1] + step * low[:-1] > y[1:])
     result: list[float] = y.tolist()
@@ -163,7 +165,7 @@ def _slow_down(bounds: _Bounds, y: Floats, step: Floats) -> Floats:
 
 
 def _speed_up(bounds: _Bounds, y: Floats, step: Floats) -> Floats:
-    """Return the law that speeds up as fast as possible."""
+    """Return the given y (m,), lowered where the arm cannot speed up to them in time."""
     _, high = bounds.range(y)
     steep = np.flatnonzero(y[:-1] + step * high[:-1] < y[1:])
     result: list[float] = y.tolist()
@@ -211,7 +213,7 @@ def _largest_before(row: _Row, step: float, after: float) -> float:
 
 
 class PathTimes(NamedTuple):
-    """Place on the path, its rate and second rate, at m times."""
+    """The place s on the path, ds/dt and d2s/dt2, at m times."""
 
     s: Floats
     v: Floats
@@ -223,16 +225,16 @@ class TimeLaw:
     The moving average of a law whose acceleration is constant between places. Immutable.
 
     :param s: the places (m,), increasing.
-    :param y: the square of ds/dt there, 0 at both ends only.
-    :param window: over which it is averaged [s].
+    :param y: the square of ds/dt at the places (m,), 0 at both ends only.
+    :param window: period over which the law is averaged [s].
     """
 
     def __init__(self, s: Floats, y: Floats, window: float) -> None:
-        """Integrate."""
+        """Integrate the law over time."""
         v, ds = np.sqrt(y), np.diff(s)
         dt = 2.0 * ds / np.maximum(v[1:] + v[:-1], _TINY)
         self.window = window
-        #: When each place is passed before the law is averaged [s].
+        #: (m,) when the law without averaging passes each place [s].
         self.times = np.concatenate([[0.0], np.cumsum(dt)])
         self.duration = float(self.times[-1]) + window
         self._s, self._v = s, v
@@ -241,7 +243,7 @@ class TimeLaw:
         self._integral = np.concatenate([[0.0], np.cumsum(travel)])
 
     def _at(self, t: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return the integral of s over time, s, and ds/dt before averaging, at any times."""
+        """Return, without averaging, the integral of s over time, s, and ds/dt at any times."""
         inside = np.clip(t, 0.0, self.times[-1])
         row = np.clip(np.searchsorted(self.times, inside, side='right') - 1, 0, len(self._s) - 2)
         h = inside - self.times[row]
@@ -279,13 +281,14 @@ class TimeLaw:
 
 def lowered_over(values: Floats, times: Floats, reach: float) -> Floats:
     """
-    Return the least of the values (m,) within a reach of each time [s] before and after.
+    Return, for each time (m,), the least value from ``reach`` [s] before to ``reach`` after it.
 
+    :param values: (m,) the value at each time.
     :param times: (m,) not decreasing [s].
     """
     low = np.searchsorted(times, times - reach, side='left')
     high = np.searchsorted(times, times + reach, side='right')
-    # The least of a range is that of two ranges of 2^k which cover it.
+    # Two ranges of 2^k values cover each range, so its least value is the lesser of theirs.
     result = np.empty_like(values)
     level = np.floor(np.log2(high - low)).astype(np.intp)
     table, size = values, 1

@@ -45,7 +45,7 @@ class LimitExcess:
     factor: float
     #: The point at the end of the segment with the greatest value.
     point: int
-    #: Where this value is, as a fraction of the segment's time.
+    #: When this value occurs, as a fraction of the segment's time.
     fraction: float
     #: The greatest value.
     needed: float

@@ -72,10 +72,11 @@ class SplinePath:
     piece: Indices
     #: (m,) the fraction of the piece's time at each sample.
     u: Floats
-    #: (m,) the segment of each sample, and the fraction of it.
+    #: (m,) the segment of each sample, by the number of the point at its end.
     points: Int32s
+    #: (m,) the fraction of this segment at each sample.
     fractions: Floats
-    #: (m, 7) poses of the TCP in base; (m, 6) joint positions [rad].
+    #: (m, 7) poses of the TCP in base.
     poses: Floats
     #: (m, 6) joint positions [rad].
     q: Floats
@@ -114,6 +115,7 @@ def solve_spline_path(
 
     :param postures: the postures at the ends of pieces, by the number of the piece.
     :param first: the number of the point at the end of the first segment.
+    :param rests: whether the arm is at rest at the start.
     :param places: the segments over time, see :class:`ToolSplinePath`.
     """
     coarse = coarse_samples(spline.times)
@@ -208,7 +210,7 @@ def _check_sizes(
     coarse: tuple[Indices, Floats],
     first: int,
 ) -> None:
-    """Refuse pieces with an ambiguous turn, or whose rates make a long detour or turn."""
+    """Refuse pieces with an ambiguous turn, or whose rates at the ends imply a detour or turn."""
     n = len(spline.positions)
     x, turn = spline.vectors(*coarse)
     x = x.reshape(n, _COARSE_SAMPLES, 3)

@@ -139,8 +139,8 @@ def plan_spline(
     Return the pieces that lead from a state through the points of a goal.
 
     :param goal: the goal, whose waypoints come after the state and have times since the start of
-        the motion. With ``keep_open``, the arm can still move at the last point; then the stop by
-        :func:`plan_stop` is checked as well.
+        the motion. With ``keep_open``, the arm may still be moving at the last point; the stop by
+        :func:`plan_stop` is then checked as well.
     :param T_flange_tcp: the TCP of the motion.
     :param first: the index that the first of these waypoints has in the whole goal.
     :param tool_tips: the tool tips to check for collisions; empty = only ``T_flange_tcp``.
@@ -275,7 +275,7 @@ def _fit_to_limits(
     goal: GoalTable,
     options: PlanningOptions,
 ) -> tuple[SplinePath, float, str]:
-    """Return the path, slowed if limits require it, the factor on times, and the limit or ''."""
+    """Return the path, slowed if necessary, the factor on times, and the limit ('' = none)."""
     found = worst_excess(kinematics, path, options)
     if found is None:
         return path, 1.0, ''

@@ -78,7 +78,7 @@ def point_remarks(goal: GoalTable, first: int) -> list[str]:
 
 
 def _in_frame(points: ToolPoints, T_new_old: Pose) -> ToolPoints:
-    """Return the same points in the axes of another frame at rest."""
+    """Return the same points expressed in another frame, which is at rest."""
     R = T_new_old.matrix()[:3, :3]
     twists, accelerations = (
         np.concatenate([rates[:, :3] @ R.T, rates[:, 3:] @ R.T], axis=1)

@@ -188,7 +188,7 @@ class KeyMessage(_Message):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RuntimeExceptionMessage(_Message):
-    """A program failed, or did not compile, at a line and a column (both count from 1)."""
+    """A program failed, or did not compile, at a line and a column (numbered from 1)."""
 
     message_type: ClassVar = 10
     layout: ClassVar = BodyLayout('I I text', 'runtime exception message')

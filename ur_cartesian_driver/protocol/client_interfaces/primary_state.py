@@ -374,7 +374,7 @@ def encode_sub_package(package: SubPackage) -> bytes:
 
 def decode_sub_packages(body: bytes) -> tuple[SubPackage, ...]:
     """
-    Return the sub-packages of a state frame without the frame's header.
+    Return the sub-packages in the body of a state frame (the frame without its header).
 
     Types 0, 3, 5 and 6 are decoded, because the driver needs them. The others stay raw, because
     their sizes depend on the software; a caller can decode them with ``decode`` of their class.

@@ -136,7 +136,7 @@ def decode_packet(data: bytes) -> RealtimeData:
     """
     Return the content of one packet with its size field; unknown fields at its end are ignored.
 
-    :raises RemoteProtocolError: the size is impossible, or not that of the bytes.
+    :raises RemoteProtocolError: the size field is impossible, or is not the number of bytes.
     """
     stated = _SIZE.unpack_from(data)[0] if len(data) >= _SIZE.size else 0
     if stated != len(data) or stated < min(PACKET_SIZES) or (stated - _SIZE.size) % 8:

@@ -272,7 +272,7 @@ _STOPS: dict[type[Stop], MotionType] = {
 #: Types whose word 18 is not the duration of a move.
 _WITH_DELAY = frozenset((MotionType.SWITCH_OUTPUT, *_STOPS.values()))
 _ARCS = {motion: kinds for kinds, motion in _ARC_TYPES.items()}
-#: The motion types of arcs; those of all other moves with a velocity and an acceleration.
+#: The motion types of arcs; the types of all other moves with a velocity and an acceleration.
 ARC_TYPES, MOVE_TYPES = frozenset(_ARCS), frozenset(_MOVES)
 _OPTIMOVES = frozenset(
     motion for motion, (cls, _) in _MOVES.items() if cls in (OptimoveJ, OptimoveL)

@@ -80,7 +80,7 @@ class ScriptCommand(IntEnum):
 
 
 class TcpPersistence(IntEnum):
-    """How long a TCP lasts; other robot programs than ours ignore this."""
+    """How long a TCP lasts; robot programs other than ours ignore this."""
 
     #: Until another TCP is set.
     PERMANENT = 0
@@ -413,7 +413,7 @@ def _safe_output_words(outputs: SafeOutputs) -> list[int]:
 
 
 def _safe_outputs(words: Sequence[int]) -> SafeOutputs:
-    """Return the outputs that words name; whether these are restored is not on the wire."""
+    """Return the outputs that words name; the wire does not carry their ``restore``."""
     digital = (
         SafeOutput(output=kind, pin=i - first, value=float(words[i]))
         for kind, first in FIRST_DIGITAL_OUTPUT.items()

@@ -19,8 +19,8 @@ The sender must
 * end the trajectory at rest. After a START with their number, the robot sets the blend radius of
   the last point to 0.
 
-The result of a trajectory is one int32: 0 success, 1 canceled, 2 failure. It comes in a TCP
-segment of its own.
+The result of a trajectory is one int32: 0 success, 1 canceled, 2 failure; from our own program
+also 3 input missing, 4 contact, 5 no contact. It comes in a TCP segment of its own.
 """
 
 from __future__ import annotations

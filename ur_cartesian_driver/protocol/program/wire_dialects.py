@@ -79,12 +79,12 @@ class Dialect:
     time_scale: int = FIXED_POINT
     #: Motion types that a program of this dialect runs; it silently skips all others.
     motion_types: frozenset[MotionType]
-    #: Words 6 - 14 of a move are q_near, velocity, acceleration and the flag of q_near.
+    #: Whether words 6 - 14 of a move are q_near, velocity, acceleration and the flag of q_near.
     supports_q_near: bool = False
-    #: A trajectory may have an open end (STREAM_START, STREAM_END).
+    #: Whether a trajectory may have an open end (STREAM_START, STREAM_END).
     supports_append: bool = False
-    #: The program is this driver's own: it has outputs and stops, the buffered servo, freedrive,
-    #: offsets and a temporary TCP, and reports the number of points begun.
+    #: Whether the program is this driver's own: it has outputs and stops, the buffered servo,
+    #: freedrive, offsets and a temporary TCP, and reports the number of points begun.
     is_own: bool = False
 
     @property

@@ -92,7 +92,7 @@ class InputsInUse(RemoteProtocolError):
 
 
 class RtdeState(Enum):
-    """State of the handshake; the value names the message that the client waits for."""
+    """State of the handshake; each member's value says what the client waits for, for errors."""
 
     NEW = 'start()'
     PROTOCOL_VERSION = 'the answer to the protocol version'

@@ -117,9 +117,9 @@ OUTPUT_TYPES: Mapping[str, DataType] = MappingProxyType(
     }
 )
 
-#: First software version of CB3 (None = never) and of e-Series with some fields, and the pattern
-#: of their names, as far as the manufacturer's guide dates them. The registers in this table are
-#: those for clients other than fieldbuses.
+#: The fields whose introduction the manufacturer's guide dates: the first software version that
+#: has them on CB3 (None = no version), the same on e-Series, and the pattern of their names. Of
+#: the registers, only those for clients other than fieldbuses are in the table.
 _INTRODUCED: tuple[tuple[tuple[int, ...] | None, tuple[int, ...], str], ...] = (
     ((3, 5), (5, 0), r'elbow_(position|velocity)'),
     ((3, 9), (5, 3), r'\w+_bit_register_\d+|\w+_(int|double)_register_(2[4-9]|[34]\d)'),

@@ -99,7 +99,8 @@ class Recipe:
         Return the whole frame of a data package.
 
         :param values: in the order of the recipe; vectors as tuples.
-        :raises LocalProtocolError: the number, a length or the range of the values is wrong.
+        :raises LocalProtocolError: there are too few or too many values, or a value does not fit
+            the type of its field.
         """
         flat: list[Any] = [] if self.recipe_id is None else [self.recipe_id]
         value: Any  # a number has no length: caught below
@@ -119,7 +120,7 @@ class Recipe:
         """
         Return the whole frame of a data package with values by name.
 
-        :raises LocalProtocolError: a value is missing, surplus or wrong.
+        :raises LocalProtocolError: a value is missing, surplus, or does not fit its type.
         """
         if len(values) != len(self.names) or not all(name in values for name in self.names):
             missing = ', '.join(set(self.names) - set(values)) or 'none'

@@ -86,7 +86,7 @@ class PrimaryProbe:
         return self._client.send(program, lambda: True)
 
     async def find_line(self, *parts: str, time: float = RIGHTS_TIMEOUT) -> str:
-        """Wait for a line that contains one of the parts; return '' if none comes in time [s]."""
+        """Wait up to ``time`` [s] for a line that contains one of the parts; return it, or ''."""
 
         def found() -> str:
             return next((line for line in self.lines if any(p in line for p in parts)), '')
@@ -164,7 +164,7 @@ def _limits(configuration: ConfigurationData) -> Finding:
 
 
 def _calibration(model: str, geometry: DhTable | None, state: Mapping[str, Any]) -> Finding:
-    """Compare the reported pose with that of the kinematics, as the driver does before goals."""
+    """Compare the reported pose with the computed one, as the driver does before goals."""
     if geometry is None or 'actual_q' not in state:
         return skipped('calibration', 'The robot did not report its calibration')
     try:

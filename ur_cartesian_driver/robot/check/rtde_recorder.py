@@ -63,7 +63,7 @@ class RtdeRecorder:
         return dict(zip(self.names, self.rows[-1], strict=True)) if self.rows else {}
 
     def column(self, name: str) -> Floats:
-        """Return the values of an output: (n,), or (n, m) of vectors; NaN (n,) if missing."""
+        """Return the values of an output: (n,), or (n, m) for vectors; NaN (n,) if missing."""
         if name not in self.names:
             return np.full(len(self.rows), np.nan)
         i = self.names.index(name)

@@ -42,7 +42,7 @@ class ProgramAutoStart:
         :param power_up: switches the arm on and releases its brakes; returns False if
             there is no connection.
         :param upload: sends the robot program.
-        :param warn: takes a line for the log.
+        :param warn: called with a line for the log.
         """
         self._settings = settings
         self._pending = pending

@@ -47,7 +47,7 @@ class ProgramControl:
         Prepare; nothing is sent.
 
         :param robot: returns the newest state; None = the robot is not connected.
-        :param warn: takes a line for the log.
+        :param warn: called with a line for the log.
         :param may_upload: whether the first connection may start the robot program.
         """
         self._sockets, self._primary = sockets, primary_client
@@ -93,7 +93,7 @@ class ProgramControl:
         return self._primary.send(primary.encode_command(command), is_wanted)
 
     def send_script(self, data: bytes, is_wanted: Callable[[], bool]) -> bool:
-        """Send a user's script, like :meth:`send_primary` sends commands."""
+        """Send a user's script, as :meth:`send_primary` sends commands."""
         self._event_log.note('the driver sent a script of others')
         return self._primary.send(data, is_wanted)
 

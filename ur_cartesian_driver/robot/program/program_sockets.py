@@ -112,7 +112,7 @@ class ProgramSockets:
         """
         Listen on all ports that are not open yet.
 
-        :param host: our address; if it has changed, all ports move there.
+        :param host: our address; if it has changed, all ports move to it.
         :param allowed: addresses that may connect.
         :raises OSError: a port is taken; the text names the parameter to change.
         """
@@ -200,7 +200,7 @@ class ProgramSockets:
         while True:
             last, before = loop.time(), last
             self.max_keepalive_gap = max(self.max_keepalive_gap, last - before)
-            if not (self.is_paused and was_paused):  # one more: a read waits
+            if not (self.is_paused and was_paused):  # one more: a read is waiting
                 self._send_keepalive()
             was_paused = self.is_paused
             due = max(due + self._settings.keepalive_period, loop.time())

@@ -24,15 +24,16 @@ class ProgramTracker:
     def __init__(self, sockets: ProgramSockets) -> None:
         """Begin with no program."""
         self._sockets = sockets
-        #: The connected program was told to end.
+        #: Whether the connected program was told to end.
         self.is_ending = False
-        #: The running program has connected to us, even if it has hung up since.
+        #: Whether the running program has connected to us, even if it has hung up since.
         self._has_called = False
-        #: Time, by the robot's clock, since when it has reported that no program runs although one
-        #: is connected [s].
+        #: The robot's time [s] of its first report that no program runs although one is connected;
+        #: inf = it does not report this now.
         self._dead_since = inf
         self._has_shown_itself = False
-        #: The program's count of connections: in the newest report; before the present connection.
+        #: The robot program's count of its connections, as last reported: by now; before the
+        #: present connection.
         self._run = self._run_at_connection = 0
         self._identity = asyncio.Event()
         self._connected_at = -inf

@@ -26,7 +26,7 @@ from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection, SILEN
 from ur_cartesian_driver.robot.transport import AttemptLog, Backoff
 
 REQUIRED_FIELDS = ('actual_digital_input_bits', 'actual_digital_output_bits')
-#: Old software lacks some of these.
+#: Outputs that old software may lack.
 OPTIONAL_FIELDS = (
     'analog_io_types',
     'standard_analog_input0',

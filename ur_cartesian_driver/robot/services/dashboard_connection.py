@@ -162,7 +162,7 @@ def _missing_in_robot_api(command: str, version: ControllerVersion) -> str:
 
 
 def is_too_early(command: str, answer: str) -> bool:
-    """Return whether a refused unlock may succeed later: any conflict of the Robot API may."""
+    """Return whether a refused unlock may succeed later (for the Robot API: any conflict)."""
     return TOO_EARLY in answer or (command == UNLOCK and CONFLICT in answer)
 
 

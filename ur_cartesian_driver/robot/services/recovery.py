@@ -140,7 +140,7 @@ class RecoveryRunner:
 
     async def _settled_step(self, situation: Callable[[], RecoverySituation]) -> NextStep:
         """
-        Return the next step, but one that needs a person only if it stays the next step.
+        Return the next step; one that needs a person only if it is still next after a while.
 
         Sockets and robot state reflect a change at different times, and a program that has just
         been started has not connected yet.

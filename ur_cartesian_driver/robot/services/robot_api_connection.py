@@ -100,7 +100,7 @@ class RobotApiConnection:
     def _exchange(self, command: ApiCommand, body: bytes, timeout: float) -> tuple[int, bytes]:
         """Send a request and return status and body of the answer; called in a thread."""
         try:
-            # Only to the robot: not through a proxy of the environment, nor redirected elsewhere.
+            # The pool connects only to the robot: no proxy, and no redirection to another host.
             with urllib3.HTTPConnectionPool(
                 self._host,
                 self._port,

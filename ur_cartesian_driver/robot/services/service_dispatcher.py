@@ -156,7 +156,7 @@ class ServiceDispatcher:
                 )
 
     def _refusal(self, call: ServiceCall) -> ServiceAnswer | None:
-        """Refuse a call that is not allowed now."""
+        """Return the refusal of a call that is not allowed now; None = it is allowed."""
         status = self._link.status
         if isinstance(call, DashboardCall) and call.command in QUERY_COMMANDS:
             return None

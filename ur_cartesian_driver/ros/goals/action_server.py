@@ -108,7 +108,7 @@ class GoalServer:
         return next((motion for motion in motions if motion and not motion.done()), None)
 
     def find_run(self, key: bytes) -> GoalRun | None:
-        """Return the run of a goal that has not ended, by the bytes of its id."""
+        """Return the run of a goal by the bytes of the goal's id; None if the goal has ended."""
         with self._lock:
             return self._runs.get(key)
 
@@ -136,7 +136,7 @@ class GoalServer:
         """Start the run of an accepted goal; called by the executor."""
         run = GoalRun(handle, action, self._context, self._finish)
         if not (run.is_scheduled or action.is_validation(handle.request)):
-            self.arbiter.enqueue(run.arm_request)  # here, where goals are in order
+            self.arbiter.enqueue(run.arm_request)  # by the executor, in order of arrival
         with self._lock:
             is_over_limit = len(self._runs) >= MAX_GOALS
             if not is_over_limit:

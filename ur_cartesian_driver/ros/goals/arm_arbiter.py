@@ -18,7 +18,7 @@ import threading
 
 
 class ArmRequest:
-    """One goal's or session's place with the arbiter."""
+    """The request of one goal or session for the arm."""
 
     def __init__(self, name: str, on_preempt: Callable[[], None]) -> None:
         """
@@ -50,7 +50,7 @@ class ArmArbiter:
 
     @property
     def release_count(self) -> int:
-        """How many times the arm was released; each time, it may have moved before."""
+        """How many times the arm was released; before each release it may have moved."""
         return self._release_count
 
     @property

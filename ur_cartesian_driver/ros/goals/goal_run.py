@@ -73,7 +73,7 @@ class GoalRun:
         self.thread = threading.Thread(target=self._run, name=self.arm_request.name, daemon=True)
         #: Whether the goal waits for its start time.
         self.is_waiting = self.is_scheduled
-        #: The last append request that was granted, and its response.
+        #: A key of the last append request that was granted, and the response to it.
         self.last_append: tuple[object, Any] | None = None
         self._lock = threading.Lock()
         self._motion: MotionHandle | None = None
@@ -89,12 +89,12 @@ class GoalRun:
 
     @property
     def points(self) -> int:
-        """The number of points of a goal with keep_open; 0 = another goal, or no motion yet."""
+        """The number of points of a goal with keep_open; 0 = no keep_open, or no motion yet."""
         motion = self._motion
         return motion.appender.points if motion is not None and motion.appender else 0
 
     def motion(self, timeout: float) -> MotionHandle | None:
-        """Wait up to ``timeout`` [s] for the motion to begin; return the motion, or None."""
+        """Wait up to ``timeout`` [s] for the motion and return it; None if it has not begun."""
         self._begun.wait(timeout)
         return self._motion
 

@@ -42,7 +42,7 @@ class FreedriveService:
                 motion.result(JOIN_TIMEOUT)
 
     def _handle(self, request: Any) -> Future[ServiceAnswer]:
-        """Start or end freedrive; the answer comes when the robot has done so, or cannot do so."""
+        """Start or end freedrive; the answer comes when the robot has done this, or has failed."""
         with self._lock:
             motion = self._motion
             if request.data:

@@ -5,8 +5,8 @@
 
 The executor only stores the newest message, and a separate thread processes it. So neither the
 wait for a tf2 frame nor a client that sends quickly holds up the node. A target that cannot be
-followed is ignored with a warning that says why; the previous target stays in effect until that
-one is too old.
+followed is ignored with a warning that says why; the previous target stays in effect until it is
+too old itself.
 
 A session acquires the arm like a goal, but is treated as older than all goals, so that any goal
 preempts it.
@@ -243,7 +243,7 @@ class LiveTargetSubscriber:
         except BaseException as error:
             self._arbiter.release(arm_request)
             if self._had_session and isinstance(error, RobotNotReady):
-                self._inhibitor.activate()  # the robot was ready before: it was stopped
+                self._inhibitor.activate()  # the robot was ready before, so it was stopped
             raise
         self._session, self._had_session = session, True
         if arm_request.preempted_by:

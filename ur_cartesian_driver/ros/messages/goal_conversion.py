@@ -3,8 +3,8 @@
 """
 Conversion of a goal message to a goal with resolved frames.
 
-Only errors of the message itself are refused here: invalid enumerations and unknown frames. The
-planning, which knows no messages, checks all else.
+Only errors of the message itself are refused here: invalid enumerations and unknown frames.
+Planning, which does not know messages, makes all other checks.
 """
 
 from __future__ import annotations

@@ -143,7 +143,13 @@ def status_message(
 
 
 def _unknown(name: str, value: Any) -> Any:
-    """Return the value of a status field that is not known: NaN, UNKNOWN or the default."""
+    """
+    Return the content of a status field whose value is not known.
+
+    This is NaN for floats, the message's constant ``..._UNKNOWN`` for modes, else ``value``.
+
+    :param value: the default of the field in the message.
+    """
     if isinstance(value, float | np.ndarray):
         return value + nan
     return getattr(DriverStatus, f'{name.upper()}_UNKNOWN', value)

@@ -4,7 +4,7 @@
 The service that appends points to a running goal with keep_open.
 
 A separate thread plans the points, one request after the other, so neither the executor nor the
-feedback waits for it. The response is sent when the points are appended or refused.
+feedback waits for the planning. The response is sent when the points are appended or refused.
 """
 
 from __future__ import annotations

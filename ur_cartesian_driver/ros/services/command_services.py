@@ -53,7 +53,7 @@ from ur_cartesian_driver.srv import (
     SetPayload as SetPayloadService,
 )
 
-#: The calls of services without request fields, which respond with a sentence or a value.
+#: The driver call of each service without request fields; the response is a sentence or a value.
 TRIGGER_SERVICES: Mapping[str, ServiceCall] = {
     'resend_robot_program': SendProgramCall(),
     'hand_back_control': HandBackCall(),
@@ -103,7 +103,8 @@ def _output(request: Any) -> ServiceCall:
     return SetOutputCall(kind=kind, pin=request.pin, value=request.value, domain=domain)
 
 
-#: Services with request fields: their type, and the function that makes the call of a request.
+#: For each service with request fields: the type of the service, and the function that converts a
+#: request to a driver call.
 REQUEST_SERVICES: Mapping[str, tuple[Any, Callable[[Any], ServiceCall]]] = {
     'recover': (
         Recover,
@@ -157,7 +158,7 @@ class CommandServices:
     def _convert(
         self, call_of: Callable[[Any], ServiceCall], request: Any
     ) -> Future[ServiceAnswer]:
-        """Make the call of a request, or refuse the request."""
+        """Convert a request to a driver call and make it, or refuse the request."""
         try:
             return self._call(call_of(request))
         except DriverError as error:

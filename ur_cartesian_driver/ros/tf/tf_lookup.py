@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import normalize, Pose
 from ur_cartesian_driver.ros.message_fields import Message, nanoseconds
 
-#: Longest wait for a transform [s]: one for the present time is published only a moment later.
+#: Longest wait for a transform [s]. Transforms for the present time are published a moment later.
 LOOKUP_TIMEOUT = 0.5
 
 

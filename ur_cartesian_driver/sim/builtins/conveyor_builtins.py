@@ -111,7 +111,7 @@ class ConveyorBuiltins(BuiltinGroup):
     def track_conveyor_linear(
         self, direction: Value, ticks_per_meter: Value, encoder_index: Value = 0
     ) -> None:
-        """Track a belt that moves straight in a direction given in the base."""
+        """Track a belt that moves straight, in a direction given in base axes."""
         six(direction, 'direction')
         number(ticks_per_meter, 'ticks_per_meter')
         self._belts.tracked = index(encoder_index, 'encoder_index', ENCODERS)

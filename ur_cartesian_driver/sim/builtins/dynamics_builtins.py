@@ -20,13 +20,13 @@ from ur_cartesian_driver.sim.motion.kinematics.point_motion import (
 )
 from ur_cartesian_driver.urscript.script_values import Matrix, Value
 
-#: Half the time between the two Jacobians whose difference gives the time derivative [s].
+#: Half the time [s] between the two Jacobians whose difference gives the time derivative.
 DIFFERENCE = 1e-4
 UNIT_ACCELERATIONS = tuple(vector6(1.0 if i == j else 0.0 for i in range(6)) for j in range(6))
 
 
 class DynamicsBuiltins(BuiltinGroup):
-    """Functions of joint positions and speeds (by default the target's); results in base axes."""
+    """Functions of joint positions and speeds (default: the target's); results in base axes."""
 
     def _q(self, q: Value) -> Vector6:
         return self._controller.motion.q if q is None else six(q, 'q')

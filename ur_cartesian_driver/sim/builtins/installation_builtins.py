@@ -18,7 +18,7 @@ from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import truth, type_name, Value
 
-#: Actions that a program can assign to an input; 'default' = none.
+#: Actions that a program can assign to an input; 'default' = no action.
 INPUT_ACTIONS = ('default', 'freedrive')
 EUROMAP_PINS = 33
 
@@ -45,7 +45,7 @@ def _runstate(count: int) -> Callable[[Any, Value, Value], None]:
 
 
 def _runstate_list(count: int) -> Callable[[Any, Value], None]:
-    """Return the older script function; it takes the outputs that are high during a program."""
+    """Return the older script function, given a list of the outputs to be high in a program."""
 
     def choose(_: Any, outputs: Value) -> None:
         if type(outputs) is not list:

@@ -17,7 +17,7 @@ from ur_cartesian_driver.urscript.script_values import ScriptPose, Value
 def solve(
     controller: Controller, T_base_tcp: Pose, T_flange_tcp: Pose, near: Vector6
 ) -> Vector6 | None:
-    """Return the joint solution of a TCP pose that is nearest to ``near``; None = no solution."""
+    """Return the joint positions nearest to ``near`` for a TCP pose; None = no solution."""
     return nearest(controller.arm, T_base_tcp @ T_flange_tcp.inverse(), near)
 
 

@@ -111,7 +111,7 @@ class ModbusBuiltins(BuiltinGroup):
     def modbus_set_output_register(
         self, signal_name: Value, register_value: Value, is_secondary_program: Value = False
     ) -> None:
-        """Write one register; for a signal that reads and writes, a list of all its registers."""
+        """Write one register or, for a signal that reads and writes, the list of all registers."""
         signal = self._signal(signal_name)
         given = register_value if type(register_value) is list else [register_value]
         if len(given) != signal.registers_to_write:

@@ -149,10 +149,10 @@ class MotionBuiltins(BuiltinGroup):
 
     def servoc(self, pose: Value, a: Value = 1.2, v: Value = 0.25, r: Value = 0) -> Steps:
         """
-        Move like `movep`: how the manual's "servo circular" differs from it is not published.
+        Move like `movep`: its difference from the manual's "servo circular" is not published.
 
-        A call takes at least one cycle, even if the tool is already at the target, because
-        programs call `servoc` in a loop that does not wait otherwise.
+        A call takes at least one cycle, even if the tool is already at the target: programs call
+        `servoc` in a loop in which nothing else takes time.
         """
         passed = False
         for _ in self.movep(pose, a, v, r):
@@ -248,7 +248,7 @@ class ModeBuiltins(BuiltinGroup):
         within(damping, 'damping', 0, 1)
 
     def force_mode_set_gain_scaling(self, scaling: Value) -> None:
-        """Set the factor (0..2) that scales the speed of compliant axes per missing force."""
+        """Set the factor (0..2) on the speed of a compliant axis for a given force error."""
         self._controller.contact.gain_scaling = within(scaling, 'scaling', 0, 2)
 
     def tool_contact(self, direction: Value = None) -> int:
@@ -258,7 +258,7 @@ class ModeBuiltins(BuiltinGroup):
 
 
 def _limits(a: Value, v: Value, t: Value) -> tuple[float, float, float]:
-    """Return acceleration, speed and time; for a time above 0, the others only shape the ramps."""
+    """Return `a`, `v` and `t` as numbers; if `t` is above 0, `a` and `v` only shape the ramps."""
     time = not_negative(t, 't')
     if time > 0.0:
         return number(a, 'a'), number(v, 'v'), time

@@ -62,7 +62,7 @@ class PathOffsetBuiltins(BuiltinGroup):
         self._offset.alpha = within(alpha, 'alpha', 0, 1)
 
     def path_offset_set_max_offset(self, transLimit: Value, rotLimit: Value) -> None:
-        """Set the limits of the offset along [m] and about [rad] each axis."""
+        """Set the limits of the offset: along each axis [m], and about each axis [rad]."""
         self._offset.max_translation = not_negative(transLimit, 'transLimit')
         self._offset.max_rotation = not_negative(rotLimit, 'rotLimit')
 

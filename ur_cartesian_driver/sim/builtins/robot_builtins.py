@@ -214,9 +214,9 @@ class RobotBuiltins(BuiltinGroup):
 
     def reset_revolution_counter(self, qNear: Value = None) -> None:
         """
-        Change the positions of joints without limits by full turns.
+        Change the positions of unlimited joints by full turns.
 
-        :param qNear: positions [rad], to which the new positions are nearest; None = no change.
+        :param qNear: positions [rad], near which the new positions have to be; None = no change.
         """
         if qNear is None:
             return

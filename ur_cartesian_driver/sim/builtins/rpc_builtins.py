@@ -52,7 +52,7 @@ class RemoteProcedures(RemoteObject):
 
     def __init__(self, controller: Controller, url: str) -> None:
         """
-        Take the address of the server.
+        Parse the address of the server.
 
         :raises RuntimeException: the URL is not an HTTP address.
         """

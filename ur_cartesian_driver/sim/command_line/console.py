@@ -24,7 +24,8 @@ def run_command(
 ) -> int:
     """Run a command and return its exit status; 0 means that it succeeded."""
     logging.basicConfig(level=logging.WARNING, format='%(levelname)s: %(message)s')
-    # Shells make background processes ignore SIGINT, and nohup SIGHUP; only SIGHUP stays ignored.
+    # Background processes of a shell ignore SIGINT, and processes of nohup ignore SIGHUP. Only
+    # SIGHUP stays ignored here.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) != signal.SIG_IGN:

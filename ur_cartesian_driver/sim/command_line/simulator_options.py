@@ -115,7 +115,7 @@ def _add_start(command: argparse.ArgumentParser) -> None:
 
 
 def take_negative_numbers(command: argparse.ArgumentParser) -> None:
-    """Accept values that begin with a minus, such as -1.5,2; argparse has no public way."""
+    """Accept values such as -1.5,2 that begin with a minus; argparse has no public option."""
     command._negative_number_matcher = _NUMBERS
 
 

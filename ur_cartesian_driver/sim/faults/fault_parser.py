@@ -129,7 +129,7 @@ _DEVIATION: dict[str, Reader] = {
     'amount': _number('an amount'),
 }
 
-#: First word of a fault -> class of the fault, and the readers of its fields, which follow.
+#: First word of a fault -> class of the fault, and the readers of the fields in later words.
 _KINDS: Mapping[str, tuple[type[Fault], Mapping[str, Reader]]] = MappingProxyType(
     {
         **{event.value: (EventFault, {'action': _constant(event)}) for event in FaultEvent},
@@ -162,7 +162,7 @@ def parse_fault(text: str) -> Fault:
     """
     Return the fault that a text describes.
 
-    :raises ValueError: a word is not understood or a value is impossible; the text names which.
+    :raises ValueError: a word is not understood or a value is impossible; the message names it.
     """
     words = _WordReader(text)
     if words.peek() not in _KINDS:

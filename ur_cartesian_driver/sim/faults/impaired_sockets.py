@@ -7,7 +7,7 @@ from __future__ import annotations
 from ur_cartesian_driver.sim.faults.impairment import ImpairedConnection, Impairment
 from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets, SocketState
 
-#: Most received bytes that are held back here; further bytes wait in the kernel, then at the peer.
+#: Bound on received bytes that are held back here; further ones wait in the kernel or at the peer.
 _MAX_INCOMING = 65_536
 
 

@@ -131,5 +131,5 @@ class ImpairedConnection:
         return 0.0 if self.impairment is None else self.impairment.delay
 
     def _release_terms(self, now: float) -> tuple[float, float]:
-        """Return the time up to which bytes are due, and their rate; inf without impairment."""
+        """Return the time up to which bytes are due, and their rate; both inf if unimpaired."""
         return (inf, inf) if self.impairment is None else (now, self.impairment.rate)

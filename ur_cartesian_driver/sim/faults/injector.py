@@ -79,7 +79,7 @@ class _PendingFault:
     fault: Fault
     set_at: float
     travelled: float
-    #: Whether the TCP was beyond the plane when the fault was set.
+    #: Whether the coordinate of the TCP was at or above that of the plane when the fault was set.
     side: bool
 
 
@@ -137,7 +137,7 @@ class FaultInjector:
         self._apply_running(self._controller.time)
 
     def step(self) -> None:
-        """Trigger the faults due in this cycle."""
+        """Trigger the faults due in this cycle, and apply the lasting faults."""
         now = self._controller.time
         self._measure_path()
         due = [pending for pending in self._pending if self._is_due(pending, now)]

@@ -170,7 +170,7 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
         'power on': Controller.power_on,
         'power off': Controller.power_off,
         'brake release': Controller.release_brakes,
-        # Only the arm: without a running controller, nothing could be tested afterwards.
+        # Switches off only the arm: without a controller, nothing could be tested afterwards.
         'shutdown': Controller.power_off,
         'close popup': Controller.close_popups,
     }

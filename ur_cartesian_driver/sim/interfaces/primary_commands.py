@@ -3,8 +3,8 @@
 """
 The one-line commands that clients can send to a script port in addition to programs.
 
-Any other line is a statement: it is compiled as a separate program, which replaces the running
-program, as on the robot. All input of a client that connected in local control is refused.
+Any other single line is a statement: it is compiled as a separate program, which replaces the
+running program, as on the robot. All input of a client that connected in local control is refused.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
         'stop program': lambda controller: controller.programs.stop(),
         'pause program': lambda controller: controller.programs.pause(),
         'resume program': lambda controller: controller.programs.play(),
-        # On a robot, motions go to the arm or only to the screen; here there is no difference.
+        # On a robot, motions then go to the arm or only to the screen; here, always to the arm.
         'set real': lambda _: None,
         'set sim': lambda _: None,
     }

@@ -3,8 +3,8 @@
 """
 One HTTP client of the Robot API of PolyScope X, and the effect of each request.
 
-Paths and bodies of requests are repeated here. If the simulator used the driver's table, tests
-could not find mistakes in the table. doc/simulation.md states the sources and the assumptions.
+The driver has a table of the same requests. If the simulator used that table, tests could not find
+mistakes in it. doc/simulation.md states the sources and the assumptions.
 """
 
 from __future__ import annotations
@@ -225,7 +225,7 @@ def _openapi(controller: Controller, _: Body) -> Fields:
     return {'openapi': '3.1.0', 'info': {'title': 'Robot API', 'version': number}}
 
 
-#: Method and path below BASE_PATH -> first software version with this request, and its effect.
+#: Method and path below BASE_PATH -> first software version with this request, and its handler.
 _ROUTES: Mapping[tuple[str, str], tuple[tuple[int, int], Handler]] = MappingProxyType(
     {
         ('GET', '/openapi.json'): (FIRST_VERSION, _openapi),

@@ -47,7 +47,7 @@ class _OutputSchedule:
 
 
 class _PacketGaps:
-    """Leaves out packets, as a loaded controller does."""
+    """Leaves out packets, as a busy controller does."""
 
     def __init__(self, imperfections: Imperfections) -> None:
         self._imperfections, self._random = imperfections, Random(imperfections.seed)

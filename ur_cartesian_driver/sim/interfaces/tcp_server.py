@@ -20,7 +20,7 @@ from ur_cartesian_driver.sim.faults.impairment import ImpairedConnection, Impair
 
 _log = logging.getLogger(__name__)
 
-#: Most bytes that a client can leave unread, not counting bytes in the kernel.
+#: Largest number of bytes that a client can leave unread, not counting bytes in the kernel.
 MAX_UNREAD_BYTES = 1_000_000
 #: A client with more unread bytes gets no states but is kept: many clients only send scripts.
 MAX_UNREAD_BYTES_FOR_STATE = 16_384
@@ -192,8 +192,9 @@ class TcpServer(Generic[S]):
         self.connections: set[_ClientConnection[S]] = set()
         self._server: asyncio.Server | None = None
         self.closing = False
-        #: The impairment of all connections; the controller's clock at the last fault update [s].
+        #: The impairment of all connections; None = no impairment.
         self.impairment: Impairment | None = None
+        #: The controller's clock at the last update of the faults [s].
         self.now = 0.0
 
     @property

@@ -7,7 +7,8 @@ The simulated arm follows its targets exactly, so actual values equal the target
 is compliant or configured as imperfect, or a fault makes them deviate. A deviation of the pose
 changes the joint positions accordingly, but not the twist, as with a faulty measurement. A
 deviation of the twist changes the joint speeds, but not the pose. A deviation of the acceleration
-changes the accelerometer and, integrated, twist and joint speeds, which many clients check.
+changes the reading of the accelerometer; its integral over time changes the twist and the joint
+speeds, because many clients compute accelerations from these.
 """
 
 from __future__ import annotations
@@ -128,7 +129,7 @@ class ActualMotion:
         return q
 
     def _joint_change(self, change: Vector6) -> Vector6:
-        """Return the joint change for a small TCP change; if singular, by least squares."""
+        """Return the joint change for a small TCP change; at a singularity, by least squares."""
         jacobian = self._motion.arm.jacobian(self._undisturbed.q, self._motion.T_flange_tcp)
         return vector6(float(v) for v in np.linalg.pinv(jacobian, rcond=1e-6) @ change)
 

@@ -56,7 +56,7 @@ class ArmTarget:
 
     @property
     def T_flange_tcp(self) -> Pose:
-        """The TCP; motions that began before the TCP was set keep the previous one."""
+        """The TCP; motions that began before it was set keep the previous TCP."""
         return self._T_flange_tcp
 
     @T_flange_tcp.setter

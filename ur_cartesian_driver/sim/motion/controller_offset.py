@@ -8,8 +8,9 @@ filtered offset. Frames, filter, limits and the stop at the end follow the scrip
 following rules are ours, because the manual has none:
 
 * a new offset replaces the previous offset, even if that was set in another frame;
-* the offset remains at rest, in pauses and in stops; while set-points (servoj, speedj, speedl)
-  lead the arm, the offset has no effect, and the set-points start from the displaced position;
+* the offset remains applied at standstill, in pauses and in stops; while set-points (servoj,
+  speedj, speedl) lead the arm, the offset has no effect, and the set-points start from the
+  displaced position;
 * the frame MOTION keeps its axes while the tool stands still or moves along its own z axis; before
   the first motion this frame does not exist, and offsets in this frame have no effect;
 * an offset that needs more than the maximum speed of a joint, or a joint acceleration above
@@ -207,7 +208,7 @@ class ControllerPathOffset:
         return None
 
     def _is_sudden(self, target: ArmTarget, q: Vector6, change: Vector6) -> bool:
-        """Return whether a joint cannot follow the offset."""
+        """Return whether the offset moves a joint faster than the joint can follow."""
         motion = self._motion
         rate = scale6(subtract6(change, self._change), 1.0 / motion.cycle)
         most = MAX_JOINT_ACCELERATION * motion.cycle

@@ -29,15 +29,16 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget, TargetRates
 from ur_cartesian_driver.sim.motion.paths.path_motion import PathMotion
 
-#: Most cycles in a batch; fewest cycles, because numpy is slow for short batches.
+#: Largest number of cycles in a batch.
 _MAX_CYCLES = 384
+#: Smallest number of cycles in a batch: numpy is slow for short batches.
 _MIN_CYCLES = 12
 #: Number of cycles that are solved one by one after a batch could not be solved.
 _BACK_OFF = 50
 
 
 class CycleStep(NamedTuple):
-    """The next target of a motion, and the path time [s] that the motion advances to it."""
+    """The next target of a motion, and the path time [s] by which the motion advances."""
 
     q: Vector6
     pose: Pose
@@ -64,13 +65,13 @@ class CycleBatch:
         self._solved_for = (0, 0.0, 0.0)
         #: Whether the cycles were solved by inverse kinematics.
         self.on_tool_path = False
-        #: The joints of the last cycle that was taken.
+        #: The joints of the last cycle that :meth:`next` returned.
         self._q: Vector6 = target.q
         self._back_off = 0
 
     def next(self, motion: PathMotion, duration: float, max_tool_speed: float) -> CycleStep | None:
         """
-        Advance a motion by its next solved cycle; None = this cycle has to be solved singly.
+        Advance a motion by its next solved cycle; None = the caller has to solve it.
 
         :param duration: the path time per cycle [s].
         :param max_tool_speed: bound on the tool speed [m/s].

@@ -32,10 +32,11 @@ _ATTEMPTS = 12
 # too long by some factor is therefore divided by a power of this factor, but at most by the power
 # with this exponent, and at most by this multiple of the factor.
 _MAX_POWER, _MAX_OVERCUT = 4.0, 2.0
-# A tool motion is stuck if it is slower than this fraction of its speed; for longer than this [s];
-# while no joint is faster than this fraction of its limit, as when the arm passes a singularity.
+# A tool motion is stuck if its speed stays below this fraction of the planned speed
 _STALLED = 0.01
+# for longer than this [s],
 _STALLED_AFTER = 1.0
+# unless a joint is faster than this fraction of its limit, as when the arm passes a singularity.
 _TURNING = 0.2
 # If the first step of a joint line is too long by this factor, the line does not begin at the
 # joints with which the preceding tool path ends.
@@ -54,7 +55,7 @@ class CycleStepper:
         self._batch = CycleBatch(target)
 
     def forget_stall(self) -> None:
-        """Restart the time after which a motion is considered stalled."""
+        """Restart the timer after which a motion is considered stalled."""
         self._stalled_for = 0.0
 
     def advance(
@@ -106,7 +107,7 @@ class CycleStepper:
         return self._target.forward(q)
 
     def _jumps(self, q: Vector6, setpoint: Setpoint, joints: float) -> bool:
-        """Return whether joint travel does not shrink with the time of a step: a branch jump."""
+        """Return whether a step is a branch jump: a shorter step turns the joints as far."""
         if isinstance(setpoint, Pose):
             return is_singular(self._target.q, q, self._target.T_base_tcp, setpoint)
         return self._on_tool_path and joints > _JUMP_RATIO

@@ -61,12 +61,12 @@ class Imperfections:
     speed_noise: float = 0.002
     #: Smaller speeds are measured as exactly 0 while the target stands still [rad/s]. Recorded.
     speed_deadband: float = 0.001
-    #: Fraction of RTDE packets after which one is left out. Recorded: 0.07 at 500 Hz.
+    #: Fraction of RTDE packets after which a single packet is left out. Recorded: 0.07 at 500 Hz.
     single_gaps: float = 0.07
     #: Fraction of RTDE packets after which up to ``max_skipped`` are left out. Recorded: "a few".
     long_gaps: float = 0.002
-    #: Most RTDE packets that are left out in a row. Recorded: gaps of 12 ms at 500 Hz, of 40 ms at
-    #: 125 Hz.
+    #: Largest number of consecutive RTDE packets that are left out. Recorded: gaps of 12 ms at
+    #: 500 Hz, of 40 ms at 125 Hz.
     max_skipped: int = 5
     #: Joint currents of an arm that is switched on [A]. Assumed, independent of the payload.
     holding_current: Vector6 = (0.1, -1.6, -1.1, -0.3, 0.1, 0.05)

@@ -90,8 +90,9 @@ class MotionGenerator:
         self.max_tool_speed = MAX_TOOL_SPEED
         #: Speed at which movel turns the tool for each m/s of its ``v`` [rad/s].
         self.turn_ratio = 1.0
-        #: The target of the motion; the offset that a program adds to the target.
+        #: The target of the motion, without the path offset.
         self._target = ArmTarget(arm, cycle, q)
+        #: The offset that a program adds to the target.
         self.path_offset = ControllerPathOffset(self._target)
         self._active = RunningMotion(self._target)
         self._reports = MotionReports()
@@ -156,7 +157,7 @@ class MotionGenerator:
 
     @property
     def scaling(self) -> float:
-        """The speed scaling of the last cycle, which limits of the arm can reduce."""
+        """The speed scaling that the last cycle achieved; limits of the arm can reduce it."""
         return min(self._active.rate, self._active.scale)
 
     @property
@@ -278,7 +279,7 @@ class MotionGenerator:
     def servoj(
         self, q: Vector6, t: float, lookahead_time: float = 0.1, gain: float = 300.0
     ) -> Move:
-        """Move the set-point to ``q`` within ``t`` [s] of scaled time; the arm follows it."""
+        """Move a set-point, which the arm follows, to ``q`` within ``t`` [s] of scaled time."""
         qd, before = self._active.nominal_joint_speed(), self._active.motion
         begin = before.setpoint(before.elapsed) if isinstance(before, ServoMotion) else self.q
         return self._replace(

@@ -22,9 +22,9 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 #: A running script function that takes time: it yields once per cycle.
 Steps = Generator[None, None, None]
 
-#: Deceleration [rad/s^2] of a stop by the controller itself, because a program has ended off a
-#: path, a thread was killed or a move is aborted. Not published; users call the robot's stop very
-#: sudden.
+#: Deceleration [rad/s^2] of a stop by the controller itself: a program has ended while the arm is
+#: on no path, a thread was killed, or a move is aborted. Not published; users call the robot's
+#: stop very sudden.
 HARD_STOP = 15.0
 
 

@@ -36,7 +36,7 @@ class RunningMotion:
         self._target = target
         self.motion: Motion | None = None
         self.move: Move | None = None
-        #: The speed scaling of the last cycle: as requested; as achieved by the arm.
+        #: The speed scaling of the last cycle: ``scale`` was requested, ``rate`` was achieved.
         self.scale = self.rate = 1.0
 
     @property
@@ -99,7 +99,7 @@ class RunningMotion:
         return self._unscaled(self._twist())
 
     def _joint_speed(self) -> Vector6:
-        """Return the joint speed at the end of the last cycle; on a path, the mean speed in it."""
+        """Return the joint speed after the last cycle; on a path, the mean speed in that cycle."""
         motion = self.motion
         if motion is None or isinstance(motion, JointStopMotion):
             return STILL if motion is None else motion.qd
@@ -108,7 +108,7 @@ class RunningMotion:
         return self._target.qd
 
     def _twist(self) -> Vector6:
-        """Return the TCP twist at the end of the last cycle; on a path, the mean twist in it."""
+        """Return the TCP twist after the last cycle; on a path, the mean twist in that cycle."""
         motion = self.motion
         if motion is None or isinstance(motion, ToolStopMotion):
             return STILL if motion is None else motion.twist

@@ -3,9 +3,9 @@
 """
 Motions without a path: servoj, speedj, speedl and the two stops.
 
-``preview`` looks ahead without changing the motion, because the step may have to be shortened.
-Stops run in real time, independent of the speed scaling, so that stops always end; the other
-motions run in scaled time.
+``preview`` computes a step without making it, because the step may have to be shortened until the
+arm can follow; ``accept`` makes the step. Stops run in real time, independent of the speed
+scaling, so that stops always end; the other motions run in scaled time.
 """
 
 from __future__ import annotations
@@ -83,7 +83,8 @@ class JointSpeedMotion(_JointMotion):
         step = self.acceleration * h
         part = step / size if size > step else 1.0
         qd = self.target if part >= 1.0 else add_scaled6(self.qd, change, part)
-        # For ``full`` seconds the speed changes (at the mean of both speeds), then it is constant.
+        # For ``full`` seconds the speed changes evenly from the old to the new speed, which then
+        # stays constant.
         q = add_scaled6(add_scaled6(self.q, self.qd, 0.5 * full), qd, 0.5 * full)
         q = add_scaled6(q, qd, h - full)
         return q, (q, qd, self.elapsed + h)
@@ -162,7 +163,9 @@ class JointStopMotion(_JointMotion):
 @dataclass(slots=True)
 class ToolSpeedMotion(_ToolMotion):
     """
-    speedl: the twist changes along a straight line, as recorded on a UR5e in URSim.
+    speedl: all components of the twist change evenly and reach their targets together.
+
+    This is the law recorded on a UR5e in URSim.
 
     :param acceleration: bound on the linear acceleration of the tool [m/s^2].
     :param acceleration_rot: bound on the angular acceleration of the tool [rad/s^2].
@@ -190,7 +193,7 @@ class ToolSpeedMotion(_ToolMotion):
 
 @dataclass(slots=True)
 class ToolStopMotion(_ToolMotion):
-    """stopl: the tool brakes along its tangent; translation and rotation stop together."""
+    """stopl: the tool keeps its direction and brakes; translation and rotation stop together."""
 
     acceleration: float
     acceleration_rot: float
@@ -214,7 +217,7 @@ ServoLikeMotion: TypeAlias = SetpointMotion | StopMotion
 
 
 def _speed_call_is_over(duration: float | None, elapsed: float, reached: bool) -> bool:
-    """Return whether a speed call can return; without a duration, after at least a cycle."""
+    """Return whether a speedj or speedl can return: after ``duration``; if None, at the target."""
     if duration is None:
         return elapsed > 0.0 and reached
     return elapsed >= duration - _ROUNDING
@@ -224,9 +227,9 @@ def _approach_twist(
     twist: Vector6, target: Vector6, acceleration: float, acceleration_rot: float, h: float
 ) -> Vector6:
     """
-    Return the twist after a change towards the target for ``h`` seconds.
+    Return the twist after it has changed towards the target for ``h`` seconds.
 
-    The twist changes along a straight line, so translation and rotation arrive together.
+    All components change evenly, so translation and rotation reach their targets together.
     """
     change = subtract6(target, twist)
     time = max(norm(change[:3]) / acceleration, norm(change[3:]) / acceleration_rot)

@@ -125,7 +125,7 @@ class InterpreterMode:
 
         :param clear_queue: whether to discard the statements that have been waiting.
         :param clear_on_end: whether to delete the statements' definitions when the mode ends.
-        :raises RuntimeException: the call is not in the main thread, or is in such a statement.
+        :raises RuntimeException: the call is not in the main thread, or is in interpreter mode.
         """
         interpreter = self._programs.interpreter
         if interpreter is None or interpreter.current_thread != 0 or self._interpreter is not None:

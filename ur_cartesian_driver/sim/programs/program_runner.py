@@ -286,7 +286,7 @@ class ProgramRunner:
             return
         self.state = RuntimeState.STOPPING
         if self._stepping is not None and self._stepping is self._interpreter:
-            self._stepping.stop()  # inside one of its functions; ends when that function returns
+            self._stepping.stop()  # called by the program itself: it ends when the call returns
         else:
             self._finish()
 

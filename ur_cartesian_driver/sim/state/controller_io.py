@@ -60,7 +60,7 @@ class DigitalPort:
 
     def switch_on(self, channel: str) -> None:
         """
-        Switch a channel on, such as ``standard 3``.
+        Switch on a channel such as ``standard 3``.
 
         :raises ValueError: there is no such channel.
         """
@@ -74,7 +74,7 @@ class DigitalPort:
         values[int(pin)] = True
 
     def packed(self) -> int:
-        """Return standard in bits 0-7, configurable in 8-15, tool in 16-17."""
+        """Return all channels in one number: bits 0-7 standard, 8-15 configurable, 16-17 tool."""
         return pack_bits(self.standard + self.configurable + self.tool)
 
 

@@ -44,8 +44,8 @@ def compile_program(
     """
     Compile a checked program and return the body of its main thread.
 
-    :param procedures: the functions that exist already, by the id of their scopes; those of the
-        program are added.
+    :param procedures: the functions that exist already, by the id of their scopes; the functions
+        of the program are added to them.
     :param lazily: compile each function when it is called for the first time.
     """
     procedures |= {id(scope): _procedure(scope, runtime.interleaves) for scope in root.walk()}
@@ -172,7 +172,7 @@ class _Compiler(ExpressionCompiler):
                 return
 
     def _critical(self, node: tree.CriticalStatement) -> CompiledNode:
-        """Compile the entry or exit of a critical section; taking time in one lets others run."""
+        """Compile the entry or exit of a critical section, which stops random thread switches."""
         runtime, enter = self._runtime, node.enter
 
         def plain(frame: StackFrame) -> None:

@@ -3,13 +3,12 @@
 """
 Resolves the meaning of each name before anything runs.
 
-The rules: every variable that the body of the program assigns is global, however it is marked. In
+The rules: every variable that the body of the program assigns is global, even if marked local. In
 a function or thread `local x = ...` makes x a local of the whole function and `global x = ...`
-makes it a global of the program. An unmarked assignment there writes the global of that name if
-the program has one anywhere, and otherwise makes a local. A function sees all functions of the
-scopes around it, wherever the text defines them, but not the locals of the enclosing function. If
-a scope defines a function twice, the later definition applies, because an exported program can
-include a file twice.
+makes it a global of the program. There, a plain `x = ...` writes the global x if the program has
+one anywhere, and otherwise makes a local. A function sees all functions of the scopes around it,
+wherever the text defines them, but not the locals of the enclosing function. If a scope defines a
+function twice, the later definition applies, because an exported program can include a file twice.
 
 The same walk finds unknown names, calls with wrong arguments, and the functions that can take
 time: only these functions need a Python generator.
@@ -41,15 +40,16 @@ _COMPOUND = (
 
 @dataclass(slots=True, kw_only=True)
 class Scope:
-    """The names of one function, or of the body of a program, or of a line added to one."""
+    """The names of a function, of a program's body, or of a line added to a running program."""
 
     parent: Scope | None
     owner: tree.FunctionDefinition | tree.ScriptProgram
     globals: dict[str, int]
     locals: dict[str, int] = field(default_factory=dict)
     functions: dict[str, Scope] = field(default_factory=dict)
-    #: The functions that this one calls; whether this one can take time.
+    #: The scopes of the functions that are called in this scope.
     calls: list[Scope] = field(default_factory=list)
+    #: Whether running this scope can take time.
     suspends: bool = False
 
     @property
@@ -85,7 +85,7 @@ def resolve(
     Check a program and return the scope of its body.
 
     :param enclosing: scope of the program that this one continues; that scope is not changed.
-    :raises CompileError: the first unknown name or call with wrong arguments.
+    :raises CompileError: a name is unknown, or a call has wrong arguments.
     """
     root = Scope(
         parent=enclosing, owner=program, globals=dict(enclosing.globals) if enclosing else {}

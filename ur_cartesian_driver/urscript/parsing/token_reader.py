@@ -13,8 +13,8 @@ from ur_cartesian_driver.urscript.script_errors import CompileError
 
 #: Deepest nesting of blocks, brackets, signs and `not`.
 MAX_NESTING = 50
-#: Largest number in a row of operators of equal precedence, or of calls, indices and fields; each
-#: of these makes the tree one node deeper.
+#: Largest number of consecutive operators of equal precedence, or of consecutive calls, indices
+#: and fields; each of these makes the tree one node deeper.
 MAX_CHAIN = 100
 
 #: The kinds of tokens whose texts the language defines: its words and symbols.

@@ -3,7 +3,7 @@
 """
 Compiles lines for a running program, as in interpreter mode.
 
-A line is any number of statements or function definitions. It sees the global variables and
+A line is any number of statements or function definitions. Each line sees the global variables and
 functions of the program and of earlier lines. The variables and functions that lines define can be
 forgotten, all of them at once.
 """

@@ -68,8 +68,9 @@ class _Thread:
     in_critical_section: bool = False
     #: Frames until the thread begins.
     delay: int = 0
-    #: Nodes that the thread may still evaluate in this frame; whether it took time in this frame.
+    #: Number of nodes that the thread may still evaluate in this frame.
     fuel: int = 0
+    #: Whether the thread took time in this frame.
     took_time: bool = False
 
     def descends_from(self, other: _Thread) -> bool:
@@ -266,7 +267,7 @@ class ScriptInterpreter:
             self._end(thread)
 
     def _end(self, thread: _Thread) -> None:
-        """End a thread; it is the current one, so that builtins clean up for the right thread."""
+        """End a thread, as the current thread, so that builtins clean up for the right thread."""
         thread.alive = False
         previous, self._current = self._current, thread
         try:

@@ -21,7 +21,7 @@ class Dwells(PointEvent[Segment]):
     field = 'segments'
 
     def places(self, goal: GoalTable) -> Iterator[tuple[str, int]]:
-        """Yield the name and the point of each dwell."""
+        """Yield the field name and the point of each dwell."""
         for i in rows_where(goal.motions.dwells > 0.0):
             yield segment_field(i, 'dwell'), i
 

@@ -30,13 +30,13 @@ class GoalRest:
     stopped: float
     #: Places of the points of the resumed goal.
     places: Sequence[float]
-    #: Function that returns the time from a waypoint to ``begin`` [s]. Its other arguments are the
-    #: name and value of the time offset of an event at that waypoint; offsets <= 0 need no time.
+    #: Function that returns the time from a waypoint to ``begin`` [s]; 0 for an offset <= 0. Its
+    #: other arguments are the name and value of the time offset of an event at the waypoint.
     time_since: Callable[[int, str, float], float]
 
     @property
     def first(self) -> int:
-        """The number of the last resumed point at or before ``begin``; 0 if there is none."""
+        """The number of the resumed goal's last point at or before ``begin``; 0 if it has none."""
         return max(sum(place <= self.begin + NO_FRACTION for place in self.places) - 1, 0)
 
     def is_passed(self, waypoint: int) -> bool:

@@ -43,7 +43,7 @@ def check_point(field: str, waypoint: int, goal: GoalTable) -> None:
     """
     Refuse the number of a point that the goal does not have.
 
-    :raises InvalidGoal: there is no such point; the text names the numbers that exist.
+    :raises InvalidGoal: the goal has no point of this number; the text names the numbers it has.
     """
     if not 0 <= waypoint < len(goal.waypoints):
         raise InvalidGoal(

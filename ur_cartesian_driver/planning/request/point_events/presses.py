@@ -41,7 +41,7 @@ _UNITS = (('N', 'm/s'), ('Nm', 'rad/s'))
 
 
 def is_turn(axis: str) -> bool:
-    """Return whether an axis of a press stands for turns (rx, ry, rz)."""
+    """Return whether an axis of a press is one of rotation (rx, ry, rz)."""
     return axis.startswith('r')
 
 
@@ -125,7 +125,7 @@ class Presses(PointEvent[Press]):
                 )
 
     def check_robot(self, goal: GoalTable, model: RobotModel, T_tcp_controlled: Pose) -> None:
-        """Refuse what a CB3 cannot do, and TOOL if the controlled frame is not the TCP."""
+        """Refuse options that a CB3 lacks, and TOOL if the controlled frame is not the TCP."""
         for i, press in enumerate(goal.presses):
             for name, is_set in (
                 ('zero_sensor', press.zero_sensor),
@@ -154,7 +154,7 @@ class Presses(PointEvent[Press]):
                 yield PlacedStop(press.first_waypoint, record, note, order=2)
 
     def left(self, events: Sequence[Press], rest: GoalRest) -> Sequence[Press]:
-        """Return the presses ahead, and the rest of one that has begun, without zeroing again."""
+        """Return the presses ahead, and one that has begun, which zeroes the sensor no more."""
         return rest.stretches(
             events,
             begun=lambda press: replace(press, zero_sensor=False) if press.zero_sensor else press,

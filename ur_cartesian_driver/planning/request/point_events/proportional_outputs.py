@@ -97,7 +97,7 @@ class ProportionalOutputs(OutputEvent[ProportionalOutput]):
         )
         name = f'standard analog output {output.pin}'
         begin = _ahead(
-            # With the value 0, a stop would carry out the record.
+            # Not 0: in a stop, the robot program switches waiting outputs of value 0.
             replace(switch, value=1.0, follows_speed=True),
             (output.first_waypoint, output.begin_lead, f'{field}.begin_lead'),
             path,

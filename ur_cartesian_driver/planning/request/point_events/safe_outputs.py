@@ -36,11 +36,11 @@ def check_safe_outputs(goal: GoalTable) -> None:
 
 
 def add_safe_outputs(goal: GoalTable, options: PlanningOptions) -> GoalTable:
-    """Return a goal with safe outputs added: the parameter's, and proportional outputs."""
+    """Return the goal with the parameter's safe outputs, and one for each proportional output."""
     outputs = {(output.output, output.pin): output for output in goal.safe_outputs}
     for output in parse_safe_outputs(options.safe_outputs):
         outputs.setdefault((output.output, output.pin), output)
-    # Outputs that follow the speed are restored: they follow it again after a pause.
+    # An output that follows the speed is idle in a pause; restored, it follows the speed again.
     for pin, following in {each.pin: each for each in goal.proportional_outputs}.items():
         outputs.setdefault(
             (OutputKind.STANDARD_ANALOG, pin),

@@ -60,7 +60,7 @@ class Stops:
         return frozenset(stop.waypoint for stop in self._stops)
 
     def delayed(self, times: Floats) -> Floats:
-        """Return when points (n,) are reached [s] if their times count the motion only."""
+        """Return when points (n,) are reached [s], stops included, from their times without."""
         rests = np.zeros(len(times))
         for each in self._stops:
             if isinstance(each.stop, Wait) and each.waypoint + 1 < len(rests):
@@ -148,7 +148,7 @@ def _still_spline(stop: Stop, before: Primitive, joints: Floats) -> Spline:
 
 
 def _resting_path(path: ReferencePath, points: Any, durations: Floats) -> ReferencePath:
-    """Return a path with a second row, later by the rest, at each point where the arm rests."""
+    """Return a path with a second row for each point where the arm rests: the end of the rest."""
     points, durations = points[durations > 0.0], durations[durations > 0.0]
     at = np.searchsorted(path.point, points, side='right')
     columns = {

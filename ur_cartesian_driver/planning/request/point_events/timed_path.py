@@ -38,17 +38,20 @@ _MIN_MOTION = 1e-7
 _TURNING = 0.01
 # The tool turns back if its displacement is less than this fraction of the distance travelled.
 _TURNS_BACK = 0.1
-# If the tool is beyond the trigger pose by more than this [m], [rad] when the record is read, the
+# If the tool is past the trigger pose by more than this [m], [rad] when the record is read, the
 # tool must come back to that pose before the output is switched.
 _BEYOND = 1e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlacedOutput:
-    """One output: its time [s], the segment that it follows, and the segment that reports it."""
+    """The records of one output, with their place in the plan."""
 
+    #: When the output is switched [s].
     time: float
+    #: The row of the segment after which the records are sent.
     after_index: int
+    #: The row of the segment whose report line names the output.
     report_index: int
     records: tuple[OutputRecord, ...]
     text: str
@@ -58,11 +61,13 @@ class PlacedOutput:
 class PassedPoint:
     """How the tool passes a point of the goal, or stops there."""
 
-    #: The row of the motion that leads there, and the row after which an output there is read.
+    #: The row of the motion that leads to the point.
     row: int
+    #: The row of the motion after which the record of an output at the point is read.
     after: int
-    #: When the point is reached [s], and when an output there is triggered; None = it stops.
+    #: When the point is reached [s].
     time: float
+    #: When an output at the point is triggered [s]; None = as soon as its record is read.
     trigger_time: float | None
     #: A clause for the report.
     where: str
@@ -82,12 +87,12 @@ class TimedPath:
         """
         Compute when each motion ends, and when it returns.
 
-        :param reference: the path of the TCP, with the times of the segments.
+        :param reference: the path of the TCP along the segments, on the clock of ``start_time``.
         :param blend_halves: the time in the first half of the blend after each segment [s]; None =
             no blends.
         :param start_time: when the first segment begins [s].
         :param point_times: when points are passed within a motion (n,) [s]; None = each point is
-            at the end of one.
+            at the end of a motion.
         """
         self._point_times = point_times
         self._primitives, self._reference = segments.primitives, reference
@@ -153,7 +158,7 @@ class TimedPath:
         )
 
     def last_returned(self, time: float) -> int:
-        """Return the index of the last motion that has returned by a time [s]."""
+        """Return the index of the last motion that has returned by a time [s]; -1 = none."""
         return int(np.searchsorted(self._returns, time + SAME_TIME, side='right')) - 1
 
     def _passes(self, k: int) -> bool:
@@ -168,7 +173,7 @@ class TimedPath:
         return 'while passing it' if self._passes(k) else 'after stopping there'
 
     def _at_end(self, k: int) -> float | None:
-        """Return the time when the tool is closest to a motion's end [s], None if it stops."""
+        """Return when the tool is closest to a motion's target [s]; None if it stops there."""
         if not self._passes(k):
             return None
         end, half = float(self.ends[k]), float(self._blend_halves[k])
@@ -178,7 +183,7 @@ class TimedPath:
         return self._nearest(np.array(target.position), end - half, end + half, end)
 
     def _nearest(self, position: Floats, begin: float, end: float, middle: float) -> float:
-        """Return when in a period the path is nearest a position; ``middle`` if the tool rests."""
+        """Return the time in a period when the tool is nearest a position; ``middle`` at rest."""
         times, rows = self._reference.time, self._reference.poses
         own = slice(
             max(int(np.searchsorted(times, begin, side='right')) - 1, 0),

@@ -31,9 +31,11 @@ class ContactBody:
     """
     A body that is fixed in the robot's base.
 
-    :param shape: 'plane' = the space behind a plane; 'box' = a box along the axes of the base.
+    :param shape: 'plane' = the half-space on the side of a plane away from its normal; 'box' = a
+        box along the axes of the base.
     :param place: a point on the plane, or the centre of the box [m].
-    :param extent: the normal of the plane, away from the body; or the edge lengths of the box [m].
+    :param extent: the normal of the plane, which points out of the body; or the edge lengths of
+        the box [m].
     :param stiffness: force per depth [N/m].
     :param damping: force per speed along the normal [N s/m].
     :param friction: force along the surface per force along the normal.

@@ -3,11 +3,12 @@
 """
 The compliance of an arm, in contact with bodies and in force mode.
 
-The laws of the robot are not published; these simple ones are ours. Along axes that are not
+The robot's laws are not published; the following simple laws are ours. Along axes that are not
 compliant, the arm is a spring between its target and the tool. In force mode the tool moves along
-each compliant axis at a speed proportional to the missing force, up to the axis's limit. The
-controller adds this motion to the target of the program. When force mode has ended and the arm
-stands still, the program continues from the displaced target.
+each compliant axis at a speed proportional to the missing force (the difference between the wanted
+force and the force that the tool applies), up to the axis's limit. The controller adds this motion
+to the target of the program. When force mode has ended and the arm stands still, the program
+continues from the displaced target.
 """
 
 from __future__ import annotations
@@ -101,9 +102,11 @@ class ContactMotion:
         #: The reason why the arm has to stop; None = no reason.
         self.fault: MotionFault | None = None
         self._zero: Vector6 = ZERO6
-        #: Displacement by force mode; rate of this displacement; bend of the arm; in base axes.
+        #: Displacement by force mode, in base axes.
         self._yielded: Vector6 = ZERO6
+        #: Rate of this displacement.
         self._yield_rate: Vector6 = ZERO6
+        #: Bend of the arm, in base axes.
         self._bent: Vector6 = ZERO6
         self._cycles_in_contact = 0
 
@@ -187,7 +190,7 @@ class ContactMotion:
         yielded, bent = turned(to_task, self._yielded), turned(to_task, self._bent)
         applied = turned(to_task, self.measured)
         # A bend along a compliant axis at the start of force mode remains as a displacement.
-        # Along the other axes, a displacement (left from before the frame has turned) decays.
+        # Along the other axes, a displacement (left over from an earlier task frame) decays.
         kept = 1.0 - self._share
         yielded = vector6(
             y + b if free else kept * y
@@ -217,7 +220,7 @@ class ContactMotion:
         self._yielded, self._bent = turned(to_base, yielded), turned(to_base, self._bent)
 
     def _yielding_target(self, rate: float) -> ArmState | None:
-        """Return the target displaced by force mode, or the previous one if out of reach."""
+        """Return the target displaced by force mode; if out of reach, the previous one."""
         motion, before = self._motion, self.target
         target, (x, y, z, *turn) = motion.T_base_tcp, self._yielded
         pose = Pose(

@@ -22,10 +22,11 @@ from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import (
 )
 from ur_cartesian_driver.sim.motion.paths.move_paths import JointMovePath, MovePath, Setpoint
 
-# The remainder of a path is solved in this many steps; or in shorter steps, down to this fraction
-# of the remainder; so that no step turns a joint by more than this angle [rad].
+# The remainder of a path is solved in at least this many steps.
 _WALK_STEPS = 8
+# If even a step of this fraction of the remainder fails, the joints would have to jump.
 _MIN_WALK_STEP = 1e-4
+# Steps are shortened until no step turns a joint by more than this angle [rad].
 _MAX_JOINT_STEP = 0.3
 # A step that changes the branch is halved until it is about this long [m, rad].
 _FINE = 1e-5
@@ -41,7 +42,7 @@ class IkBranchTracker:
     T_tcp_flange: Pose
 
     def joints(self, setpoint: Setpoint) -> Vector6 | None:
-        """Return the joints at a set-point that are nearest to the present; None = no solution."""
+        """Return the joints at a set-point, nearest to the present joints; None = no solution."""
         return self._nearest(setpoint, self.q)
 
     def after(

@@ -38,7 +38,8 @@ MAX_JOINT_JERK = 400.0
 MAX_TOOL_SPEED = 5.0
 #: Deceleration of a joint before the end of its range [rad/s^2].
 LIMIT_DECELERATION = 10.0
-#: Joint travel per tool travel [rad/m, rad/rad] above which the arm is considered singular.
+#: Joint travel per tool travel [rad/m, rad/rad] above which the arm is considered to be at a
+#: singularity.
 SINGULAR_RATE = 1000.0
 
 #: The speed of an arm at rest.
@@ -68,7 +69,7 @@ class JointKinematics:
         self._lengths = nominal.a[1], nominal.a[2], nominal.d[4]
 
     def joints(self, T_base_flange: Pose, q_near: Vector6) -> Vector6 | None:
-        """Return the solution within the limits that is nearest to ``q_near``, or None."""
+        """Return the solution within the limits nearest to ``q_near``; None = no solution."""
         if not max(map(abs, T_base_flange.position)) < _MAX_DISTANCE:
             return None  # absurd speeds lead to such positions, whose squares overflow
         return nearest(self._arm, T_base_flange, q_near)
@@ -122,12 +123,12 @@ class JointKinematics:
 
     def kept_rows(self, q: Floats, on_branch: bool) -> Flags:
         """
-        Return whether the arm can make each step between two rows in one cycle (n,).
+        Return for each step from row to row whether the arm can make it in one cycle (n,).
 
-        This is :meth:`overspeed_factor` for many steps.
+        The joint limits are those of :meth:`overspeed_factor`.
 
         :param q: joint positions (n + 1, 6) [rad]; the first row is the arm's present position.
-        :param on_branch: whether the steps must keep the branch, too.
+        :param on_branch: whether a step must also stay on the IK branch.
         """
         travel, q_before = np.abs(np.diff(q, axis=0)), q[:-1]
         low, high = np.array(self._limits).T

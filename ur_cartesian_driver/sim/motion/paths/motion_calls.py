@@ -41,7 +41,7 @@ class MotionCall(NamedTuple):
 
 
 def constant_speed_parameters(a: float, v: float, r: float) -> ProfileParameters:
-    """Return the parameters of movep; it can brake at b within the blend radius: v^2 = 2 b r."""
+    """Return the parameters of movep; its deceleration b stops within the radius: v^2 <= 2 b r."""
     braking = max(a, v * v / (2.0 * r)) if r > 0.0 else None
     return ProfileParameters(acceleration=a, speed=v, braking=braking)
 

@@ -4,7 +4,8 @@
 The geometry of motion: the set-point at a path parameter, without time.
 
 The parameter of a move path runs from 0 to its ``length``: for joint lines in radians of the
-leading axis, for lines and arcs of the tool in metres (or by the rotation if that takes longer).
+leading axis, for lines and arcs of the tool in metres (or in scaled radians if the rotation takes
+longer).
 The parameter of a blend path runs from 0 to 1; such a path replaces the end of one move path and
 the beginning of the next. A set-point is six joint positions or a pose of the TCP in the base.
 Rows of set-points are (n, 6), or (n, 7) with x y z [m] and the unit quaternion x y z w.
@@ -373,7 +374,7 @@ def start_within_radius(move_path: MovePath, radius: float) -> float | None:
 
 
 def end_within_radius(move_path: MovePath, radius: float) -> float | None:
-    """Return the length that remains when the tool is ``radius`` [m] from the end, or None."""
+    """Return the length left when the tool is ``radius`` [m] from the end; None = never."""
     if isinstance(move_path, LinearMovePath):
         return start_within_radius(move_path, radius)
     return _exit_parameter(
@@ -382,7 +383,7 @@ def end_within_radius(move_path: MovePath, radius: float) -> float | None:
 
 
 def _exit_parameter(pose: Callable[[float], Pose], radius: float, length: float) -> float | None:
-    """Return the first parameter at which ``pose`` is ``radius`` [m] from ``pose(0)``, or None."""
+    """Return the first parameter at which ``pose`` leaves the ``radius`` [m]; None = never."""
     origin = pose(0.0).position
     low, f_low = 0.0, -radius
     for i in range(1, _SAMPLES + 1):

@@ -37,7 +37,8 @@ from ur_cartesian_driver.sim.motion.paths.move_paths import (
 _ROUNDING = 1e-9
 # Speeds and lengths below this are treated as zero, in the units of any path.
 _MIN_SPEED = 1e-9
-# To end in time, a timed move after a blend runs at most this many times faster than on average.
+# To end in time, the part of a timed move after a blend is driven at most this many times faster
+# than the whole move would be on average.
 _MAX_CATCH_UP = 2.0
 
 
@@ -46,8 +47,8 @@ class ProfileParameters:
     """
     Acceleration and speed along a path, in its unit (rad or m) per s^2 and per s.
 
-    :param time: time of the move [s]; 0 = none. With a time, acceleration and speed only determine
-        the fraction of the time for the ramps.
+    :param time: time of the move [s]; 0 = no time is given. With a time, acceleration and speed
+        only determine the fraction of the time for the ramps.
     :param jerk: bound on the jerk, for an S-curve; None = trapezoid.
     :param braking: deceleration at the end, if it differs from the acceleration.
     """
@@ -204,8 +205,8 @@ def append_move_path(
 
     The blend begins at the blend radius, or at the arm's position if the call comes late, and ends
     at the same distance after the waypoint. If the arm already stands still, or the new path does
-    not leave the blend radius, there is no blend and the arm stops at the waypoint. (In a blend,
-    both moves would have one speed, so a short move would be driven at the speed of the other.)
+    not leave the blend radius, there is no blend and the arm stops at the waypoint. (In a blend
+    both moves have one common speed, so a short new move would run at the speed of the last move.)
     """
     last, last_move = path_motion.sections[-1], path_motion.last_move
     ahead = path_motion.sections[path_motion.index : -1]
@@ -299,7 +300,7 @@ def _blend_profiles(
     if before.time > 0.0:
         strongest = max(strongest, acceleration * length / whole)
     if after.time > 0.0:
-        # At an even speed, except for the braking at the end.
+        # The speed is even, except for the braking at the end.
         cruise = (whole + head) / (time * (1.0 - 0.5 * after.ramp_part(whole)))
     else:
         stoppable = sqrt(2.0 * (after.braking or acceleration) * rest)

@@ -62,7 +62,7 @@ class PathQueue:
         self._waiting = self._overlap = None
 
     def end_of_frame(self) -> None:
-        """Keep an overlapping waypoint and drop the spare time: no move has followed at once."""
+        """Keep an overlapping waypoint and drop the spare time, because no move has followed."""
         self._overlap, self._spare = None, 0.0
 
     def begin(self, call: MotionCall) -> None:
@@ -78,7 +78,7 @@ class PathQueue:
             if self._target.tcp_is_active:
                 self._begin_in_blend(motion, call)
             else:
-                # A blend joins two moves of the same TCP: first finish the running move.
+                # A blend can only join moves with the same TCP: first finish the running move.
                 self._wait(call)
         elif motion is None:
             self._begin_from_rest(call)
