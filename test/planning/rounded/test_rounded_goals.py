@@ -160,6 +160,27 @@ def test_outputs_are_placed_at_the_time_of_their_point(cell):
     assert records[3].trigger_pose is None
 
 
+def test_points_within_a_piece_have_a_line_and_a_kind_each(cell):
+    goal = Goal(
+        waypoints=tuple(cell.point(1e-4 * k, 2e-5 * (k % 3)) for k in range(1, 200)),
+        corner_deviation=5e-5,
+        io_commands=(
+            IOCommand(
+                waypoint=77, offset=0.0, output=OutputKind.STANDARD_DIGITAL, pin=1, value=1.0
+            ),
+        ),
+    )
+    found = plan(goal, cell.state, cell.arm, OPTIONS)
+    assert len(found.segments) < 100
+    assert found.rows.kinds == dict.fromkeys(range(199), 'Spline')
+    lines = [line for line in found.report if line.startswith('point ')]
+    assert all(any(f'point {k}: rounded' in line for line in lines) for k in range(199))
+    assert not any('\n' in line for line in found.report)
+    assert any('digital output 1 on while passing point 77' in line for line in found.report)
+    (record,) = [record for row in found.segments for record in row.outputs]
+    assert record.trigger_pose.distance_to(goal.waypoints[77].pose) < 5e-5
+
+
 def test_points_that_repeat_are_passed_once(cell):
     goal = square(cell, corner_deviation=1e-3)
     twice = tuple(point for point in goal.waypoints for _ in range(2))

@@ -199,12 +199,18 @@ class PlannedRows(Rows[PlannedSegment]):
 
     @property
     def kinds(self) -> dict[int, str]:
-        """The name of the class of the motion to each point, by the index of the point."""
-        return {
-            waypoint: type(primitive).__name__
-            for waypoint, primitive in zip(self.waypoints.tolist(), self.primitives, strict=True)
-            if not isinstance(primitive, Stop)
-        }
+        """
+        The name of the class of the motion to each point, by the index of the point.
+
+        A point that is passed within a motion has the class of that motion.
+        """
+        found: dict[int, str] = {}
+        passed = 0
+        for waypoint, primitive in zip(self.waypoints.tolist(), self.primitives, strict=True):
+            if not isinstance(primitive, Stop):
+                found |= dict.fromkeys(range(passed, waypoint + 1), type(primitive).__name__)
+                passed = waypoint
+        return found
 
     def __len__(self) -> int:
         return len(self.waypoints)
@@ -271,7 +277,12 @@ class Plan:
     def report(self) -> tuple[str, ...]:
         """One line for each segment, the remarks, and one line for each slow stretch."""
         rows = self.rows
-        lines = (line + rows.notes.get(i, '') for i, line in enumerate(rows.report_lines))
+        # A piece that passes several points has a line for each.
+        lines = (
+            line
+            for i, lines in enumerate(rows.report_lines)
+            for line in (lines + rows.notes.get(i, '')).split('\n')
+        )
         slow = (stretch.line for stretch in self.find_slow_stretches())
         return (*filter(None, lines), *self.remarks, *slow)
 

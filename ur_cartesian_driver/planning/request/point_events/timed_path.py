@@ -117,7 +117,7 @@ class TimedPath:
         """Return how the tool passes a point; None if no motion leads there."""
         row = self._rows.get(waypoint)
         if self._point_times is not None and (row is None or self._passes(row)):
-            return self._within(float(self._point_times[waypoint]))
+            return self._within(waypoint, float(self._point_times[waypoint]))
         if row is None:
             return None
         return PassedPoint(
@@ -128,15 +128,15 @@ class TimedPath:
             where=self._where(row),
         )
 
-    def _within(self, time: float) -> PassedPoint:
-        """Return how the tool passes a point within a motion at a time [s]."""
+    def _within(self, waypoint: int, time: float) -> PassedPoint:
+        """Return how the tool passes a point at a time [s] within a motion."""
         after = self.last_returned(time)
         return PassedPoint(
             row=min(int(np.searchsorted(self.ends, time)), len(self.ends) - 1),
             after=max(after, 0),
             time=time,
             trigger_time=None if after < 0 else time,
-            where='while passing it',
+            where=f'while passing point {waypoint}',
         )
 
     def triggered(self, record: SwitchOutput, time: float | None, after: int) -> SwitchOutput:
