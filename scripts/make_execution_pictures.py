@@ -231,6 +231,72 @@ def draw_path_offset() -> Path:
     return drawing
 
 
+#: The ways past a corner that are compared: label, colour, and what the path asks for.
+CORNERS = (
+    ('blends of lines, 1.3 mm', '#1f77b4', {'blend': 1.3e-3}),
+    ('blends of PROCESS, 1.3 mm', '#9aa5b1', {'blend': 1.3e-3, 'motion': 'process'}),
+    ('rounded corners, 0.5 mm', '#c8372d', {'corner_deviation': 5e-4}),
+)
+#: The zigzag: directions and length of its segments [m], speed [m/s] and acceleration [m/s^2].
+ZIGZAG = ((0, 1), (1, 0), (0, 1), (1, 0), (0, 1))
+SIDE, SPEED, ACCELERATION = 0.02, 0.1, 1.0
+#: A cycle of an e-Series [s].
+SHORT_CYCLE = 0.002
+
+
+async def a_zigzag(cell: Any, options: dict[str, Any]) -> list[tuple[float, ...]]:
+    """Follow a zigzag; return the places of the tool from its start [m], one for each cycle."""
+    import example_goals
+
+    from ur_cartesian_driver.kinematics.chain import Arm
+    from ur_cartesian_driver.kinematics.robot_models import robot_model
+    from ur_cartesian_driver.path import Path as ToolPath
+    from ur_cartesian_driver.planning import plan
+
+    state = cell.memory.read()
+    start = state.actual_tcp_pose
+    path = ToolPath(start).at(speed=SPEED, acceleration=ACCELERATION)
+    for x, y in ZIGZAG:
+        path = path.by(SIDE * x, SIDE * y, **options)
+    arm = Arm(robot_model(cell.robot.config.model))
+    motion = cell.owner.start(plan(path.goal(), state, arm, example_goals.OPTIONS))
+    rows = []
+    while motion.outcome is None:
+        place = cell.robot.controller.motion.T_base_tcp.position
+        rows.append(tuple(a - b for a, b in zip(place, start.position, strict=True)))
+        await cell.sleep(SHORT_CYCLE)
+    assert motion.outcome.succeeded, motion.outcome
+    return rows
+
+
+def draw_rounded_corners() -> Path:
+    """Draw a zigzag with blends and with rounded corners; return the file of the picture."""
+    from matplotlib import pyplot
+    import numpy as np
+    from robot_cell import run_cell
+
+    drawing = CHECKOUT / 'doc' / 'rounded_corners.png'
+    figure, (near, speeds) = pyplot.subplots(1, 2, width_ratios=(1, 2.2), figsize=(10.0, 3.4))
+    near.plot([0.0, 0.0, 4.0], [16.0, 20.0, 20.0], color='#dddddd', linewidth=5)
+    for label, colour, options in CORNERS:
+        happens = partial(a_zigzag, options=options)
+        places = 1e3 * np.array(run_cell(happens, robot={'frequency': 1.0 / SHORT_CYCLE}))
+        steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+        near.plot(places[:, 0], places[:, 1], color=colour, marker='.', markersize=4)
+        speeds.plot(np.cumsum(steps), steps / SHORT_CYCLE, color=colour, label=label)
+    near.set(xlim=(-0.4, 2.4), ylim=(17.9, 20.3), aspect='equal')
+    near.set(xlabel='x [mm]', ylabel='y [mm]', title='the first corner, a dot every 2 ms')
+    speeds.set(ylim=(0.0, 115.0), xlabel='way of the tool [mm]', ylabel='speed [mm/s]')
+    speeds.set_title('a zigzag of four corners: 100 mm/s and 1 m/s² asked')
+    for axes in (near, speeds):
+        axes.grid(alpha=0.3)
+    figure.legend(*speeds.get_legend_handles_labels(), loc='lower center', ncols=3, frameon=False)
+    figure.tight_layout(rect=(0.0, 0.07, 1.0, 1.0))
+    figure.savefig(drawing, dpi=90)
+    compress(drawing)
+    return drawing
+
+
 PICTURES = {
     'primitives': Picture(
         title='Lines, an arc and blends (PRIMITIVES); the speed slider at 50 % for a while',
@@ -320,7 +386,11 @@ def compress(drawing: Path) -> None:
 
 
 if __name__ == '__main__':
-    others = {'press': draw_press, 'path_offset': draw_path_offset}
+    others = {
+        'press': draw_press,
+        'path_offset': draw_path_offset,
+        'rounded_corners': draw_rounded_corners,
+    }
     for wanted in sys.argv[1:] or (*PICTURES, *others):
         path = others[wanted]() if wanted in others else draw(wanted)
         sys.stdout.write(f'{path}: {path.stat().st_size / 1000:.0f} kB\n')
