@@ -3,7 +3,8 @@
 """
 The page on rounded corners: its examples are one goal, and its speeds are those of the planner.
 
-``python test/planning/rounded/test_rounded_page.py`` prints the table of speeds.
+``PYTHONPATH=test/support python test/planning/rounded/test_rounded_page.py`` prints the table of
+speeds.
 """
 
 from math import cbrt, cos, radians, sin, sqrt, tan
