@@ -143,7 +143,7 @@ class Progress:
     actual_q: Vector6 = ZERO6
     #: Measured joint velocities [rad/s].
     actual_qd: Vector6 = ZERO6
-    #: Expected time of the desired pose, from the start of the motion [s].
+    #: Planned time of the desired pose, from the start of the motion [s].
     time: float = 0.0
     #: Planned time that is left, at full speed scaling [s].
     time_remaining: float = 0.0

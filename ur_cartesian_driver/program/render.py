@@ -71,7 +71,7 @@ SERVO_MAX_REPEATS = 500
 #: guide.
 SERVO_MAX_STEPS = 50
 
-#: The first version with a feature that no version is known to have.
+#: Stands for the first version with a feature if no version is known to have it; above any.
 _NO_VERSION = (1000, 0, 0)
 #: For each feature, the first version of CB3/e-Series and of PolyScope X software that has it.
 FEATURES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
@@ -87,11 +87,13 @@ SPLINE_CONSTANTS: dict[str, float] = {
     #: Bounds [rad/s^2] on the acceleration for speedj, whatever the braking time.
     'MIN_BRAKING': 1.0,
     'MAX_ACCELERATION': 40.0,
-    #: If a call of speedj has taken at least this many steps, the arm has coasted into a pause.
+    #: If a call of speedj has taken at least this many steps, the program was paused meanwhile,
+    #: and the arm went on for a while.
     'COASTED': 2.0,
     #: If the speed slider shortens a step, speedj is called for this fraction of the short step.
     'SHORT_CALL': 0.9,
-    #: If the arm reaches more than this fraction of the planned speed, it moves at full speed.
+    #: If the arm reaches more than this fraction of the planned speed, the speed slider is assumed
+    #: not to shorten the next step.
     'FULL_SPEED': 0.999,
     #: Smallest fraction of a step that is planned, even if the arm nearly stands still.
     'MIN_FRACTION': 0.01,
@@ -105,8 +107,8 @@ SPLINE_CONSTANTS: dict[str, float] = {
     'MAX_SPEED': 20.0,
     #: Largest distance [rad] from the arm to a first point at time 0, as in the client library.
     'START_TOLERANCE': 0.01,
-    #: If a spline ends farther than this [rad] from its last point, or moves on by more than this
-    #: in a step, a movej covers what remains.
+    #: If, at the end of a spline, the arm is farther than this [rad] from the last point, or still
+    #: moves by more than this in a step, a movej covers what remains.
     'END_TOLERANCE': 1e-05,
     #: Acceleration [rad/s^2] and speed [rad/s] of that movej.
     'END_ACCELERATION': 15.0,
@@ -143,7 +145,7 @@ OFFSET_CONSTANTS: dict[str, float] = {
     'BRAKING': BRAKING_FRACTION,
     #: Distance [m] from its target within which an offset has arrived, as in the driver.
     'TOLERANCE': ARRIVAL_TOLERANCE,
-    #: Largest change [1/s] of the rate of the offset's time, which follows the motion's rate.
+    #: The offset's time runs at a rate that follows the motion's: largest change [1/s].
     'RATE_CHANGE': 10.0,
     #: A step of the offset's time that is not longer than this [s] does not move the offset.
     'MIN_TIME': 1e-6,

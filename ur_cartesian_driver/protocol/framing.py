@@ -29,7 +29,7 @@ INT32_MAX = 2**31 - 1
 T = TypeVar('T')
 E = TypeVar('E', bound=IntEnum)
 
-#: Most bytes of a stream that an error text quotes.
+#: Largest number of bytes that an error text quotes.
 _MAX_QUOTED = 48
 
 

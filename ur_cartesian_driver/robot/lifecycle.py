@@ -7,7 +7,7 @@ The connection to the robot as a table of states and events.
 * **CONNECTING**: RTDE answers; the robot has not reported its configuration (primary interface).
 * **CONNECTED**: the robot reports its state and is the configured model, but accepts no goal: the
   robot program is not connected, has ended or is paused (it would run the goal at some later
-  time), the states are too old, or the TCP of the last goal has to be restored.
+  time), the states are too old, or the TCP from before the last goal is not restored yet.
 * **READY**: the robot program is connected and accepts goals.
 * **EXECUTING**: a goal runs; it may be paused and resumed.
 * **STOPPED**: the safety system keeps the arm from moving. Nothing starts by itself from here;

@@ -166,7 +166,7 @@ class GoalMachine:
         signal, text = self._interpret(event, now)
         if signal is not None:
             commands += self._apply(signal, text, now)
-        # No progress report delays a CANCEL; the next packet brings the report.
+        # The progress report waits for the next packet if it would delay a CANCEL.
         sends_cancel = signal is not None and self.state is GoalState.CANCELLING
         if isinstance(event, events.StateReceived) and not sends_cancel:
             commands += self._after_packet(event, now)
@@ -250,7 +250,7 @@ class GoalMachine:
         raise TypeError(f'unknown event {event!r}')
 
     def _check_age(self, now: float) -> Meaning | None:
-        """Return the signal for an arm that has moved unseen for too long, or None."""
+        """Return the signal if the newest state is too old to monitor the goal, else None."""
         assert self._packet_time is not None
         age = now - self._packet_time
         if age <= self._max_state_age or self.state not in MONITORED_STATES:
@@ -258,7 +258,7 @@ class GoalMachine:
         return GoalSignal.STALE, explain_age(age, self._max_state_age).rstrip('.')
 
     def _check_outputs(self) -> Meaning | None:
-        """Return the signal for outputs that a pause has changed for good, or None."""
+        """Return the signal if a pause changed outputs that may not be restored, else None."""
         fault = self._guard.fault()
         if not fault or self.state not in INTERRUPTIBLE_STATES:
             return None
@@ -353,7 +353,8 @@ class GoalMachine:
                 self._code, self._text = transition.code, text
         if self.state is before:
             return []
-        # A program that leaves the motion's mode while its safe outputs are armed would set them.
+        # Leaving the motion's mode while the safe outputs are armed makes the program set them.
+        # After a success it must not, so they are disarmed first.
         disarms_first = self.state is GoalState.RESTORING and self._succeeds() and self._guard
         commands = [] if disarms_first else self.feeder.enter(self.state, self._packet)
         return commands + self._enter(self.state, signal, now)

@@ -68,7 +68,7 @@ class LiveTargets(Steerable, Ageing, Reporting):
         self.generator.set_target(T_base_tcp)
 
     def age(self, now: float) -> list[GoalCommand]:
-        """Drop a target that is too old; end the session after its timeout; warn of a stop."""
+        """Drop a target that is too old, end the session after its timeout, warn of a limit."""
         generator = self.generator
         warnings: list[GoalCommand] = []
         if generator.blocked and not self._was_blocked:

@@ -3,9 +3,9 @@
 """
 Keep an arm that follows live targets away from workspace planes and from itself.
 
-A check takes longer than a control cycle, but is needed only near a bound: no part of the arm
-moves farther than the sum of the joints' turns times the largest distance of any part from an
-axis. So each check also gives how far the joints may turn before the next check.
+A check takes longer than a control cycle, so it is left out while no part of the arm can reach a
+bound. A part moves at most by the sum of the joints' turns, times the largest distance of any part
+from an axis. So each check also gives how far the joints may turn before the next one.
 """
 
 from __future__ import annotations

@@ -37,7 +37,8 @@ _REMEDY = (
     'name them qx, qy, qz, qw, or rx, ry, rz [rad], or roll, pitch, yaw [deg], or give the option '
     'orientation'
 )
-#: Units of columns without a unit in the file; a length or a speed must have one there.
+#: Default units of columns for which the file gives none. A length may take its unit from the
+#: option; a speed must have one in the file.
 _DEFAULT_UNITS = {Quantity.TIME: 's', Quantity.PURE: '-'}
 
 

@@ -60,9 +60,9 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     OPTIMIZED_TYPES,
 )
 
-#: Length of a segment [m] for which there is one sample.
+#: Length between two samples of a segment [m].
 _SAMPLE_LENGTH = 0.02
-#: Tilt of the axis [rad] for which there is one sample, if the tilts need more than the lengths.
+#: Tilt of the axis between two samples [rad], where it needs more samples than the length.
 _SAMPLE_TILT = pi / 18.0
 #: Greatest number of samples of a segment (at density 1).
 _MAX_SAMPLES = 32
@@ -74,8 +74,8 @@ _KNOT_TILT = pi / 36.0
 _LENGTH_PER_RADIAN = 0.05
 #: Greatest number of searches; each avoids the collisions found by the earlier ones.
 _MAX_SEARCHES = 8
-#: Costs of a small clearance: a rotation whose clearance exceeds the required one by less than a
-#: key [m] costs that key's value; the costs of all such keys are added.
+#: Costs of a small clearance: a rotation costs a key's value if its clearance is below the
+#: required one plus the key [m]; the costs of all keys for which this holds are added.
 _NEARNESS = {0.0: 1000.0, 0.003: 100.0, 0.01: 20.0}
 #: Number of smoothing passes.
 _SMOOTHING_PASSES = 40
@@ -203,7 +203,8 @@ class _FreePath:
         segments = goal.segments
         free = segments.free_axes != FreeAxis.NONE
         first = int(np.argmax(free))
-        #: Whether the controlled frame is or becomes the TCP; other frames cannot turn on a line.
+        #: Whether the controlled frame is or becomes the TCP; any other frame would leave its
+        #: straight line if the tool turned.
         self.can_turn = options.allow_tcp_change or (
             T_tcp_controlled.distance_to(IDENTITY) <= SAME_TCP
             and T_tcp_controlled.angle_to(IDENTITY) <= SAME_TCP
@@ -232,7 +233,7 @@ class _FreePath:
             self.is_any[0] = self.is_open[0] = False
 
     def _with_arc_ends(self, poses: Floats) -> Floats:
-        """Return the poses, with the poses in which FIXED arcs arrive at their ends."""
+        """Return the poses, at ends of FIXED arcs as the arcs arrive there; keep the arcs."""
         self.arcs: dict[int, ArcCurve] = {}
         segments = self.goal.segments
         for row in np.flatnonzero(segments.types == SegmentType.CIRCULAR).tolist():
@@ -326,7 +327,7 @@ class _FreePath:
 
     def _layers(self, ends: Indices, whole: Floats, tilts: Floats) -> list[Layer]:
         postures = self.goal.waypoints.postures
-        # Where the rotation is not free, the change that the goal commands must be possible.
+        # Where the rotation is not free, the change that the goal prescribes must be allowed.
         commanded = np.abs(np.diff(self.rotations, prepend=0.0))
         bound = ~self.is_any | np.append(False, ~self.is_any[:-1])
         tilted = tilts * self.sizes  # the axis deviates by tilt x turn / 8
@@ -334,7 +335,7 @@ class _FreePath:
         begin = first = 0
         for number, (end, row) in enumerate(zip(ends.tolist(), self.knots.tolist(), strict=True)):
             change = inf
-            if first:  # the axis may deviate on the way to the first layer
+            if first:  # 0 = the first layer: the axis may deviate on the way there
                 share = float(tilted[first : row + 1].max()) / whole[number]
                 change = 8.0 * MAX_AXIS_DEVIATION / max(share, 1e-9)
             change = min(change, (end - begin) * _MAX_CHANGE_PER_SAMPLE / self.density)

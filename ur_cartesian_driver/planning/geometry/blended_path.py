@@ -59,10 +59,10 @@ class CurveSequence(Protocol):
         """
 
     def extent(self, number: int) -> tuple[float, float]:
-        """Return length [m] and turn [rad] of a curve: of the leading joint on a joint line."""
+        """Return length [m] and turn [rad] of a curve (on a joint line, the leading joint's)."""
 
     def locate(self, number: Indices, t: Floats) -> tuple[Indices, Floats]:
-        """Return the segment (n,) of each place on curves, and the fraction (n,) before it."""
+        """Return the segments (n,) of places on curves, and the fractions (n,) of them before."""
 
 
 class CurveRows:

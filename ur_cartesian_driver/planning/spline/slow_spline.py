@@ -3,9 +3,9 @@
 """
 Find the stretches on which a spline is slower than requested.
 
-The requested speed at a point is the mean speed that the times give the segment or, if lower, the
-speed of the point's twist; between points it is interpolated. The actual speeds are computed from
-the joint polynomials.
+At each end of a segment, the requested speed is the segment's mean speed by the goal's times or,
+if lower, the speed of the twist of the point there; within the segment it is interpolated. The
+actual speeds are computed from the joint polynomials.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 _MIN_LENGTH = 1e-6
 #: A tool slower than this [m/s] rests.
 _REST = 1e-9
-#: The path reverses if the dot product of its unit directions before and after is below this.
+#: The path reverses on a slow stretch if the dot product of its unit directions at the two ends
+#: of the stretch is below this.
 _REVERSAL = -0.5
 #: Number of places per sample of the path at which speeds are compared.
 _PER_SAMPLE = 4
@@ -93,7 +94,7 @@ def slow_spline_stretches(
 
 
 def _places(path: SplinePath) -> tuple[Int64s, Floats, Floats]:
-    """Return pieces, fractions of their times, and times [s] of places, each (n,)."""
+    """Return for each place (n,) its piece, the fraction of the piece's time, and its time [s]."""
     rows = np.arange(_PER_SAMPLE * (len(path.u) - 1) + 1) / _PER_SAMPLE
     times = np.interp(rows, np.arange(len(path.u)), path.times)
     piece = path.piece[np.ceil(rows).astype(np.intp)]

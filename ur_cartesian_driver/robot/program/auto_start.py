@@ -52,7 +52,7 @@ class ProgramAutoStart:
     def review(
         self, robot: RobotState, status: ConnectionStatus, *, program_connected: bool
     ) -> None:
-        """Start the program once the robot is known, or log the reason for not doing so."""
+        """Start the program as soon as the robot is accepted, or log why it is not started."""
         if not self._pending or status.state not in (
             ConnectionState.CONNECTED,
             ConnectionState.STOPPED,

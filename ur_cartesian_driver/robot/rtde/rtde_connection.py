@@ -88,7 +88,7 @@ class RtdeConnection:
         return self._version
 
     def write(self, values: Mapping[str, RtdeValue]) -> None:
-        """Write all inputs of the first group, given by name."""
+        """Write the first group of inputs of the codec; ``values`` has each by its name."""
         self._connection.send(self._inputs[0].pack_named(values))
 
     async def ended(self) -> str:
@@ -139,7 +139,7 @@ class RtdeConnection:
             self._answered.set()
 
     def _take_values(self, values: RtdeValues) -> None:
-        self._on_values(self._names, values)  # first, because it may lead to a CANCEL
+        self._on_values(self._names, values)  # first: it may make the driver send a CANCEL
         self._last_packet = asyncio.get_running_loop().time()
 
     def _on_closed(self, reason: str) -> None:

@@ -5,12 +5,13 @@ Interpreter mode: a program executes the statements that clients send, in order.
 
 A statement is compiled and numbered when it arrives, answered with `ack: <number>: <statement>` or
 `discard: <reason>: <statement>`, and executed after the previous statements. While no program is
-in interpreter mode, statements wait without an answer. They also wait after a statement that
-clears or ends the mode, because they could name a variable that is about to be deleted. Commands
-are executed at once, before waiting statements.
+in interpreter mode, statements wait without an answer. They also wait after a statement that calls
+clear_interpreter or end_interpreter until it has taken effect, because they could name a variable
+that is about to be deleted. The interface's own commands (`abort`, `skipbuffer`, `state...`) are
+executed at once, before waiting statements.
 
-Assumed, because it is not documented: while no program runs, statements are discarded, and `abort`
-and `skipbuffer` are acknowledged with the number of the last statement.
+Assumed, because not documented: statements that arrive while no program runs at all are discarded,
+and `abort` and `skipbuffer` are always acknowledged with the number of the last statement.
 """
 
 from __future__ import annotations

@@ -11,9 +11,9 @@ that evaluates more nodes than its budget in one frame ends the program with an 
 The manual guarantees less than this, so two settings make the order of threads less certain. With
 `thread_delay` a new thread begins some frames later. With `interleaving` threads take turns at
 random: in a random order, between any two statements, and before an assignment stores its value in
-a global variable, except in a critical section. If a thread takes time in a critical section, the
-other threads run, even in critical sections of their own. So a thread that is killed in a critical
-section blocks no other thread.
+a global variable, except in a critical section. A critical section is no lock; it only stops these
+switches. If a thread takes time in one, the other threads run and may enter critical sections,
+too, and a thread that is killed in one blocks no other.
 
 The program ends when its main thread ends, and all other threads end with it. When a thread ends
 by itself, the threads that it started continue; when it is killed, they are killed, too.
@@ -227,7 +227,7 @@ class ScriptInterpreter:
         End the program at once; the generators of waiting builtins are closed.
 
         If a builtin calls this, the program ends as soon as the builtin yields or returns, because
-        a thread cannot be unwound from inside.
+        Python cannot close a generator while it runs.
         """
         if self._current is not None:
             self._halted = True
@@ -267,7 +267,7 @@ class ScriptInterpreter:
             self._end(thread)
 
     def _end(self, thread: _Thread) -> None:
-        """End a thread, as the current thread, so that builtins clean up for the right thread."""
+        """End a thread; it is the current one meanwhile, so that builtins clean up for it."""
         thread.alive = False
         previous, self._current = self._current, thread
         try:

@@ -37,8 +37,8 @@ from ur_cartesian_driver.sim.motion.paths.move_paths import (
 _ROUNDING = 1e-9
 # Speeds and lengths below this are treated as zero, in the units of any path.
 _MIN_SPEED = 1e-9
-# To end in time, the part of a timed move after a blend is driven at most this many times faster
-# than the whole move would be on average.
+# After a blend, a timed move may have to catch up. The average speed of its remainder is at most
+# this many times the average speed needed from the entry of the blend to the end.
 _MAX_CATCH_UP = 2.0
 
 
@@ -158,7 +158,7 @@ class PathMotion:
 
     @property
     def next_change(self) -> float:
-        """The time [s] up to which the present section cannot be cut by a blend."""
+        """The time [s] of the next change: the entry of the blend, or the section's end."""
         entry = self.last_move.entry
         in_last = self.index + 1 == len(self.sections)
         if in_last and self.last_move.radius > 0.0 and self.time < entry:
@@ -275,11 +275,12 @@ def _blend_profiles(
     Return the profiles of the blend (0 to 1) and of the remainder of the new path.
 
     The rate u' of the blend changes evenly from its value at the entry to the value for the next
-    cruising speed, within three bounds: u' does not grow so far that one of the two moves exceeds
-    its acceleration (s'' = 2 r u'^2 <= a, so u'^2 <= a / 2r), and the remainder of the new path
-    must be long enough to brake. A trapezoid enters with v <= sqrt(2 a r), which is within the
-    bound of the first move. For a first move with a time, the bound is its acceleration from rest
-    to rest or, if greater, that of the next move in proportion to their lengths.
+    cruising speed. It does not grow beyond three bounds: the acceleration of the first move, that
+    of the next one (each s'' = 2 r u'^2 <= a, with the length r of that path in the blend), and
+    the speed from which the remainder of the new path is long enough to brake. A first move with a
+    trapezoid enters with v <= sqrt(2 a r), so it keeps its bound anyway. If the first move has a
+    time, its a is the acceleration from rest to rest or, if greater, that of the next move times
+    the first length by the next length.
 
     If the next move has a time, the sum of both times is kept: the time that the previous move had
     left until its waypoint is added to the time of the next move.
