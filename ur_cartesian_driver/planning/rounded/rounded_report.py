@@ -92,12 +92,13 @@ class RoundedReport:
         motion, polynomials = self._motion, self._motion.polynomials
         kept = self._kept_length()
         passed = self.corner_deviations()
-        widest = float(passed.max(initial=0.0))
+        widest = float(passed.max(initial=-1.0))
         pieces = len(polynomials.piece)
         total = float(polynomials.times[-1])
         return [
             f'rounded corners: {100.0 * kept:.0f} % of the length at the speed that was asked, '
-            f'within {100.0 * _KEPT:.0f} %; points are passed within {1e3 * widest:.3f} mm',
+            f'within {100.0 * _KEPT:.0f} %'
+            + (f'; points are passed within {1e3 * widest:.3f} mm' if widest >= 0.0 else ''),
             f'joints: {pieces} quintic pieces in {total:.3f} s ({pieces / total:.0f} a second), '
             f'which keep the tool within {1e3 * polynomials.distance:.3f} mm and '
             f'{polynomials.angle:.5f} rad of the rounded path',
@@ -122,10 +123,13 @@ class RoundedReport:
         :param slower_by: a speed is too low if it is more than this fraction below the requested
             one.
         """
+        laws = self._motion.laws
         return tuple(
             stretch
-            for law in self._motion.laws
-            for stretch in _slow_stretches(law, slower_by, first=law is self._motion.laws[0])
+            for law in laws
+            for stretch in _slow_stretches(
+                law, slower_by, begins=law is laws[0], ends=law is laws[-1]
+            )
         )
 
 
@@ -138,7 +142,9 @@ def _speeds(law: SectionLaw) -> tuple[Floats, Floats, Floats]:
     return rate * length, law.asked, step
 
 
-def _slow_stretches(law: SectionLaw, slower_by: float, *, first: bool) -> list[SlowStretch]:
+def _slow_stretches(
+    law: SectionLaw, slower_by: float, *, begins: bool, ends: bool
+) -> list[SlowStretch]:
     speed, asked, _ = _speeds(law)
     slow = (speed < (1.0 - slower_by) * asked) & (np.linalg.norm(law.samples.x1, axis=1) > 1e-3)
     edges = np.flatnonzero(np.diff(slow, prepend=False, append=False))
@@ -146,8 +152,9 @@ def _slow_stretches(law: SectionLaw, slower_by: float, *, first: bool) -> list[S
     found = []
     for begin, stop in edges.reshape(-1, 2).tolist():
         slowest = begin + int(np.argmin(speed[begin:stop] / asked[begin:stop]))
-        point = int(segments[slowest])
-        cause, reason = _cause(law, begin, stop, slowest, point)
+        # The corner of a place is at the nearer end of its segment.
+        point = max(int(segments[slowest]) - bool(fractions[slowest] < 0.5), 0)
+        cause, reason = _cause(law, begin, stop, point, begins=begins, ends=ends)
         found.append(
             SlowStretch(
                 first=int(segments[begin]),
@@ -165,15 +172,17 @@ def _slow_stretches(law: SectionLaw, slower_by: float, *, first: bool) -> list[S
 
 
 def _cause(
-    law: SectionLaw, begin: int, stop: int, slowest: int, point: int
+    law: SectionLaw, begin: int, stop: int, point: int, *, begins: bool, ends: bool
 ) -> tuple[SlowCause, str]:
     directions = law.samples.x1[[max(begin - 1, 0), min(stop, len(law.samples.s) - 1)]]
     if directions[0] @ directions[1] < _REVERSAL * np.prod(np.linalg.norm(directions, axis=1)):
         return SlowCause.REVERSAL, f'the path reverses near point {point}'
-    if begin == 0:
+    if begin == 0 and begins:
         return SlowCause.RAMP, 'the arm starts from rest'
-    if stop == len(law.samples.s):
+    if stop == len(law.samples.s) and ends:
         return SlowCause.RAMP, 'the arm comes to rest'
+    if begin == 0 or stop == len(law.samples.s):
+        return SlowCause.STOP, f'the arm stops at point {point}'
     own = slice(begin, stop)
     lows = {name: float((cap[own]).min()) for name, cap in law.caps.items()}
     name = min(lows, key=lambda each: lows[each])

@@ -13,7 +13,7 @@ one is exceeded, until none is or the greatest number of rounds is reached.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, sqrt
 
 import numpy as np
 
@@ -45,6 +45,8 @@ _DENSITY = 1.0 / 4.0
 _SPACING = 0.002
 #: Shortest averaging window [s]: long enough for the acceleration to be continuous on the wire.
 _MIN_WINDOW = 0.02
+#: The square of the acceleration along the path, as a part of speed times jerk.
+_RAMP_PART = 0.35
 #: Fraction of the acceleration limits at which the law aims, because averaging adds a little.
 _AIM = 0.985
 #: How often limits are tightened; the power of the excess by which they are, a smaller one where
@@ -173,7 +175,13 @@ class SectionLaw:
         after = np.minimum(row + np.isin(self.samples.s, section.ends), len(section.ends) - 1)
         self._limits_at = tool.at(row, after)
         self._tool, self._options, self._model = tool, options, kinematics.arm.model
-        self.window = max(_MIN_WINDOW, 2.0 * float(tool.accelerations.max()) / tool.jerk)
+        # More acceleration along the path needs a longer window for its jerk. A ramp to the speed
+        # v takes v / a + 2 a / j, which is least at a^2 = v j / 2; corners have shorter ramps.
+        self._ramp = min(
+            float(tool.accelerations.max()),
+            sqrt(_RAMP_PART * float(tool.speeds.max()) * tool.jerk),
+        )
+        self.window = max(_MIN_WINDOW, 2.0 * self._ramp / tool.jerk)
         #: By name of a limit: the greatest ds/dt that it allows at each place (m,).
         self.caps = self._caps()
         m = len(self.samples.s)
@@ -238,11 +246,17 @@ class SectionLaw:
         bound = _AIM / self._tightened
         return LawLimits(
             speed=np.minimum.reduce(list(self.caps.values())),
-            first=samples.q1,
-            second=samples.q2,
-            bound=self._options.max_joint_acceleration
-            * bound[:, None]
-            * np.ones(samples.q1.shape),
+            # The acceleration along the path is one more column beside those of the joints.
+            first=np.column_stack([samples.q1, np.linalg.norm(samples.x1, axis=1)]),
+            second=np.column_stack([samples.q2, np.zeros(len(bound))]),
+            bound=np.column_stack(
+                [
+                    self._options.max_joint_acceleration
+                    * bound[:, None]
+                    * np.ones(samples.q1.shape),
+                    self._ramp * bound,
+                ]
+            ),
             vectors=(
                 (samples.x1, samples.x2, tool.accelerations * bound),
                 *[(samples.w1, samples.w2, tool.turn_accelerations * bound)] * samples.turns,
