@@ -3,7 +3,7 @@
 """
 Live sessions and freedrive, as methods of a driver.
 
-Both are motions like those of goals: only one motion runs at a time, each can be cancelled in the
+Both are motions, as goals are: only one motion runs at a time, each can be cancelled in the
 same way, and each has one outcome. But their paths are not planned before they run.
 """
 

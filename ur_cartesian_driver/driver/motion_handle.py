@@ -80,7 +80,7 @@ class MotionHandle:
 
         :param waypoints: the points, with times from the start of the goal, in the goal's frame.
         :param segments: empty, or one for each point.
-        :param io_commands: outputs to switch; their waypoint indices are those of the whole goal.
+        :param io_commands: outputs to switch; their waypoint indices count in the whole goal.
         :param last: whether no more points follow, so that the arm comes to rest at the last one.
             If ``waypoints`` is empty, the arm comes to rest at the planned ending, which for a
             spline is after its last point.

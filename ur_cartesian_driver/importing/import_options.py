@@ -137,7 +137,7 @@ class ImportOptions:
     #: Largest distance [m] of the path from the corners of lines and arcs for which the file has
     #: none; 0 = the arm stops at these corners, or passes them with a blend.
     corner: float = 0.0
-    #: Largest distance of the simplified path from that of the file [m]; 0 = all points are kept.
+    #: Largest distance of the simplified path from the file's [m]; 0 = all points are kept.
     simplify: float = 0.0
     #: Largest distance [m] between a curve that arcs cannot represent and the lines in its place.
     tolerance: float = 5e-5

@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, interpolate_rows
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 
-#: Largest angle [rad] between the orientation at a left-out point and that of the new path there.
+#: Largest angle [rad] between the orientation at a left-out point and the new path's there.
 MAX_TURN = radians(0.5)
 #: Smallest number of lines that an arc replaces.
 _MIN_LINES = 4

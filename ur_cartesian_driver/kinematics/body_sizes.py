@@ -9,7 +9,7 @@ UR10e to UR16e, UR20 and UR30: the shapes in the packages ir-support and ir-supp
 which are made for teaching; the base of their UR16e, which is larger than in the data sheet, and
 the place of its wrist 3 are not used. No package has shapes of UR15, UR18 and UR8 Long, so their
 bodies are assumed: those of a UR20, scaled by the footprints in the data sheets (204 and 245 mm),
-with 10 mm more on each side; the places where links meet are those of the ROS 2 description
+with 10 mm more on each side; the places where links meet are from the ROS 2 description
 package of Universal Robots. Tests check that the bodies contain the meshes of the first two
 packages.
 

@@ -152,7 +152,7 @@ class CollisionMeshes:
                 self._pinocchio.computeCollision(self._geometry, self._placement, index)
                 for index in indices
             )
-            # Pinocchio's lower bound is that of the distance minus the security margin.
+            # Pinocchio's lower bound is for the distance minus the security margin.
             found = (self._placement.collisionResults[index] for index in indices)
             lower_bounds[row] = bound + max(0.0, min(each.distance_lower_bound for each in found))
         return near, lower_bounds

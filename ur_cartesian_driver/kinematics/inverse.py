@@ -147,7 +147,7 @@ def explain_unreachable(arm: Arm, T_base_flange: Pose) -> str:
     """
     Return a clause that says why no solution lies within the limits; empty if one does.
 
-    For a calibrated arm, the lengths in the clause are those of its ideal arm.
+    For a calibrated arm, the clause has the lengths of its ideal arm.
     """
     found = solutions(arm, T_base_flange)
     if found:

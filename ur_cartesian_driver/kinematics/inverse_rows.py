@@ -83,7 +83,7 @@ def solve_path(
     """
     Return joint positions along a path, each row the nearest to the previous one.
 
-    The result is that of :func:`~.inverse.nearest` from row to row: the nearest of all branches
+    The result equals :func:`~.inverse.nearest` from row to row: the nearest of all branches
     and full turns within the limits. Rows without solution are skipped.
 
     :param poses: (n, 7).
@@ -140,7 +140,7 @@ def nearest_rows(arm: Arm, poses: Floats, q_near: Floats) -> Floats:
     """
     Return for each pose the solution nearest to its row of ``q_near``.
 
-    The result is that of :func:`~.inverse.nearest` for each row.
+    The result equals :func:`~.inverse.nearest` for each row.
 
     :param poses: (n, 7).
     :param q_near: (n, 6) [rad].

@@ -121,7 +121,7 @@ class Progress:
     """
     The progress of a running motion.
 
-    Poses, twists and accelerations are those of the controlled frame in the robot's base.
+    Poses, twists and accelerations belong to the controlled frame, in the robot's base.
     """
 
     #: Index of the waypoint that the tool moves to.

@@ -308,7 +308,7 @@ class _Resumption:
         return [APPROACH_TIME, APPROACH_TIME + max(0.5, self.approach / APPROACH_SPEED)]
 
     def _times(self, k: int, u: float, approach: int = 0) -> list[float]:
-        """Return the times of all points of a goal of moves; those of the approach come first."""
+        """Return the times of all points of a goal of moves, first the approach's."""
         if not self.timed:
             return [0.0] * (len(self.points) - k + approach)
         arrive = [point.time for point in self.points]

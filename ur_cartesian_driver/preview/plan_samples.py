@@ -114,7 +114,7 @@ def _line(segments: Sequence[PlannedSegment]) -> str:
 
 
 def _time(segments: Sequence[PlannedSegment]) -> str:
-    """Return the time of segments as text; that of OPTIMIZED moves is not known in advance."""
+    """Return the time of segments as text; OPTIMIZED moves have none that is known."""
     if any(isinstance(segment.primitive, OptimoveJ | OptimoveL) for segment in segments):
         return '      ? s'
     return f'{sum(segment.duration for segment in segments):7.3f} s'

@@ -428,7 +428,7 @@ class RobotLink:
 
 
 def model_names(robot_type: int, software_major: int) -> list[str]:
-    """Return the models that report this type; for example, a UR7e reports that of a UR5."""
+    """Return the models that report this type; for example, a UR7e reports the type of a UR5."""
     names = [
         name
         for name, model in MODELS.items()

@@ -27,7 +27,7 @@ _SEPARATOR = 80 * '='
 
 def message_definition(name: str) -> str:
     """
-    Return the definition of a message, with those of the messages that it contains.
+    Return the definition of a message and of the messages that it contains.
 
     :param name: package and type, for example ``sensor_msgs/JointState``.
     :raises OSError: the package of one of these messages is not installed.

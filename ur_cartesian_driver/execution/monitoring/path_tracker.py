@@ -51,7 +51,7 @@ LAG_DISTANCE = 0.0005
 #: When the plan waits, the target is at most this far from the planned place [m]: the wire rounds
 #: to a micrometre, and a servo creeps.
 SAME_PLACE = 2e-5
-#: Beyond this fraction of an edge the path's direction is that of the next edge.
+#: Beyond this fraction of an edge the path has the direction of the next edge.
 AT_END = 0.999
 #: How much of the path behind the target is kept, because the tool may lag [s].
 HISTORY_TIME = 1.0

@@ -29,7 +29,7 @@ class SetpointSource(Protocol):
 
     @property
     def done(self) -> bool:
-        """Whether the positions returned last are those of the end, where the arm rests."""
+        """Whether the positions returned last are the end, where the arm rests."""
 
 
 class SplineSetpoints:

@@ -191,7 +191,7 @@ def _term(kind: str, code: str) -> Term | None:
 
 @cache
 def _first_code(code: int) -> int:
-    """Turn the group code of a point's y or z into that of its x; return other codes unchanged."""
+    """Turn the group code of a point's y or z into its x's; return other codes unchanged."""
     for first, last, x in ((20, 28, 10), (30, 37, 10), (220, 223, 210), (230, 233, 210)):
         if first <= code <= last:
             return x + code - first

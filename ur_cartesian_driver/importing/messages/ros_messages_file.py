@@ -315,7 +315,7 @@ def _collect_joints(message: Any, options: ImportOptions, into: PathCollector) -
     """
     Read a JointTrajectory.
 
-    :raises BrokenFile: an option moves the path, the joints are not those of the arm, or a value
+    :raises BrokenFile: an option moves the path, the joints are not the arm's, or a value
         does not suit its field.
     """
     line = getattr(message, 'line', 0)

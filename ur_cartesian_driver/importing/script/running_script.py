@@ -55,7 +55,7 @@ class RunningScript:
         return f'{before}{self._assumed}' if self._assumed else ''
 
     def tell(self, remarks: ImportNotes) -> None:
-        """Add all remarks to those of the import."""
+        """Add all remarks to the import's."""
         for why, (names, lines) in self._said.items():
             for line in lines:
                 remarks.add(line, ', '.join(names), why)

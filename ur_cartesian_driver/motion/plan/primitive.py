@@ -251,7 +251,7 @@ class BeginPress:
     Force mode begins; if no axis is compliant, only the watch for contact begins.
 
     :param T_base_task: the frame of the compliant axes.
-    :param follows_tool: whether the frame is that of the TCP, updated in each cycle.
+    :param follows_tool: whether the frame is the TCP's, updated in each cycle.
     """
 
     T_base_task: Pose

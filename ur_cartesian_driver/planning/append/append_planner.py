@@ -186,7 +186,7 @@ class _PartPlanner:
         self._before, self._appended, self._arm, self._options = appendable, appended, arm, options
         self._T_flange_tcp = appendable.T_flange_tcp or appendable.T_flange_active
         self._segments = appended.segments or (Segment(),) * len(appended.waypoints)
-        #: Number of points of the goal, including those of this part.
+        #: Number of points of the goal, this part included.
         self._points = appendable.points + len(appended.waypoints)
 
     # -- motions of the robot --------------------------------------------------------------------

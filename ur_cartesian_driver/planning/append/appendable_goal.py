@@ -99,7 +99,7 @@ class AppendableGoal:
     points: int = 0
     #: Number of planned records.
     records: int = 0
-    #: Number of committed records: all but those of the ending.
+    #: Number of committed records: all but the ending's.
     committed_records: int = 0
     #: Motion time at which the committed records end [s].
     time: float = 0.0

@@ -105,7 +105,7 @@ class _Refinement:
     jump: Joints | None = None
 
     def samples(self, piece: int) -> _Samples:
-        """Return the samples as those of a piece with this number."""
+        """Return the samples, labelled with the number of their piece."""
         return (
             np.full(len(self.t), piece),
             np.array(self.t),

@@ -52,7 +52,7 @@ from ur_cartesian_driver.planning.spline.spline_path import solve_spline_path, S
 MIN_PIECE_TIME = 0.02
 #: Number of shortest pieces that are joined into one at first; the result is split as necessary.
 _JOINED = 8
-#: Greatest deviation that the pieces may add to that of the path [m].
+#: Greatest deviation that the pieces may add to the path's own [m].
 PIECE_TOLERANCE = 1e-5
 #: Greatest such deviation as a fraction of the smallest bound of a corner.
 _PIECE_PART = 0.2

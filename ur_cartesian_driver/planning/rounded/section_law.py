@@ -246,7 +246,7 @@ class SectionLaw:
         bound = _AIM / self._tightened
         return LawLimits(
             speed=np.minimum.reduce(list(self.caps.values())),
-            # The acceleration along the path is one more column beside those of the joints.
+            # The acceleration along the path is one more column beside the joints.
             first=np.column_stack([samples.q1, np.linalg.norm(samples.x1, axis=1)]),
             second=np.column_stack([samples.q2, np.zeros(len(bound))]),
             bound=np.column_stack(

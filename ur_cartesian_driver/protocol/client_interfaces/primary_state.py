@@ -3,7 +3,7 @@
 """
 The sub-packages of a robot state frame on the primary interface.
 
-Each is big-endian: ``uint32`` size, ``uint8`` type, body; the size is that of all three together.
+Each is big-endian: ``uint32`` size, ``uint8`` type, body; the size counts all three.
 A UR5e sends the sub-packages in the order and with the sizes of this table, together 1386 bytes
 with the frame's header. Only the known beginning of a body is decoded, because newer software
 appends fields, but never omits any.

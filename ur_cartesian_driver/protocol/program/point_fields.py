@@ -3,7 +3,7 @@
 """
 Trajectory points as 21 numbers: converts motion primitives and outputs to these and back.
 
-This table is that of URCL since 2.12. Velocity comes before acceleration on the wire, unlike in
+URCL has this table since 2.12. Velocity comes before acceleration on the wire, unlike in
 URScript. The factors on the wire are S = 1,000,000 and T, which equals S except in dialect 2.0.
 :mod:`~ur_cartesian_driver.protocol.program.trajectory_points` scales the numbers, and arranges
 them for older programs.

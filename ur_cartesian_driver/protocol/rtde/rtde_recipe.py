@@ -75,7 +75,7 @@ class Recipe:
         Return the values in a data package; vectors are tuples.
 
         :param payload: the package without its first three bytes (size and type).
-        :raises RemoteProtocolError: the size of the package is not that of the recipe.
+        :raises RemoteProtocolError: the package and the recipe differ in size.
         """
         if len(payload) != self._size:
             raise RemoteProtocolError(

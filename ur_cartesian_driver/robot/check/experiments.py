@@ -70,7 +70,7 @@ class MotionSamples:
 
     @property
     def moving(self) -> Flags:
-        """Return a mask (n,) of the rows whose target differs from that of the row before."""
+        """Return a mask (n,) of the rows whose target differs from the row before."""
         steps = np.abs(np.diff(self.target_q, axis=0)).max(axis=1) > 1e-9
         return np.concatenate([[False], steps])
 

@@ -90,7 +90,7 @@ class GoalServer:
 
     @property
     def frames(self) -> Frames:
-        """The frames that goals can name, including those of tf2."""
+        """The frames that goals can name, in tf2 too."""
         return self._context.frames
 
     @property

@@ -66,7 +66,7 @@ BUILTIN_GROUPS: tuple[type[BuiltinGroup], ...] = (
 
 
 def controller_builtins(controller: Controller) -> Builtins:
-    """Return all functions that a primary program can call, including those of the language."""
+    """Return all functions that a primary program can call, the language's own included."""
     found = dict(core_builtins())
     for group in BUILTIN_GROUPS:
         found |= group(controller).functions()

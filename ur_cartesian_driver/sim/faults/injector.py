@@ -79,7 +79,7 @@ class _PendingFault:
     fault: Fault
     set_at: float
     travelled: float
-    #: Whether the coordinate of the TCP was at or above that of the plane when the fault was set.
+    #: Whether the coordinate of the TCP was at or above the plane when the fault was set.
     side: bool
 
 

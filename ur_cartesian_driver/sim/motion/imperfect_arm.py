@@ -29,7 +29,7 @@ _NOISE_CYCLES, _NOISE_SHIFT = 1009, 337
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Imperfections:
     """
-    The imperfections of an arm and its controller; the defaults are those of an e-Series arm.
+    The imperfections of an arm and its controller; the defaults fit an e-Series arm.
 
     "Recorded" marks figures from recordings of real arms; the other figures are assumed.
     """

@@ -138,7 +138,7 @@ class ArmPower:
     """The power of the arm: the present robot mode and the commanded robot mode."""
 
     def __init__(self, mode: RobotMode, power_on_time: float, brake_release_time: float) -> None:
-        """Begin in a robot mode; the times are those of the two slow steps [s]."""
+        """Begin in a robot mode; the two slow steps take these times [s]."""
         self.mode = mode
         self._goal = mode
         self._times = {

@@ -125,7 +125,7 @@ class JointKinematics:
         """
         Return for each step from row to row whether the arm can make it in one cycle (n,).
 
-        The joint limits are those of :meth:`overspeed_factor`.
+        The joint limits are as in :meth:`overspeed_factor`.
 
         :param q: joint positions (n + 1, 6) [rad]; the first row is the arm's present position.
         :param on_branch: whether a step must also stay on the IK branch.

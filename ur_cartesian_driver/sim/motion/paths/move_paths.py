@@ -165,7 +165,7 @@ class CircularMovePath:
 
     An unconstrained orientation takes the shortest rotation from start to end, and a long rotation
     determines the length, as on a line. A fixed orientation is constant relative to the tangent;
-    the orientation of the end pose is then ignored, and the length is that of the arc.
+    the orientation of the end pose is then ignored, and the length is the arc's.
 
     :raises MotionError: the three points do not lie on a circle.
     """

@@ -279,7 +279,7 @@ def _blend_profiles(
     of the next one (each s'' = 2 r u'^2 <= a, with the length r of that path in the blend), and
     the speed from which the remainder of the new path is long enough to brake. A first move with a
     trapezoid enters with v <= sqrt(2 a r), so it keeps its bound anyway. If the first move has a
-    time, its a is the acceleration from rest to rest or, if greater, that of the next move times
+    time, its a is the acceleration from rest to rest or, if greater, the next move's times
     the first length by the next length.
 
     If the next move has a time, the sum of both times is kept: the time that the previous move had
