@@ -150,6 +150,13 @@ def test_a_broken_file_is_one_sentence_with_its_line(tmp_path, text, line, part)
     assert '\n' not in str(caught.value)
 
 
+def test_a_long_header_is_shown_with_dots(tmp_path):
+    with pytest.raises(BrokenFile) as caught:
+        imported(tmp_path, 'x [mm],' + 99 * '.9' + '\n')
+    shown = f"'x [mm], {54 * '.9'}....'"
+    assert str(caught.value) == f"line 1: the column 'y' is missing; the header is {shown}."
+
+
 @pytest.mark.skipif(not (CHECKOUT / 'doc').is_dir(), reason='only a checkout has this page')
 def test_the_table_of_the_page_is_read(tmp_path):
     page = (CHECKOUT / 'doc' / 'importing.md').read_text(encoding='utf-8')

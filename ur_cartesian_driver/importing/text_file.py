@@ -69,3 +69,8 @@ def file_lines(text: str) -> list[str]:
     if not lines[-1]:
         del lines[-1]
     return lines
+
+
+def quoted(text: str, width: int = 40) -> str:
+    """Return a text of the file in quotes; dots replace the end of one longer than a width."""
+    return repr(text if len(text) <= width else f'{text[: width - 3]}...')

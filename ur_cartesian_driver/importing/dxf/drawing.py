@@ -18,6 +18,7 @@ from ur_cartesian_driver.importing.dxf.affine import (
 )
 from ur_cartesian_driver.importing.dxf.dxf_records import read_records, Record
 from ur_cartesian_driver.importing.dxf.dxf_terms import LeftOut, TERMS
+from ur_cartesian_driver.importing.text_file import quoted
 from ur_cartesian_driver.motion.geometry.vectors import add, scale, ZERO3
 
 _COMMENT, _NAME, _VARIABLE = 999, 2, 9
@@ -136,7 +137,7 @@ def _new_block(record: Record, blocks: dict[str, DrawingBlock]) -> DrawingBlock:
     block = DrawingBlock(record)
     name = record.text(2)
     if blocks.setdefault(name.upper(), block) is not block and name:
-        raise record.fault(f'a block {name!r:.40} came before')
+        raise record.fault(f'a block {quoted(name)} came before')
     return block
 
 

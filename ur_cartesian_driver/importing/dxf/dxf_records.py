@@ -16,7 +16,7 @@ from pathlib import Path
 import re
 
 from ur_cartesian_driver.importing.imported_path import BrokenFile
-from ur_cartesian_driver.importing.text_file import decoded, file_lines
+from ur_cartesian_driver.importing.text_file import decoded, file_lines, quoted
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, ZERO3
 
 #: The group code under which all extended data (codes from 1000) are stored.
@@ -79,8 +79,8 @@ class Record:
                 line = self.line + 2 * index + 3
                 if code == _MARKER and self.kind in _KINDS_WITH_MARKERS:
                     if self.kind not in _MARKED.get(value, (self.kind,)) or value[:4] != 'AcDb':
-                        # The file was cut: these tags belong to another entity.
-                        raise BrokenFile(line, f'{self.kind}: its marker {value!r:.40} is wrong')
+                        # The file was cut: this is the rest of another entity.
+                        raise BrokenFile(line, f'{self.kind}: its marker {quoted(value)} is wrong')
                 yield code, value, line
 
     @property
@@ -146,10 +146,10 @@ class Record:
 
     def _number(self, code: int, text: str, line: int) -> float:
         if not _NUMBER.fullmatch(text):
-            raise self.fault(f'{text!r:.40} is no number (group code {code})', line)
+            raise self.fault(f'{quoted(text)} is no number (group code {code})', line)
         value = float(text)
         if abs(value) > _MAX_NUMBER:
-            raise self.fault(f'{text!r:.40} is too large (group code {code})', line)
+            raise self.fault(f'{quoted(text)} is too large (group code {code})', line)
         return value
 
     def integer(self, code: int, default: int = 0) -> int:
@@ -223,7 +223,7 @@ def read_records(file: Path) -> Iterator[Record]:
         if code is None:
             text = lines[i].strip()
             if not _INTEGER.fullmatch(text):
-                raise BrokenFile(i + 1, f'{text!r:.40} is no group code of a DXF file')
+                raise BrokenFile(i + 1, f'{quoted(text)} is no group code of a DXF file')
             code = codes[lines[i]] = int(text)
         value = lines[i + 1].strip()
         if code == 0:

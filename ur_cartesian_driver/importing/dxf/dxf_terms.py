@@ -23,6 +23,7 @@ from ur_cartesian_driver.importing.import_format import (
     Treatment,
 )
 from ur_cartesian_driver.importing.imported_path import ImportNotes
+from ur_cartesian_driver.importing.text_file import quoted
 
 #: Names and lengths [m] of the units by the number of $INSUNITS. The survey foot is 1200/3937 m.
 UNITS = {
@@ -219,7 +220,7 @@ class LeftOut:
 
     def add(self, record: Record, why: str, what: str = '') -> None:
         """Note that a record is left out, or make another remark about it."""
-        what = what or (record.kind if record.kind in TERMS else f'{record.kind!r:.40}')
+        what = what or (record.kind if record.kind in TERMS else quoted(record.kind))
         self._found.setdefault((what, why), {})[record] = None
 
     def add_term(self, record: Record, name: str, what: str = '') -> None:

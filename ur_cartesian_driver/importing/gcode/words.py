@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from ur_cartesian_driver.importing.gcode.codes import code_named, CODES, OTHER_FILE
 from ur_cartesian_driver.importing.imported_path import BrokenFile
+from ur_cartesian_driver.importing.text_file import quoted
 
 _COMMENT = re.compile(r'\([^()]*\)|;.*')
 _MESSAGE = re.compile(r'\(\s*(MSG|DEBUG|PRINT|LOG)\s*,', re.I)
@@ -163,5 +164,4 @@ def _odd_block(number: int, line: str, text: str) -> Block:
 
 def _shown(line: str) -> str:
     """Return the beginning of a line in quotes."""
-    line = line.strip()
-    return repr(line if len(line) < 60 else f'{line[:56]}...')
+    return quoted(line.strip(), 59)

@@ -18,6 +18,7 @@ from typing import Any
 import yaml
 
 from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes
+from ur_cartesian_driver.importing.text_file import quoted
 
 _Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 #: Deepest nesting of values; messages have about five levels.
@@ -165,7 +166,7 @@ def _value(event: Any, events: Iterator[Any], first: int, depth: int) -> Any:
             break
         name = getattr(key, 'value', '')
         if not name or name in part.fields:
-            what = f'the field {name!r:.40} stands twice' if name else 'a field has no name'
+            what = f'the field {quoted(name)} stands twice' if name else 'a field has no name'
             raise BrokenFile(first + key.start_mark.line, what)
         part.fields[name] = _value(next(events), events, first, depth + 1)
     return part

@@ -34,7 +34,7 @@ from ur_cartesian_driver.importing.messages.message_terms import (
     ROBOT_TRAJECTORY,
     TERMS,
 )
-from ur_cartesian_driver.importing.text_file import file_text
+from ur_cartesian_driver.importing.text_file import file_text, quoted
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY
 from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows
@@ -105,7 +105,7 @@ def _type(message: Any) -> str:
         raise BrokenFile(
             line,
             'this is neither a Path, a PoseArray, a JointTrajectory nor a pose; its fields are '
-            f'{", ".join(fields)!r:.80}',
+            f'{quoted(", ".join(fields), 80)}',
         )
     if TERMS[name].treatment is Treatment.REFUSED:
         raise BrokenFile(line, f'this is a {name}: {TERMS[name].reason}')

@@ -13,6 +13,7 @@ import numpy as np
 from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes, MAX_DISTANCE
 from ur_cartesian_driver.importing.tables.column_names import POSITION, ROLES
 from ur_cartesian_driver.importing.tables.table_columns import Column
+from ur_cartesian_driver.importing.text_file import quoted
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 
 #: Matches a number; Python's float() also accepts underscores, digits of other scripts, and nan.
@@ -71,7 +72,7 @@ def _numbers(column: Column, cells: Sequence[str], lines: Sequence[int], _: Impo
             raise BrokenFile(line, f'the cell of {column.title!r} is empty')
         if _NUMBER.fullmatch(cell) is None or not abs(float(cell)) < _MAX_NUMBER:
             text = cell.strip(' \t')
-            raise BrokenFile(line, f'{text!r:.40} is no number ({column.title})')
+            raise BrokenFile(line, f'{quoted(text)} is no number ({column.title})')
     return numbers
 
 
@@ -107,7 +108,7 @@ def _seconds(cell: str, line: int) -> float:
             moment = datetime.combine(_EPOCH, time.fromisoformat(cell.strip()))
         except ValueError:
             raise BrokenFile(
-                line, f'{cell.strip()!r:.40} is no time such as 2026-03-04T10:00:00.125'
+                line, f'{quoted(cell.strip())} is no time such as 2026-03-04T10:00:00.125'
             ) from None
     zoned = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
     return (zoned - _EPOCH).total_seconds()
@@ -132,12 +133,12 @@ def _with_points(texts: dict[Column, list[str]], lines: Sequence[int]) -> dict[C
     line, cell = cell_at(joined.index(','))
     if (match := _WITH_THOUSANDS.search(joined)) is not None:
         line, cell = cell_at(match.start())
-        raise BrokenFile(line, f'{cell!r:.40} has thousands separators; leave them out')
+        raise BrokenFile(line, f'{quoted(cell)} has thousands separators; leave them out')
     if '.' in joined:
         other_line, other = cell_at(joined.index('.'))
         raise BrokenFile(
             other_line,
-            f'{other!r:.40} has a decimal point, but {cell!r:.40} at line {line} a decimal '
+            f'{quoted(other)} has a decimal point, but {quoted(cell)} at line {line} a decimal '
             'comma; write points everywhere',
         )
     if _CERTAIN_COMMA.search(joined) is None and all(

@@ -25,6 +25,7 @@ from ur_cartesian_driver.importing.tables.column_names import (
     Title,
 )
 from ur_cartesian_driver.importing.tables.column_units import plain_unit, Quantity, UNITS
+from ur_cartesian_driver.importing.text_file import quoted
 
 _POSITION, _ORIENTATION, _NORMAL = 'position', 'orientation', 'normal'
 #: Kinds of values that an orientation option replaces, with the reason for the remark.
@@ -147,8 +148,8 @@ def _names(titles: Sequence[Title]) -> str:
 def _refuse_header(titles: Sequence[Title], line: int) -> NoReturn:
     """Refuse a header without a position."""
     missing = _missing({title.name for title in titles}, _POSITION)
-    header = ', '.join(title.text for title in titles)
-    raise BrokenFile(line, f'the column {missing!r} is missing; the header is {header!r:.120}')
+    header = quoted(', '.join(title.text for title in titles), 120)
+    raise BrokenFile(line, f'the column {missing!r} is missing; the header is {header}')
 
 
 def _missing(names: set[str], kind: str) -> str:
