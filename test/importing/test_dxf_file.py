@@ -203,6 +203,16 @@ def test_an_arc_in_an_unevenly_scaled_block_is_an_ellipse(tmp_path):
     assert vias(mirrored)[0] == pytest.approx([10 * sqrt(2), -10 * sqrt(2), 0.0])
 
 
+def test_the_outer_knots_do_not_change_a_spline(tmp_path):
+    entity = 'SPLINE 71 2 40 {} 40 0 40 0 40 1 40 1 40 {} 10 0 20 0 10 5 20 9 10 10 20 0'
+    whole, other = (
+        millimetres(imported(tmp_path, drawing(entity.format(*knots))))
+        for knots in ((0, 1), (-9.3, 7))
+    )
+    assert whole[[0, -1]] == pytest.approx(np.array([[0.0, 0, 0], [10, 0, 0]]))
+    assert other == pytest.approx(whole)
+
+
 # Polylines
 
 

@@ -36,7 +36,7 @@ def drawn(text, unit):
     """Return points on each curve that the front end draws [m]."""
     from drawn_curves import drawn_curves
 
-    return [unit * curve for curve in drawn_curves(text)]
+    return drawn_curves(text, unit)
 
 
 def assert_same(ours, theirs):

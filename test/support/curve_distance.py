@@ -3,12 +3,13 @@
 """Distances between curves, and the curves that a path follows."""
 
 from collections.abc import Iterable, Sequence
+from math import degrees
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-#: Angles between points on arcs [degrees], and distances between those on lines [m].
-STEP, SPACING = 1.0, 2e-3
+#: Largest distance of curves from the lines between their points, and of points on lines [m].
+SAG, SPACING = 5e-7, 2e-3
 
 
 def path_curves(positions, vias, travels) -> list[np.ndarray]:
@@ -37,8 +38,13 @@ def arc_points(a, via, b):
     ex = a - centre
     ey = np.cross(normal / np.linalg.norm(normal), ex)
     angle = np.arctan2((b - centre) @ ey, (b - centre) @ ex) % (2.0 * np.pi)
-    t = np.linspace(0.0, angle, 2 + int(np.degrees(angle) / STEP))[1:]
+    t = np.linspace(0.0, angle, arc_count(np.degrees(angle), float(np.linalg.norm(ex))))[1:]
     return centre + np.cos(t)[:, None] * ex + np.sin(t)[:, None] * ey
+
+
+def arc_count(angle: float, radius: float) -> int:
+    """Return how many points an arc [degrees, m] needs; an ellipse, with its larger radius."""
+    return 2 + int(angle / min(1.0, degrees((8.0 * SAG / max(radius, 1e-9)) ** 0.5)))
 
 
 def distances(points: np.ndarray, curves: Sequence[np.ndarray], enough: float = 0.0) -> np.ndarray:

@@ -10,7 +10,7 @@ ezdxf's own evaluation of the entities that it decides to draw, also of those in
 from io import StringIO
 import logging
 
-from curve_distance import STEP
+from curve_distance import arc_count, SAG
 from ezdxf import filemanagement
 from ezdxf.addons.drawing.config import Configuration, ProxyGraphicPolicy
 from ezdxf.addons.drawing.frontend import UniversalFrontend
@@ -20,8 +20,6 @@ from ezdxf.entities import Insert
 import numpy as np
 
 logging.getLogger('ezdxf').setLevel(logging.CRITICAL)
-#: Splines are sampled until they are so near to lines, as a share of their size.
-FLAT = 1e-5
 #: What has no path.
 OTHERS = (
     *('POINT', 'HATCH', 'MPOLYGON', 'MESH', 'WIPEOUT', 'MTEXT', 'OLE2FRAME', 'IMAGE', 'TEXT'),
@@ -40,15 +38,16 @@ AbstractPipeline.register(_Nowhere)
 
 
 class DrawnCurves(UniversalFrontend):
-    """Collects the curves of a drawing, in its units."""
+    """Collects the curves of a drawing, whose unit [m] says how dense their points are."""
 
-    def __init__(self, doc):
+    def __init__(self, doc, unit):
         super().__init__(
             RenderContext(doc),
             _Nowhere(),
             Configuration(proxy_graphic_policy=ProxyGraphicPolicy.IGNORE),
         )
         self.curves = []
+        self.unit = unit
         self._dispatch.update(dict.fromkeys(OTHERS, lambda entity, properties: None))
         self._dispatch['HELIX'] = self.draw_curve_entity
         self.draw_layout(doc.modelspace())
@@ -61,7 +60,7 @@ class DrawnCurves(UniversalFrontend):
         self.curves.append([entity.dxf.start, entity.dxf.end])
 
     def draw_curve_entity(self, entity, properties):
-        self.curves.append(curve_points(entity))
+        self.curves.append(curve_points(entity, self.unit))
 
     def draw_polyline_entity(self, entity, properties):
         if entity.dxftype() == 'POLYLINE':
@@ -70,22 +69,24 @@ class DrawnCurves(UniversalFrontend):
             if entity.is_2d_polyline and not entity.dxf.hasattr('elevation') and len(entity):
                 entity.dxf.elevation = (0, 0, entity[0].dxf.location.z)  # as the front end
         for part in entity.virtual_entities():
-            self.curves.append(curve_points(part))
+            self.curves.append(curve_points(part, self.unit))
 
 
-def curve_points(entity):
+def curve_points(entity, unit):
     """Return points on a curve in order, in world coordinates."""
     kind, dxf = entity.dxftype(), entity.dxf
     if kind == 'LINE':
         return [dxf.start, dxf.end]
     if kind in ('CIRCLE', 'ARC'):
         start, sweep = (0.0, 360.0) if kind == 'CIRCLE' else arc(dxf.start_angle, dxf.end_angle)
-        return list(entity.vertices(np.linspace(start, start + sweep, 2 + int(sweep / STEP))))
+        count = arc_count(sweep, unit * dxf.radius)
+        return list(entity.vertices(np.linspace(start, start + sweep, count)))
     if kind == 'ELLIPSE':
         start, sweep = arc(np.degrees(dxf.start_param), np.degrees(dxf.end_param))
-        angles = np.linspace(start, start + sweep, 2 + int(sweep / STEP))
+        count = arc_count(sweep, unit * max(1.0, dxf.ratio) * dxf.major_axis.magnitude)
+        angles = np.linspace(start, start + sweep, count)
         return list(entity.construction_tool().vertices(np.radians(angles)))
-    return spline_points(entity.construction_tool())
+    return spline_points(entity.construction_tool(), unit)
 
 
 def arc(start, end):
@@ -93,21 +94,34 @@ def arc(start, end):
     return start, sweep if 1e-6 < sweep < 360.0 - 1e-6 else 360.0
 
 
-def spline_points(tool):
-    places = np.union1d(np.linspace(0.0, tool.max_t, 33), tool.knots())  # corners are at knots
+def spline_points(tool, unit):
+    """
+    Return points on a spline.
+
+    It lies between those knots where its basis functions add up to 1. ezdxf draws the other spans
+    too, of a spline whose first or last knots differ; there the curve leaves its control points.
+    """
+    knots = np.array(tool.knots())
+    first, last = knots[tool.degree], knots[tool.count]
+    corners = knots[(first <= knots) & (knots <= last)]
+    places = np.union1d(np.linspace(first, last, 33), corners)
     for _ in range(20):
         points = np.array([tuple(p) for p in tool.points(places)])
         middles = 0.5 * (places[1:] + places[:-1])
         off = np.array([tuple(p) for p in tool.points(middles)]) - 0.5 * (points[1:] + points[:-1])
-        coarse = np.linalg.norm(off, axis=1) > FLAT * np.ptp(points, axis=0).max()
+        coarse = unit * np.linalg.norm(off, axis=1) > SAG
         if not coarse.any():
             break
         places = np.union1d(places, middles[coarse])
     return points
 
 
-def drawn_curves(text: str) -> list[np.ndarray]:
-    """Return the curves of a drawing, each as points (n, 3)."""
+def drawn_curves(text: str, unit: float) -> list[np.ndarray]:
+    """
+    Return the curves of a drawing, each as points (n, 3) [m].
+
+    :param unit: the unit of its lengths [m].
+    """
     doc = filemanagement.read(StringIO(text))
-    curves = DrawnCurves(doc).curves
-    return [np.array([tuple(p) for p in points]) for points in curves if len(points)]
+    curves = DrawnCurves(doc, unit).curves
+    return [unit * np.array([tuple(p) for p in points]) for points in curves if len(points)]
