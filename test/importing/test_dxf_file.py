@@ -203,6 +203,14 @@ def test_an_arc_in_an_unevenly_scaled_block_is_an_ellipse(tmp_path):
     assert vias(mirrored)[0] == pytest.approx([10 * sqrt(2), -10 * sqrt(2), 0.0])
 
 
+def test_an_axis_that_hardly_leaves_the_plane_of_its_ellipse_keeps_its_length(tmp_path):
+    """As files with few digits have it; half of the axis is the other one."""
+    entity = 'ELLIPSE 10 0 20 0 11 10 21 0 31 0.04 40 0.5 41 0 42 1.5707963267949'
+    x, y, z = millimetres(imported(tmp_path, drawing(entity))).T
+    assert (x[0], z[0]) == pytest.approx((10.0, 0.04))
+    assert (x[-1], y[-1], z[-1]) == pytest.approx((0.0, 0.5 * np.hypot(10.0, 0.04), 0.0), abs=1e-9)
+
+
 def test_the_outer_knots_do_not_change_a_spline(tmp_path):
     entity = 'SPLINE 71 2 40 {} 40 0 40 0 40 1 40 1 40 {} 10 0 20 0 10 5 20 9 10 10 20 0'
     whole, other = (
@@ -314,6 +322,11 @@ def test_the_tolerance_holds_after_the_scale(tmp_path):
         ('CIRCLE 10 0 20 0 40 1 210 0 220 0 230 0', 'its extrusion has no direction'),
         ('LWPOLYLINE 38 -5 210 0 220 0 10 0 20 0 10 1 20 1', 'its extrusion has no direction'),
         ('ELLIPSE 10 0 20 0 11 0 21 0 40 0.5', 'it has an axis without a length.'),
+        (
+            'ELLIPSE 5 2F 10 0 20 0 11 3 21 4 31 2 40 0.5',
+            'ELLIPSE 2F: its axis leaves its plane by 2 (group codes 11 and 210).',
+        ),
+        ('ELLIPSE 10 0 20 0 11 0.01 21 0 210 1 220 0 230 0 40 0.5', 'leaves its plane by 0.01'),
         ('LWPOLYLINE 90 3 10 0 20 0 10 1 20 1', 'it has 2 vertices in place of 3'),
         ('LWPOLYLINE 90 2 10 0 10 1 20 1', 'a vertex has no y (group code 20).'),
         ('LWPOLYLINE 20 0 10 1 20 1', 'group code 20 stands before the first 10.'),

@@ -100,6 +100,10 @@ class _Pen:
         self.points.extend((x, y, z) for x, y, z in places[1:])
         self.vias.extend([None] * (len(places) - 1))
 
+    def length_of(self, v: Vector3) -> float:
+        """Return the length of a difference of two points of the entity [m]."""
+        return norm(self.place.direction(v))
+
     def gap(self) -> float:
         """Return the distance [m] between the ends."""
         return norm(subtract(self.points[0], self.points[-1]))
@@ -172,8 +176,14 @@ def _ellipse(record: Record, pen: _Pen, left_out: LeftOut) -> None:
     if not (ratio > 0.0 and norm(a) > 0.0):
         raise ValueError('it has an axis without a length')
     normal = object_axes(record.extrusion()).z
+    out = dot(normal, a)
+    # Some programs turn such an axis, and others the plane. Across its axis no plane has an
+    # ellipse, however small.
+    if pen.length_of(scale(normal, out)) > pen.tolerance or abs(out) > 0.5 * norm(a):
+        raise ValueError(f'its axis leaves its plane by {abs(out):g} (group codes 11 and 210)')
+    across = cross(normal, a)
+    b = scale(across, ratio * norm(a) / norm(across))
     begin = record.number(41, 0.0)
-    b = scale(cross(normal, a), ratio)
     _closed_ellipse(pen, centre, a, b, begin, _sweep(begin, record.number(42, tau)))
 
 
