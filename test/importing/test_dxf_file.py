@@ -232,6 +232,13 @@ def test_a_closed_polyline_keeps_its_last_side_and_its_elevation(tmp_path, versi
     assert millimetres(found) == pytest.approx(np.array(corners, dtype=float))
 
 
+@pytest.mark.parametrize('point', ['', '10 0 20 0 38 5', '10 0 20 0 30 5'])
+def test_a_polyline_has_its_own_elevation_or_that_of_its_vertices(tmp_path, point):
+    entity = f'POLYLINE {point} 0 VERTEX 10 0 20 0 30 5 0 VERTEX 10 9 20 0 30 5 0 SEQEND'
+    found = imported(tmp_path, drawing(entity))
+    assert millimetres(found) == pytest.approx(np.array([[0.0, 0, 5], [9, 0, 5]]))
+
+
 @pytest.mark.parametrize(('flags', 'frame', 'fitted'), [(4, 16, 8), (12, 48, 40)])
 def test_the_frame_of_a_fitted_polyline_is_not_cut(tmp_path, flags, frame, fitted):
     vertices = [(0, 0, frame), (0, 0, fitted), (5, 4, fitted), (5, 20, frame), (10, 0, fitted)]
@@ -327,6 +334,26 @@ def test_the_tolerance_holds_after_the_scale(tmp_path):
             'ELLIPSE 2F: its axis leaves its plane by 2 (group codes 11 and 210).',
         ),
         ('ELLIPSE 10 0 20 0 11 0.01 21 0 210 1 220 0 230 0 40 0.5', 'leaves its plane by 0.01'),
+        (
+            'POLYLINE 10 0 20 0 0 VERTEX 10 0 20 0 30 5 0 VERTEX 10 9 20 0 30 5 0 SEQEND',
+            'its elevation is missing (group code 30), and its points lie at z from 0 to 5.',
+        ),
+        (
+            'POLYLINE 70 0 0 VERTEX 10 0 20 0 30 5 0 VERTEX 10 9 20 0 30 7 0 SEQEND',
+            'its elevation is missing (group code 30), and its points lie at z from 5 to 7.',
+        ),
+        (
+            'POLYLINE 10 0 20 0 30 0 10 9 20 0 30 0 0 VERTEX 10 0 20 0 0 SEQEND',
+            'POLYLINE: group code 10 stands twice.',
+        ),
+        (
+            'POLYLINE 70 8 0 VERTEX 10 0 20 0 42 1 0 VERTEX 10 9 20 0 0 SEQEND',
+            'VERTEX: a vertex in space has no bulge (group code 42).',
+        ),
+        (
+            'POLYLINE 70 1 0 VERTEX 10 0 20 0 0 VERTEX 10 9 20 0 70 16 0 SEQEND',
+            'VERTEX: it is of a frame (group code 70), and its POLYLINE is not fitted.',
+        ),
         ('LWPOLYLINE 90 3 10 0 20 0 10 1 20 1', 'it has 2 vertices in place of 3'),
         ('LWPOLYLINE 90 2 10 0 10 1 20 1', 'a vertex has no y (group code 20).'),
         ('LWPOLYLINE 20 0 10 1 20 1', 'group code 20 stands before the first 10.'),

@@ -24,6 +24,7 @@ from ur_cartesian_driver.motion.geometry.vectors import (
     scale,
     subtract,
     Vector3,
+    ZERO3,
 )
 
 #: Largest angle [rad] of one arc of the robot; longer arcs are halved.
@@ -32,8 +33,8 @@ _LONGEST_ARC = 0.95 * pi
 _WHOLE_TURN = 1e-6
 #: Arcs with a smaller bulge are drawn as lines: their height is below a billionth of the chord.
 _FLAT = 1e-9
-_CLOSED, _IN_SPACE, _MESH, _FACES, _FRAME = 1, 8, 16, 64, 16
-#: Ends within this distance [m] of each other are joined.
+_CLOSED, _FITTED, _IN_SPACE, _MESH, _FACES, _FRAME = 1, 4, 8, 16, 64, 16
+#: Ends that are as near as this are joined [m].
 JOINED = 1e-5
 
 
@@ -233,22 +234,49 @@ def _polyline(record: Record, pen: _Pen, left_out: LeftOut) -> None:
     for bit in (_MESH, _FACES):
         if flags & bit:
             raise _NoPathError(f'POLYLINE 70={bit}')
-    # The control frame of a spline-fit polyline is not visible.
-    vertices = [v for v in record.vertices if not v.integer(70) & _FRAME]
-    for vertex in vertices:
-        left_out.add_codes(vertex)
+    record.point(10, ZERO3)  # two would be of a vertex, too, whose beginning is missing
+    vertices = []
+    for vertex in record.vertices:
+        # The control frame of a spline-fit polyline is not visible.
+        if not vertex.integer(70) & _FRAME:
+            vertices.append(vertex)
+            left_out.add_codes(vertex)
+        elif not flags & _FITTED:
+            raise vertex.fault('it is of a frame (group code 70), and its POLYLINE is not fitted')
     if flags & _IN_SPACE:
         points = [vertex.point(10) for vertex in vertices]
+        for vertex in vertices:
+            if vertex.number(42, 0.0):
+                raise vertex.fault('a vertex in space has no bulge (group code 42)')
         for point in [*points, points[0]] if flags & _CLOSED and points else points:
             pen.line_to(point)
         return
-    given = [record.number(code) for code in (30, 38) if code in record.values]
-    height = next(iter(given or [vertex.point(10)[2] for vertex in vertices]), 0.0)
+    height = _elevation(record, vertices, pen)
     for vertex in vertices:
         if vertex.point(10)[2] != height and 30 in vertex.values:
             left_out.add_term(vertex, 'VERTEX 30')
     corners = [(*vertex.point(10)[:2], vertex.number(42, 0.0)) for vertex in vertices]
     _plane_polyline(pen, corners, height, bool(flags & _CLOSED))
+
+
+def _elevation(record: Record, vertices: Sequence[Record], pen: _Pen) -> float:
+    """
+    Return the elevation of a plane polyline: its own, or that of all its vertices.
+
+    :raises ValueError: it has none of its own, and its points have different ones.
+    """
+    for code in (30, 38):
+        if code in record.values:
+            return record.number(code)
+    heights = [vertex.point(10)[2] for vertex in vertices]
+    # To most programs its own point, without z, says 0.
+    found = [*heights, *([0.0] if 10 in record.values else [])]
+    if found and pen.length_of((0.0, 0.0, max(found) - min(found))) > pen.tolerance:
+        raise ValueError(
+            f'its elevation is missing (group code 30), and its points lie at z from '
+            f'{min(found):g} to {max(found):g}'
+        )
+    return next(iter(heights), 0.0)
 
 
 def _plane_polyline(
