@@ -404,6 +404,23 @@ def test_what_cannot_be_meant_is_refused_with_line_and_handle(tmp_path, entity, 
     assert '\n' not in str(caught.value)
 
 
+def test_two_units_are_refused(tmp_path):
+    twice = drawing(LINE, header='9 $INSUNITS 70 {}')
+    assert len(millimetres(imported(tmp_path, twice.format(4)))) == 2
+    with pytest.raises(BrokenFile, match=r'^line \d+: \$INSUNITS: it stands twice\.$'):
+        imported(tmp_path, twice.format(5))
+
+
+def test_two_layers_of_one_name_must_not_differ_in_what_is_seen(tmp_path):
+    same = imported(tmp_path, drawing(LINE, layers=['Cut 62 3', 'CUT 5 77 62 5']))
+    assert "LAYER' (handle 77): the first layer of this name counts" in remarks(same)
+    for hidden in ('62 -3', '62 3 70 1'):
+        with pytest.raises(BrokenFile) as caught:
+            imported(tmp_path, drawing(LINE, layers=['Cut 62 3', f'CUT 5 77 {hidden}']))
+        sentence = "LAYER 77: a layer 'CUT' came before, and one of the two is off or frozen."
+        assert str(caught.value).endswith(sentence)
+
+
 def test_two_blocks_of_one_name_are_refused(tmp_path):
     text = drawing(LINE, blocks={'B': '', 'b 5 77': ''})
     with pytest.raises(BrokenFile, match="BLOCK 77: a block 'b' came before"):

@@ -77,7 +77,7 @@ def read_drawing(file: Path, left_out: LeftOut) -> Drawing:
             section = _section(record, sections, left_out)
             into = found.entities if section == 'ENTITIES' else None
             if section == 'HEADER':
-                found.header = dict(_variables(record))
+                found.header = _header(record)
         elif kind == 'ENDSEC':
             section = ''
         elif section in ('ENTITIES', 'BLOCKS'):
@@ -88,8 +88,7 @@ def read_drawing(file: Path, left_out: LeftOut) -> Drawing:
             else:
                 _add_entity(record, into)
         elif kind == 'LAYER' and section == 'TABLES':
-            if found.layers.setdefault(record.text(2).upper(), record) is not record:
-                left_out.add(record, 'the first layer of this name counts')
+            _add_layer(record, found.layers, left_out)
         elif section == 'OBJECTS':
             objects[record.handle] = record
         elif not section and any(code != _COMMENT for code, _ in record.tags):
@@ -108,6 +107,16 @@ def _section(record: Record, before: set[str], left_out: LeftOut) -> str:
         left_out.add(record, 'it is no section that is known here', f'section {name}')
     before.add(name)
     return name
+
+
+def _header(record: Record) -> dict[str, Record]:
+    """Return the variables of a header; it cannot say two units."""
+    found: dict[str, Record] = {}
+    for name, variable in list(_variables(record)):  # each has its values when all are there
+        first = found.setdefault(name, variable)
+        if name == '$INSUNITS' and variable.integer(70) != first.integer(70):
+            raise variable.fault('it stands twice')
+    return found
 
 
 def _variables(header: Record) -> Iterator[tuple[str, Record]]:
@@ -131,6 +140,24 @@ def _add_entity(record: Record, into: list[Record] | None) -> None:
         into[-1].vertices.append(record)
     elif record.kind != 'SEQEND':
         into.append(record)
+
+
+def _add_layer(record: Record, layers: dict[str, Record], left_out: LeftOut) -> None:
+    """Add a layer; another one of its name must not contradict it in what is seen."""
+    name = record.text(_NAME)
+    first = layers.setdefault(name.upper(), record)
+    if first is record:
+        return
+    if _hides(first) != _hides(record):
+        raise record.fault(
+            f'a layer {quoted(name)} came before, and one of the two is off or frozen'
+        )
+    left_out.add(record, 'the first layer of this name counts')
+
+
+def _hides(layer: Record) -> tuple[bool, bool]:
+    """Return whether a layer is frozen, and whether it is off."""
+    return bool(layer.integer(70) & _FROZEN), layer.integer(62, 7) < 0
 
 
 def _new_block(record: Record, blocks: dict[str, DrawingBlock]) -> DrawingBlock:
@@ -219,13 +246,14 @@ class Seen:
         if record.integer(60):
             return '60'
         entry = self._drawing.layers.get(layer)
-        if entry and entry.integer(70) & _FROZEN:
+        is_frozen, is_off = _hides(entry) if entry else (False, False)
+        if is_frozen:
             return 'LAYER 70=1'
         if record.kind == 'INSERT':
             return ''
         if layer == 'DEFPOINTS':
             return 'LAYER Defpoints'
-        return 'LAYER 62<0' if entry and entry.integer(62, 7) < 0 else ''
+        return 'LAYER 62<0' if is_off else ''
 
     def _show(self, layer: str) -> None:
         """Add a remark, once for each layer, on the layer's properties that the tool ignores."""
