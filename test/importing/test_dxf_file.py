@@ -404,6 +404,89 @@ def test_what_cannot_be_meant_is_refused_with_line_and_handle(tmp_path, entity, 
     assert '\n' not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ('entity', 'marker'),
+    [
+        ('LWPOLYLINE {} 100 AcDbPolyline 100 {} 10 0 20 0 10 9 20 0', 'AcDb3dPolylineVertex'),
+        ('LINE {} 100 AcDbLine 10 0 20 0 11 9 21 0 100 {}', 'AcDbLine'),
+        ('LINE {} 100 {} 10 0 20 0 11 9 21 0', 'AcDbLime'),
+        ('CIRCLE {} 10 0 20 0 40 9 100 {}', 'AcDbHelix'),
+    ],
+)
+def test_a_marker_of_another_entity_is_refused_with_its_line(tmp_path, entity, marker):
+    text = drawing(entity.format('100 AcDbEntity', marker))
+    line = len(text.splitlines()) - text.splitlines()[::-1].index(marker)
+    with pytest.raises(BrokenFile) as caught:
+        imported(tmp_path, text)
+    kind = entity.split()[0]
+    assert str(caught.value) == f'line {line}: {kind}: its marker {marker!r} is wrong.'
+
+
+def test_an_insert_of_many_places_has_a_marker_of_its_own(tmp_path):
+    insert = 'INSERT 100 AcDbEntity 8 0 100 {} 2 B 10 100 20 0 70 1'
+    blocks = {'B': '0 ' + LINE}
+    for marker in ('AcDbBlockReference', 'AcDbMInsertBlock'):
+        found = imported(tmp_path, drawing(insert.format(marker), blocks=blocks))
+        assert millimetres(found) == pytest.approx(np.array([[100.0, 0, 0], [110, 0, 0]]))
+
+
+def test_a_group_of_an_application_has_to_end(tmp_path):
+    text = drawing('LWPOLYLINE 10 0 20 0 10 9 20 0 102 {ACAD 70 1')
+    with pytest.raises(BrokenFile, match=r"LWPOLYLINE: its group '{ACAD' does not end \(group"):
+        imported(tmp_path, text)
+
+
+def test_nothing_is_embedded_in_an_entity_with_a_path(tmp_path):
+    entity = 'LWPOLYLINE 10 0 20 0 10 9 20 0 101 Embedded 70 1'
+    found = imported(tmp_path, drawing(entity))
+    assert millimetres(found) == pytest.approx(np.array([[0.0, 0, 0], [9, 0, 0], [0, 0, 0]]))
+    assert 'LWPOLYLINE: group code 101 is none of a LWPOLYLINE' in remarks(found)
+
+
+@pytest.mark.parametrize(
+    ('text', 'record'),
+    [
+        (drawing('TEXT 100 AcDbEntity 8 0 10 0 20 0 100 AcDbEntity 8 0'), 'TEXT'),
+        (drawing('TEXT 100 AcDbEntity 8 0 10 0 20 0 100 AcDbLine 10 0 20 0 11 9 21 0'), 'TEXT'),
+        (drawing('TEXT 8 0 10 0 20 0 8 0 10 0 20 0 11 9 21 0'), 'TEXT'),
+        (drawing('POLYLINE 0 VERTEX 10 0 20 0 0 SEQEND 10 0 20 0 11 9 21 0'), 'SEQEND'),
+        (drawing(LINE, blocks={'B': '0 ENDBLK 10 0 20 0 11 9 21 0'}), 'ENDBLK'),
+        (drawing(LINE, blocks={'B 8 0 10 0 20 0 8 0 11 9 21 0': ''}), 'BLOCK'),
+        (drawing(LINE).replace('ENTITIES', 'ENTITIES\n10\n0\n20\n0\n11\n9\n21\n0'), 'SECTION'),
+        (drawing(LINE, layers=['Cut 100 AcDbLine 11 9 21 0']), 'LAYER'),
+    ],
+)
+def test_an_entity_whose_beginning_is_missing_is_refused(tmp_path, text, record):
+    with pytest.raises(BrokenFile, match=rf'^line \d+: {record}: it goes on as another entity'):
+        imported(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ('text', 'sentence'),
+    [
+        (drawing(LINE, layers=[f'A 0 {LINE}']), 'LINE 2F: it cannot be in the section TABLES'),
+        (drawing(LINE, objects=f'0 {LINE}'), 'LINE 2F: it cannot be in the section OBJECTS'),
+        (drawing(LINE, header=f'0 {LINE}'), 'LINE 2F: it cannot be in the section HEADER'),
+        (
+            drawing(LINE, layers=['Off 62 -7']).replace('TABLES', 'OBJECTS', 1),
+            'TABLE: it cannot be in the section OBJECTS',
+        ),
+        (drawing(LINE, 'LAYER 2 Off 62 -7'), 'LAYER: it cannot be in the section ENTITIES'),
+        (
+            drawing(LINE, blocks={'A': '', 'B': ''}).replace('0\nENDBLK\n', '', 1),
+            'BLOCK: the block before it has not ended',
+        ),
+        (
+            drawing(LINE, blocks={'A': ''}).replace('0\nENDBLK\n', ''),
+            'ENDSEC: the block before it has not ended',
+        ),
+    ],
+)
+def test_a_record_of_another_section_is_refused(tmp_path, text, sentence):
+    with pytest.raises(BrokenFile, match=rf'^line \d+: {sentence}; the file is broken\.$'):
+        imported(tmp_path, text)
+
+
 def test_two_units_are_refused(tmp_path):
     twice = drawing(LINE, header='9 $INSUNITS 70 {}')
     assert len(millimetres(imported(tmp_path, twice.format(4)))) == 2

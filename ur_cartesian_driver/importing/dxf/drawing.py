@@ -16,12 +16,18 @@ from ur_cartesian_driver.importing.dxf.affine import (
     shifted,
     turned,
 )
-from ur_cartesian_driver.importing.dxf.dxf_records import read_records, Record
+from ur_cartesian_driver.importing.dxf.dxf_records import (
+    ENTITY_MARKER,
+    MARKER,
+    MARKERS,
+    read_records,
+    Record,
+)
 from ur_cartesian_driver.importing.dxf.dxf_terms import LeftOut, TERMS
 from ur_cartesian_driver.importing.text_file import quoted
 from ur_cartesian_driver.motion.geometry.vectors import add, scale, ZERO3
 
-_COMMENT, _NAME, _VARIABLE = 999, 2, 9
+_COMMENT, _NAME, _VARIABLE, _LAYER, _POINT = 999, 2, 9, 8, 10
 _FROZEN, _EXTERNAL = 1, (4, 8)
 _MODEL, _SHEETS = 'MODEL', ('*PAPER_SPACE', '$PAPER_SPACE')
 _MODEL_SPACES = ('*MODEL_SPACE', '$MODEL_SPACE')
@@ -29,9 +35,18 @@ _SECTIONS = (
     *('HEADER', 'CLASSES', 'TABLES', 'BLOCKS', 'ENTITIES', 'OBJECTS', 'THUMBNAILIMAGE'),
     'ACDSDATA',
 )
-#: Kinds of records that occur among entities only if the file was cut.
-_NO_ENTITIES = ('TABLE', 'ENDTAB', 'LAYER', 'BLOCK', 'ENDBLK', 'BLOCK_RECORD', 'DICTIONARY')
-#: Largest number of entities placed by blocks, and deepest nesting of blocks.
+_WITH_ENTITIES = ('BLOCKS', 'ENTITIES')
+#: The sections of the records that make a drawing; they are elsewhere only if the file was cut.
+_SECTIONS_OF = {
+    **dict.fromkeys(('TABLE', 'ENDTAB', 'LAYER', 'BLOCK_RECORD'), ('TABLES',)),
+    **dict.fromkeys(('BLOCK', 'ENDBLK'), ('BLOCKS',)),
+    **dict.fromkeys((*MARKERS, 'SEQEND'), _WITH_ENTITIES),
+    'DICTIONARY': ('OBJECTS',),
+}
+#: Markers of entities with a path, and records that have no place.
+_OF_PATHS = {marker for markers in MARKERS.values() for marker in markers}
+_NOWHERE = ('SECTION', 'ENDSEC', 'TABLE', 'ENDTAB', 'LAYER', 'ENDBLK', 'SEQEND')
+#: Largest number of placed entities of blocks, and deepest nesting of blocks.
 _MAX_PLACED, _MAX_DEPTH = 100_000, 64
 #: Maps whose axes and origin are shorter than this do not make coordinates overflow.
 _MAX_SCALE = 1e60
@@ -78,12 +93,19 @@ def read_drawing(file: Path, left_out: LeftOut) -> Drawing:
             into = found.entities if section == 'ENTITIES' else None
             if section == 'HEADER':
                 found.header = _header(record)
-        elif kind == 'ENDSEC':
+            continue
+        if section in _SECTIONS and section not in _SECTIONS_OF.get(kind, (section,)):
+            raise record.fault(f'it cannot be in the section {section}; the file is broken')
+        if section == 'BLOCKS' and into is not None and kind in ('BLOCK', 'ENDSEC'):
+            raise record.fault('the block before it has not ended; the file is broken')
+        if section in _WITH_ENTITIES or kind in _NOWHERE:
+            _refuse_two_in_one(record)
+        if kind == 'ENDSEC':
             section = ''
-        elif section in ('ENTITIES', 'BLOCKS'):
-            if kind == 'BLOCK' and section == 'BLOCKS':
+        elif section in _WITH_ENTITIES:
+            if kind == 'BLOCK':
                 into = _new_block(record, found.blocks).entities
-            elif kind == 'ENDBLK' and section == 'BLOCKS':
+            elif kind == 'ENDBLK':
                 into = None
             else:
                 _add_entity(record, into)
@@ -106,6 +128,8 @@ def _section(record: Record, before: set[str], left_out: LeftOut) -> str:
     if name not in _SECTIONS:
         left_out.add(record, 'it is no section that is known here', f'section {name}')
     before.add(name)
+    if name != 'HEADER':
+        _refuse_two_in_one(record)
     return name
 
 
@@ -130,12 +154,30 @@ def _variables(header: Record) -> Iterator[tuple[str, Record]]:
             variable.tags.append((code, value))
 
 
+def _refuse_two_in_one(record: Record) -> None:
+    """Refuse a record that goes on as an entity whose beginning is missing."""
+    kind, values = record.kind, record.values  # refuses other markers in entities with a path
+    markers = values.get(MARKER, [])
+    # Old files have no markers, but each entity has one layer.
+    second = [line for text, line in markers if text == ENTITY_MARKER][1:]
+    second += [line for _, line in values.get(_LAYER, ())[1:] if not markers]
+    if kind not in MARKERS and (kind in TERMS or kind in (*_NOWHERE, 'BLOCK')):
+        # A table is a kind of INSERT.
+        foreign = _OF_PATHS - {*MARKERS['INSERT']} if kind == 'ACAD_TABLE' else _OF_PATHS
+        second += [line for text, line in markers if text in foreign]
+    if kind in _NOWHERE:
+        second += [line for _, line in values.get(_POINT, ())]
+    if second:
+        raise record.fault(
+            'it goes on as another entity, whose beginning is missing; the file is broken',
+            min(second),
+        )
+
+
 def _add_entity(record: Record, into: list[Record] | None) -> None:
     """Add an entity, or a vertex to its polyline."""
     if into is None:
         raise record.fault('it stands between blocks, in none; the file is broken')
-    if record.kind in _NO_ENTITIES:
-        raise record.fault('it cannot be among entities; the file is broken')
     if record.kind == 'VERTEX' and into and into[-1].kind == 'POLYLINE':
         into[-1].vertices.append(record)
     elif record.kind != 'SEQEND':

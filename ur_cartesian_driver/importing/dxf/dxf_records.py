@@ -21,23 +21,25 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector3, ZERO3
 
 #: The group code under which all extended data (codes from 1000) are stored.
 EXTENDED_DATA = 1001
-_MARKER, _EMBEDDED, _APPLICATION_GROUP, _ELEVATION = 100, 101, 102, 38
+MARKER, _EMBEDDED, _APPLICATION_GROUP, _ELEVATION = 100, 101, 102, 38
 _EXTRUSION, Z_AXIS = 210, (0.0, 0.0, 1.0)
-#: Markers of subclasses, and the kinds of entities that have these markers.
-_MARKED = {
-    'AcDbLine': ('LINE',),
-    'AcDbCircle': ('ARC', 'CIRCLE'),
-    'AcDbArc': ('ARC',),
-    'AcDbEllipse': ('ELLIPSE',),
-    'AcDbPolyline': ('LWPOLYLINE',),
-    'AcDb2dPolyline': ('POLYLINE',),
-    'AcDb3dPolyline': ('POLYLINE',),
-    'AcDbVertex': ('VERTEX',),
-    'AcDbSpline': ('SPLINE', 'HELIX'),
-    'AcDbBlockReference': ('INSERT',),
-    **dict.fromkeys(('AcDbBlockBegin', 'AcDbBlockEnd', 'AcDbSymbolTableRecord'), ()),
+#: The marker of every entity, and those of the subclasses of a kind that has a path.
+ENTITY_MARKER = 'AcDbEntity'
+MARKERS = {
+    'LINE': ('AcDbLine',),
+    'ARC': ('AcDbCircle', 'AcDbArc'),
+    'CIRCLE': ('AcDbCircle',),
+    'ELLIPSE': ('AcDbEllipse',),
+    'LWPOLYLINE': ('AcDbPolyline',),
+    'POLYLINE': ('AcDb2dPolyline', 'AcDb3dPolyline', 'AcDbPolygonMesh', 'AcDbPolyFaceMesh'),
+    'VERTEX': (
+        *('AcDbVertex', 'AcDb2dVertex', 'AcDb3dPolylineVertex'),
+        *('AcDbPolygonMeshVertex', 'AcDbPolyFaceMeshVertex', 'AcDbFaceRecord'),
+    ),
+    'SPLINE': ('AcDbSpline',),
+    'HELIX': ('AcDbSpline', 'AcDbHelix'),
+    'INSERT': ('AcDbBlockReference', 'AcDbMInsertBlock'),
 }
-_KINDS_WITH_MARKERS = {kind for kinds in _MARKED.values() for kind in kinds}
 _INTEGER = re.compile(r'[-+]?[0-9]{1,15}')
 _NUMBER = re.compile(r'[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?')
 _HANDLE = re.compile(r'[0-9A-Fa-f]{1,16}')
@@ -69,19 +71,28 @@ class Record:
         return found
 
     def _in_order(self) -> Iterator[tuple[int, str, int]]:
-        inside = False
+        own = MARKERS.get(self.kind)
+        group = ''
+        seen: set[str] = set()
         for index, (code, value) in enumerate(self.tags):
+            line = self.line + 2 * index + 3
             if code == _APPLICATION_GROUP:
-                inside = value.startswith('{')
-            elif code == _EMBEDDED or (code == _MARKER and value == 'AcDbHelix'):
-                return  # later tags reuse codes; the earlier tags of a HELIX are a SPLINE
-            elif not inside:
-                line = self.line + 2 * index + 3
-                if code == _MARKER and self.kind in _KINDS_WITH_MARKERS:
-                    if self.kind not in _MARKED.get(value, (self.kind,)) or value[:4] != 'AcDb':
+                group = value if value.startswith('{') else ''
+            elif not group:
+                if code == _EMBEDDED and own is None:
+                    return  # the rest reuses codes
+                if code == MARKER and own is not None:
+                    if value in seen or value not in (ENTITY_MARKER, *own):
                         # The file was cut: this is the rest of another entity.
                         raise BrokenFile(line, f'{self.kind}: its marker {quoted(value)} is wrong')
+                    seen.add(value)
+                    if value == 'AcDbHelix':
+                        return  # the rest reuses codes; before it, a HELIX is a SPLINE
                 yield code, value, line
+        if group and own is not None:
+            raise BrokenFile(
+                self.line, f'{self.kind}: its group {quoted(group)} does not end (group code 102)'
+            )
 
     @property
     def handle(self) -> str:
