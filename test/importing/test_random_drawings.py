@@ -110,7 +110,11 @@ def test_broken_drawings_are_a_goal_or_a_sentence(tmp_path, batch):
     random = random_of('broken drawing', batch)
     options = ImportOptions(unit='mm', speed=0.1, travel_speed=1.0, tolerance=TOLERANCE)
     goals = compared = 0
-    for text in broken_texts(list(whole_files()), 100, random, together=2):
+    texts = broken_texts(list(whole_files()), 1000, random, together=2)
+    for number, text in enumerate(texts):
+        # ezdxf reads some 9 of 100 wholly, so now and then too few of the first 100.
+        if number >= 100 and compared >= 2:
+            break
         found = goal_or_sentence(tmp_path / 'a.dxf', text, options)
         if isinstance(found, str):
             continue
@@ -122,5 +126,5 @@ def test_broken_drawings_are_a_goal_or_a_sentence(tmp_path, batch):
         if ezdxf_reads_all(text):
             assert_same(goal_curves(found), theirs)
             compared += 1
-    assert goals >= 5
+    assert goals >= 0.05 * number
     assert compared >= 2
