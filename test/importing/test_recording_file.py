@@ -125,6 +125,15 @@ def test_a_column_of_another_shape_is_refused(tmp_path, recording, name):
             import_file(tmp_path / 'a.npz')
 
 
+def test_an_archive_that_leads_before_its_beginning_is_damaged(tmp_path, recording):
+    data = bytearray(recording.read_bytes())
+    data[-3] = 1  # the highest byte of the place of its directory
+    (tmp_path / 'a.npz').write_bytes(data)
+    with pytest.raises(BrokenFile) as caught:
+        import_file(tmp_path / 'a.npz')
+    assert str(caught.value) == 'the file is damaged: its arrays cannot be read.'
+
+
 @pytest.mark.random
 def test_broken_recordings_become_goals_as_numpy_reads_them_or_sentences(tmp_path, recording):
     file = tmp_path / 'a.npz'

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from errno import EINVAL
 import json
 from pathlib import Path
 from typing import Any
@@ -115,9 +116,12 @@ class Recording:
         path = Path(path)
         try:
             found = _from_folder(path, max_rows) if path.is_dir() else _from_file(path, max_rows)
-        except (OSError, _NoRecording):
+        except _NoRecording:
             raise
         except Exception as error:  # NumPy, zipfile, zlib and json each raise their own errors
+            # A changed file can lead them to a place before its beginning.
+            if isinstance(error, OSError) and error.errno != EINVAL:
+                raise
             raise ValueError(f'{path} is damaged: {error}') from error
         found._check_columns(path)
         return found
