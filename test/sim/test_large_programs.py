@@ -34,7 +34,7 @@ def test_cycles_go_on_while_a_large_program_is_compiled():
     with SimulatedRobot(SimulatorConfig(**FREE, frequency=125.0)) as robot:
         began, cycles = time.monotonic(), robot.state().timestamp
         with socket.create_connection(('127.0.0.1', robot.ports.secondary)) as client:
-            client.sendall(program(150_000).encode())
+            client.sendall(program(150_000, 'sleep(60)').encode())
             wait_for(lambda: is_playing(robot))
         passed, cycles = time.monotonic() - began, robot.state().timestamp - cycles
         assert passed > 0.2, 'compiling was too short to see anything'
