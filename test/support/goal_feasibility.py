@@ -488,6 +488,24 @@ def shortest_times(refused: Refused, i: int, piece: Piece) -> tuple[float, float
     return by_profile, least
 
 
+def _shortest_time_of_arc(refused: Refused, point: int, i: int, length: float) -> float:
+    """
+    Return how long a segment lasts outside of its blends at the speed of the arc at a point [s].
+
+    PROCESS passes a blend on an arc that touches both legs where the blend begins and ends, at
+    an unchanged speed v, and v^2 over its radius is bounded (doc/preflight.md).
+    """
+    legs = _curve(refused, point), _curve(refused, point + 1)
+    arriving, leaving = (
+        np.diff(leg.at(np.array(u))[:, :3, 3], axis=0)[0]
+        for leg, u in zip(legs, ((0.999, 1.0), (0.0, 0.001)), strict=True)
+    )
+    cosine = arriving @ leaving / np.linalg.norm(arriving) / np.linalg.norm(leaving)
+    arc_radius = refused.segment(point).blend_radius * sqrt((1.0 + cosine) / (1.0 - cosine))
+    blends = refused.segment(i).blend_radius + (refused.segment(i - 1).blend_radius if i else 0.0)
+    return (length - blends) / sqrt(refused.options.max_linear_acceleration * arc_radius)
+
+
 def _time(refused: Refused) -> str:
     i = refused.index
     pieces = follow(refused, i)
@@ -495,6 +513,9 @@ def _time(refused: Refused) -> str:
         return ''
     times = [0.0, *(point.time for point in refused.goal.waypoints)]
     time = times[i + 1] - times[i]
+    if found := re.search(r'in the blend at point (\d+), an arc', refused.text):
+        least = _shortest_time_of_arc(refused, int(found[1]), i, pieces[i].curve.length)
+        return '' if time < least * (1.0 + NEAR) else f'the arc needs no more than {least:.3f} s'
     by_profile, least = shortest_times(refused, i, pieces[i])
     # With blends it takes no longer.
     if time < by_profile * (1.0 + NEAR):
