@@ -40,7 +40,15 @@ from ur_cartesian_driver.planning.rounded.programmed_path import (
     programmed_sections,
 )
 from ur_cartesian_driver.planning.rounded.rounded_path import RoundedPath
-from ur_cartesian_driver.planning.rounded.section_law import SectionLaw, tool_rows, ToolLimits
+from ur_cartesian_driver.planning.rounded.section_law import SectionLaw, ToolLimits
+from ur_cartesian_driver.planning.rounded.tool_knots import (
+    CLOSE_ENOUGH,
+    MIN_PIECE_TIME,
+    SLOWER,
+    tool_knots,
+    tool_points,
+    TRIES,
+)
 from ur_cartesian_driver.planning.spline.joint_polynomials import (
     ANGLE_TOLERANCE_RADIUS,
     fit_joint_polynomials,
@@ -48,31 +56,22 @@ from ur_cartesian_driver.planning.spline.joint_polynomials import (
 )
 from ur_cartesian_driver.planning.spline.spline_path import solve_spline_path, SplinePath
 
-#: Shortest time of a piece [s] that robot program and sockets sustain over any number of pieces.
-MIN_PIECE_TIME = 0.02
-#: Number of shortest pieces that are joined into one at first; the result is split as necessary.
-_JOINED = 8
 #: Greatest deviation that the pieces may add to the path's own [m].
 PIECE_TOLERANCE = 1e-5
 #: Greatest such deviation as a fraction of the smallest bound of a corner.
 _PIECE_PART = 0.2
 #: Fraction of this deviation that is allowed to the tool spline; the joints get the remainder.
 _TOOL_PART = 0.3
-#: Greatest error of the acceleration, as a fraction of its limit, on pieces that can be split.
-_ACCELERATION_PART = 0.02
 #: Fraction of the jerk limit at which the law aims, because the pieces have a little more jerk.
 _JERK_PART = 0.97
 #: Corners get no larger width than the tool travels in this time [s].
 _WIDTH_TIME = 0.25
 #: Widths up to this [m] are allowed even if the tool is slower.
 _SLOW_WIDTH = 0.001
-#: Greatest number of times that the law is slowed around pieces that are too coarse.
-_TRIES = 6
-_SLOWER = 1.5
+#: A tool that travels less [m] turns on the spot, if it turns farther than this [rad].
+_NO_TRAVEL, _NO_TURN = 1e-6, 1e-6
 #: Samples inside each piece that measure its accelerations, and how far these may be above.
-_SAMPLES_INSIDE = 5
-#: Greatest acceptable ratio of these accelerations to their limits.
-_CLOSE_ENOUGH = 1.017
+_SAMPLES_INSIDE = 3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -142,15 +141,15 @@ def plan_rounded_path(
             'are all where the arm is, so there is no path whose corners could be rounded',
             'add a point elsewhere, or set corner_deviation to 0',
         )
-    for attempt in range(_TRIES + 1):
+    for attempt in range(TRIES + 1):
         motion = _fit(laws, limits, q_start, kinematics, options, tolerance)
         coarse = _coarse_times(motion, tolerance, options)
         if not len(coarse):
             _check_postures(motion, goal, targets, kinematics, options)
             return motion
-        if attempt < _TRIES:
+        if attempt < TRIES:
             for law, begin in zip(laws, motion.begins.tolist(), strict=True):
-                law.slow_around(coarse - begin, _SLOWER)
+                law.slow_around(coarse - begin, SLOWER)
     point = int(motion.path.points[np.searchsorted(motion.path.times, coarse[0, 0])])
     raise TooFast(
         point_field(point),
@@ -165,8 +164,8 @@ def _tool_limits(
 ) -> ToolLimits:
     """Return the limits of the tool on the segments (n,), from the goal and the options."""
     before = np.concatenate([[start.row()], targets[:-1]])
-    turns_only = (distance_rows(before, targets) < 1e-6) & (
-        angle_rows(before[:, 3:], targets[:, 3:]) > 0.0
+    turns_only = (distance_rows(before, targets) < _NO_TRAVEL) & (
+        angle_rows(before[:, 3:], targets[:, 3:]) > _NO_TURN
     )
     segments = goal.motions
     twists = np.linalg.norm(goal.waypoints.twists[:, :3], axis=1)
@@ -200,10 +199,10 @@ def _fit(
     options: PlanningOptions,
     tolerance: float,
 ) -> RoundedMotion:
+    knots = [tool_knots(law, _TOOL_PART * tolerance) for law in laws]
+    tool = [tool_points(law, t) for law, t in zip(laws, knots, strict=True)]
     durations = np.array([law.duration for law in laws])
     begins = np.cumsum(durations) - durations
-    knots = [_knots(law, _TOOL_PART * tolerance) for law in laws]
-    tool = [_tool_at(law, t) for law, t in zip(laws, knots, strict=True)]
     # The first row of a section is left out if it repeats the last one of the section before.
     join = [slice(1 if i else 0, None) for i in range(len(laws))]
     spline = ToolSpline.through(
@@ -244,76 +243,6 @@ def _fit(
     )
 
 
-def _knots(law: SectionLaw, tolerance: float) -> Floats:
-    """Return the knots [s] between which quintics follow the tool, as few as possible."""
-    count = max(1, int(law.duration / MIN_PIECE_TIME))
-    step = law.duration / count
-    # The first piece is short, so that an output can be sent soon after the start.
-    ends = np.unique(np.concatenate([[0, 1], np.arange(_JOINED, count, _JOINED), [count]]))
-    open_rows = np.arange(len(ends) - 1)
-    while len(open_rows):
-        sizes = np.diff(ends)[open_rows]
-        open_rows = open_rows[sizes > 1]
-        if not len(open_rows):
-            break
-        coarse = _deviations(law, step * ends, open_rows, tolerance) > 1.0
-        split = open_rows[coarse]
-        middle = (ends[split] + ends[split + 1]) // 2
-        ends = np.insert(ends, split + 1, middle)
-        moved = split + np.arange(len(split))
-        open_rows = np.sort(np.concatenate([moved, moved + 1]))
-    times: Floats = step * ends
-    times[-1] = law.duration
-    return times
-
-
-def _deviations(law: SectionLaw, times: Floats, rows: Indices, tolerance: float) -> Floats:
-    """
-    Return the deviations of quintics from the law (r,), as fractions of their bounds.
-
-    :param times: the knots of the quintics [s].
-    :param rows: (r,) the knot at which each quintic begins.
-    :param tolerance: bound on the position [m]; for turns, on the arc at ANGLE_TOLERANCE_RADIUS.
-    """
-    ends = np.unique(np.concatenate([rows, rows + 1]))
-    # The spline also has pieces across the gaps between ``rows``; these are not compared.
-    spline = ToolSpline.through(_tool_at(law, times[ends]))
-    part = np.arange(1, _JOINED) / _JOINED
-    t = (times[rows][:, None] + np.diff(times)[rows][:, None] * part).ravel()
-    exact = _tool_at(law, t)
-    number = np.repeat(np.searchsorted(ends, rows), len(part))
-    made = spline.rows(number, t - spline.times[number])
-    error = made.accelerations - exact.accelerations
-    linear, angular = law.acceleration_bounds(t)
-    off = np.maximum.reduce(
-        [
-            distance_rows(exact.poses, made.poses) / tolerance,
-            ANGLE_TOLERANCE_RADIUS * angle_rows(exact.poses[:, 3:], made.poses[:, 3:]) / tolerance,
-            np.linalg.norm(error[:, :3], axis=1) / (_ACCELERATION_PART * linear),
-            np.linalg.norm(error[:, 3:], axis=1) / (_ACCELERATION_PART * angular),
-        ]
-    )
-    largest: Floats = off.reshape(len(rows), -1).max(axis=1)
-    return largest
-
-
-def _tool_at(law: SectionLaw, t: Floats) -> ToolPoints:
-    """Return pose and rates of the tool at times (m,) since the beginning of the section [s]."""
-    s, v, a = law.law.at(t)
-    rows = law.path.rows(s)
-    poses, w1, w2 = tool_rows(rows)
-    v, a = v[:, None], a[:, None]
-    first = np.concatenate([rows.d1[:, :3], w1], axis=1)
-    second = np.concatenate([rows.d2[:, :3], w2], axis=1)
-    return ToolPoints(
-        times=t,
-        poses=poses,
-        twists=first * v,
-        accelerations=first * a + second * v * v,
-        quintic=True,
-    )
-
-
 class Places:
     """Finds the segment on which the tool is at a given time."""
 
@@ -347,7 +276,7 @@ def _coarse_times(motion: RoundedMotion, tolerance: float, options: PlanningOpti
     pieces = motion.polynomials
     bounds = (1.0 - _TOOL_PART) * tolerance * np.array([1.0, 1.0 / ANGLE_TOLERANCE_RADIUS])
     coarse = (pieces.deviations > bounds).any(axis=1)
-    coarse |= _acceleration_excess(motion, options) > _CLOSE_ENOUGH
+    coarse |= _acceleration_excess(motion, options) > CLOSE_ENOUGH
     return np.stack([pieces.times[:-1][coarse], pieces.times[1:][coarse]], axis=1)
 
 

@@ -48,15 +48,17 @@ _MIN_WINDOW = 0.02
 #: The square of the acceleration along the path, as a part of speed times jerk.
 _RAMP_PART = 0.35
 #: Fraction of the acceleration limits at which the law aims, because averaging adds a little.
-_AIM = 0.985
+_AIM = 0.975
 #: How often limits are tightened; the power of the excess by which they are, a smaller one where
 #: the excess is far from 1, because jerk grows with a higher power of the speed; an extra factor;
 #: and the excess that is close enough.
 _ROUNDS = 8
 _FAR, _LESS, _MORE, _EXTRA = 2.0, 0.6, 1.5, 1.01
-CLOSE = 1.01
+CLOSE = 1.0
 #: Samples while the window of the average passes a place at which limits change.
 _AROUND = 13
+#: Time between anchors [s].
+_ANCHOR_TIME = 2.0
 #: Times before and after a sample between which its jerk is measured [s].
 _JERK_STEP = 0.002
 _TINY = 1e-12
@@ -188,6 +190,8 @@ class SectionLaw:
         #: Factor by which limits are tightened at each place if the averaged law exceeds them.
         self._tightened = np.ones(m)
         self.law = self._fitted()
+        #: Places, about :data:`_ANCHOR_TIME` apart, at which a grid of pieces begins anew.
+        self.anchors = self.law.at(np.arange(_ANCHOR_TIME, self.duration - 1.0, _ANCHOR_TIME)).s
 
     @property
     def duration(self) -> float:
@@ -199,9 +203,9 @@ class SectionLaw:
         """The requested speed of the tool at each place (m,) [m/s]."""
         return self._limits_at.speeds
 
-    def acceleration_bounds(self, t: Floats) -> tuple[Floats, Floats]:
-        """Return the largest accelerations of the tool at times (m,) [m/s^2], [rad/s^2]."""
-        row = self._rows(self.law.at(t).s)
+    def acceleration_limits(self, s: Floats) -> tuple[Floats, Floats]:
+        """Return the limits of the tool's acceleration at places (m,) [m/s^2], [rad/s^2]."""
+        row = self._rows(s)
         return self._tool.accelerations[row], self._tool.turn_accelerations[row]
 
     def _rows(self, s: Floats) -> Indices:

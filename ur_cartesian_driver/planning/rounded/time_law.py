@@ -17,9 +17,10 @@ reaches (:func:`lowered_over`).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from math import inf, sqrt
-from typing import NamedTuple, TypeAlias
+from math import inf
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +29,8 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 # Number of halvings in a bisection.
 _HALVINGS = 30
 _TINY = 1e-12
+# Whether a time just within reach counts must not depend on rounding errors [s].
+_NO_TIME = 1e-9
 # Newton's method finds times of places, unless the law nearly rests there [1/s].
 _NEWTON_STEPS = 4
 _NO_SPEED = 1e-9
@@ -47,9 +50,6 @@ class LawLimits:
     bound: Floats
     #: For each vector of the tool: x' (m, 3), x'' (m, 3) and a (m,) in |x' u + x'' y| <= a.
     vectors: tuple[tuple[Floats, Floats, Floats], ...]
-
-
-_Row: TypeAlias = tuple[list[tuple[float, float]], list[tuple[float, float, float]]]
 
 
 class _Bounds:
@@ -86,7 +86,7 @@ class _Bounds:
         matter: Flags = ~(reached <= limits.bound).all(axis=0)
         return matter
 
-    def take(self, rows: Indices) -> _Bounds:
+    def take(self, rows: Indices | slice) -> _Bounds:
         """Return the bounds at some places."""
         found = object.__new__(_Bounds)
         found.c, found.d = self.c[rows], self.d[rows]
@@ -94,14 +94,6 @@ class _Bounds:
             [each[rows] for each in one] for one in (self.r, self.m, self.n)
         )
         return found
-
-    def row(self, i: int) -> _Row:
-        """Return the numbers of one place: c, d of each joint, and r, m, n of each vector."""
-        joints = list(zip(self.c[i].tolist(), self.d[i].tolist(), strict=True))
-        return joints, [
-            (float(r[i]), float(m[i]), float(n[i]))
-            for r, m, n in zip(self.r, self.m, self.n, strict=True)
-        ]
 
     def range(self, y: Floats) -> tuple[Floats, Floats]:
         """Return least and largest u (m,) at each place; NaN or least > largest = none allowed."""
@@ -111,6 +103,21 @@ class _Bounds:
             root = np.sqrt(np.where(n * y <= r, r * r - (n * y) ** 2, np.nan))
             high, low = np.minimum(high, root - m * y), np.maximum(low, -root - m * y)
         return low, high
+
+    def largest_before(self, step: Floats, after: Floats) -> Floats:
+        """Return the largest y (m,) from which a step leads to at most ``after``."""
+        with np.errstate(divide='ignore', invalid='ignore'):
+            rate = 1.0 - step[:, None] * self.d
+            reached = (after[:, None] + step[:, None] * self.c) / rate
+            largest = np.where(rate > 0.0, reached, inf).min(axis=1, initial=inf)
+            for r, m, n in zip(self.r, self.m, self.n, strict=True):
+                # (1 - step m) y - step sqrt(r^2 - n^2 y^2) <= after, for any y unless 1 > step m
+                a, b = 1.0 - step * m, step * n
+                square = a * a + b * b
+                root = np.sqrt(square * (step * r) ** 2 - (b * after) ** 2)
+                largest = np.fmin(largest, np.where(a > 0.0, (a * after + root) / square, inf))
+        found: Floats = largest
+        return found
 
 
 def fastest_law(s: Floats, limits: LawLimits) -> Floats:
@@ -123,8 +130,12 @@ def fastest_law(s: Floats, limits: LawLimits) -> Floats:
     y = _possible(bounds, limits.speed**2)
     y[0] = y[-1] = 0.0
     step = 2.0 * np.diff(s)
-    y = _slow_down(bounds, y, step)
-    return _speed_up(bounds, y, step)
+    y = _lowered(y, lambda row, after: bounds.take(row).largest_before(step[row], after))
+    back, step_back = bounds.take(slice(None, None, -1)), step[::-1]
+    return _lowered(
+        y[::-1],
+        lambda row, before: before + step_back[row] * back.take(row + 1).range(before)[1],
+    )[::-1]
 
 
 def _possible(bounds: _Bounds, y: Floats) -> Floats:
@@ -145,71 +156,32 @@ def _possible(bounds: _Bounds, y: Floats) -> Floats:
     return found
 
 
-def _slow_down(bounds: _Bounds, y: Floats, step: Floats) -> Floats:
-    """Return the given y (m,), lowered until the arm can slow down from each to the next."""
-    low, _ = bounds.range(y)
-    steep = np.flatnonzero(y[:-1] + step * low[:-1] > y[1:])
-    result: list[float] = y.tolist()
-    steps = step.tolist()
-    done = len(result)
-    for start in steep[::-1].tolist():
-        i = start
-        while 0 <= i < done:
-            lower = _largest_before(bounds.row(i), steps[i], result[i + 1])
-            if lower >= result[i]:
-                break
-            result[i] = lower
-            i -= 1
-        done = min(done, i + 1) if i < start else done
-    return np.array(result)
+def _lowered(y: Floats, reachable: Callable[[Indices, Floats], Floats]) -> Floats:
+    """
+    Return the given y (m,), lowered until the step between each and the next is possible.
 
+    All ramps are followed at the same time, each from its lower end and a row at a time.
 
-def _speed_up(bounds: _Bounds, y: Floats, step: Floats) -> Floats:
-    """Return the given y (m,), lowered where the arm cannot speed up to them in time."""
-    _, high = bounds.range(y)
-    steep = np.flatnonzero(y[:-1] + step * high[:-1] < y[1:])
-    result: list[float] = y.tolist()
-    steps = step.tolist()
-    last = len(result) - 1
-    done = -1
-    for start in steep.tolist():
-        i = start
-        if i <= done:
-            continue
-        while i < last:
-            reached = max(result[i] + steps[i] * _largest_u(bounds.row(i), result[i]), 0.0)
-            if reached >= result[i + 1]:
-                break
-            result[i + 1] = reached
-            i += 1
-        done = i - 1
-    return np.array(result)
+    :param reachable: returns the largest y in rows (r,) from which, or to which, a step leads from
+        the y (r,) in the rows after them.
+    """
+    y = y.copy()
 
+    def largest(rows: Indices) -> Floats:
+        return np.maximum(reachable(rows, y[rows + 1]), 0.0)
 
-def _largest_u(row: _Row, y: float) -> float:
-    joints, vectors = row
-    high = min([c - d * y for c, d in joints], default=inf)
-    for r, m, n in vectors:
-        high = min(high, sqrt(max(r * r - n * n * y * y, 0.0)) - m * y)
-    return high
-
-
-def _largest_before(row: _Row, step: float, after: float) -> float:
-    """Return the largest y from which a step leads to ``after`` or less."""
-    joints, vectors = row
-    largest = inf
-    for c, d in joints:
-        rate = 1.0 - step * d
-        if rate > 0.0:
-            largest = min(largest, (after + step * c) / rate)
-    for r, m, n in vectors:
-        # (1 - step m) y - step sqrt(r^2 - n^2 y^2) <= after
-        a, b = 1.0 - step * m, step * n
-        square = a * a + b * b
-        root = square * step * step * r * r - b * b * after * after
-        if root >= 0.0 and square > 0.0:
-            largest = min(largest, (a * after + sqrt(root)) / square)
-    return max(largest, 0.0)
+    every = np.arange(len(y) - 1)
+    while True:
+        falls = largest(every) < y[:-1] - _TINY
+        rows = np.flatnonzero(falls & ~np.append(falls[1:], False))
+        if not len(rows):
+            return y
+        while len(rows):
+            lower = largest(rows)
+            falls = lower < y[rows] - _TINY
+            rows = rows[falls]
+            y[rows] = lower[falls]
+            rows = rows[rows > 0] - 1
 
 
 class PathTimes(NamedTuple):
@@ -286,6 +258,7 @@ def lowered_over(values: Floats, times: Floats, reach: float) -> Floats:
     :param values: (m,) the value at each time.
     :param times: (m,) not decreasing [s].
     """
+    reach += _NO_TIME
     low = np.searchsorted(times, times - reach, side='left')
     high = np.searchsorted(times, times + reach, side='right')
     # Two ranges of 2^k values cover each range, so its least value is the lesser of theirs.
