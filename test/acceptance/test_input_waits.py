@@ -31,7 +31,7 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 ARM, OPTIONS = Arm(robot_model('ur5e')), PlanningOptions(max_tool_speed=1.0)
-MODES = (ExecutionMode.PRIMITIVES, ExecutionMode.SPLINE)
+MODES = (ExecutionMode.PRIMITIVES, ExecutionMode.SPLINE, ExecutionMode.SERVO)
 #: The torch, and the input that says that its arc burns.
 TORCH, ARC = 1, 3
 DIGITAL = InputWait(waypoint=0, input=InputKind.STANDARD_DIGITAL, pin=ARC, value=1.0, timeout=1.0)
