@@ -96,7 +96,7 @@ def is_on(cell, pin=2):
 
 @pytest.mark.parametrize(
     ('headless', 'execution'),
-    [(True, 'PRIMITIVES'), (False, 'PRIMITIVES'), (True, 'SPLINE')],
+    [(True, 'PRIMITIVES'), (False, 'PRIMITIVES'), (True, 'SPLINE'), (True, 'SERVO')],
 )
 def test_the_arm_stands_until_the_function_returns(run, start, headless, execution):
     async def scenario(cell):

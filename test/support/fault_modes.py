@@ -437,6 +437,54 @@ SERVO_AT_A_POINT = _mode(
     continued=(),
 )
 
+SERVO_OUTPUTS = _mode(
+    'Outputs, SERVO',
+    'Set-points around rounded corners, with an output at the second corner, one after the end, and '
+    'an analog one that follows the speed. What becomes of them is as in PRIMITIVES.',
+    {
+        'before the trigger pose': 'before the output at the second corner',
+        'before the time': 'the arm is at rest at the last point, an output is pending',
+        'cancelling': 'the driver has left the mode of set-points, the arm still moves',
+    },
+    3.0,
+    {
+        'an operator pauses the program': _STAYS_PAUSED,
+        'the speed slider is moved to 0': {
+            'before the time': {'waits': False, 'steps': ('move the slider up',)}
+        },
+    },
+    faults=(
+        'protective stop',
+        'emergency stop',
+        'an operator stops the program',
+        'an operator pauses the program',
+        'the speed slider is moved to 0',
+        'the network cable is cut',
+        "the program's sockets are cut",
+        'the node is silent',
+    ),
+    pendant=('protective stop',),
+    continued=(),
+)
+
+SERVO_WAITS = _mode(
+    'Waits, SERVO',
+    'Set-points that are held while the robot program waits for an input, which comes 0.4 s after '
+    'the fault.',
+    {'waiting for an input': 'the arm rests at the second point, the input has not come'},
+    4.0,
+    {'an operator pauses the program': _STAYS_PAUSED},
+    faults=(
+        'protective stop',
+        'an operator stops the program',
+        'an operator pauses the program',
+        'the network cable is cut',
+        'the node is silent',
+    ),
+    pendant=('protective stop',),
+    continued=(),
+)
+
 SCRIPTS = replace(
     _mode(
         'Scripts',
@@ -586,6 +634,8 @@ MODES = (
     OUTPUTS,
     AT_A_POINT,
     SERVO_AT_A_POINT,
+    SERVO_OUTPUTS,
+    SERVO_WAITS,
     SCRIPTS,
     PRESS,
     FREEDRIVE,
