@@ -274,9 +274,7 @@ def test_the_arm_waits_in_the_middle_of_the_path_and_at_its_end(displaced):
 
     async def scenario(cell):
         waits = tuple(
-            InputWait(
-                waypoint=k, input=InputKind.STANDARD_DIGITAL, pin=k, value=1.0, timeout=5.0
-            )
+            InputWait(waypoint=k, input=InputKind.STANDARD_DIGITAL, pin=k, value=1.0, timeout=5.0)
             for k in (1, 2)
         )
         segment = Segment(velocity=SPEED, acceleration=1.0)

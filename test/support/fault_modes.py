@@ -439,8 +439,8 @@ SERVO_AT_A_POINT = _mode(
 
 SERVO_OUTPUTS = _mode(
     'Outputs, SERVO',
-    'Set-points around rounded corners, with an output at the second corner, one after the end, and '
-    'an analog one that follows the speed. What becomes of them is as in PRIMITIVES.',
+    'Set-points around rounded corners, with an output at the second corner, one after the end, '
+    'and an analog one that follows the speed. What becomes of them is as in PRIMITIVES.',
     {
         'before the trigger pose': 'before the output at the second corner',
         'before the time': 'the arm is at rest at the last point, an output is pending',

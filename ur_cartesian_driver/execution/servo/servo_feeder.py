@@ -14,10 +14,10 @@ goal (:mod:`~ur_cartesian_driver.execution.goal.goal_transitions`) then mean:
 * in CANCELLING the mode IDLE is written instead of a CANCEL; the program answers by leaving the
   servo.
 
-A goal that does more along its path than move is also sent as points (:mod:`~..points.point_feeder`):
-the robot program switches outputs, waits and calls functions as along any spline, but the
-set-points lead the arm. While it does something at a point, the set-points are held there, until it
-has begun the next motion.
+A goal that does more along its path than move is also sent as points
+(:mod:`~ur_cartesian_driver.execution.points.point_feeder`): the robot program switches outputs,
+waits and calls functions as along any spline, but the set-points lead the arm. While it does
+something at a point, the set-points are held there, until it has begun the next motion.
 
 At the end of every goal, successful or not, the robot program is told to brake and stop reading,
 and the inputs are released.
@@ -90,7 +90,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         self._points = PointFeeder(monitor) if monitor.job.has_events else None
         self._holds = deque(monitor.job.holds)
         self._stopped_time = 0.0
-        self._set_next_hold(0.0)
+        self.stream.hold_time = self._next_hold()
 
     # ---- before the motion --------------------------------------------------------------------
 
@@ -158,7 +158,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         return [] if row is None else [WriteInputs(values=row)]
 
     def feed(self, event: Event, now: float) -> list[GoalCommand]:
-        """Answer a packet of the servo's registers with a write, and a state packet with points."""
+        """Answer a packet of the servo's registers with a write, and others with points."""
         if not isinstance(event, ServoReceived):
             self._end_hold()
             return [] if self._points is None else self._points.feed(event, now)
@@ -177,15 +177,15 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
             commands.append(EnterServo())
         return commands
 
-    def _set_next_hold(self, rest: float) -> None:
-        self.stream.go_on(rest, self._holds[0].begin if self._holds else inf)
+    def _next_hold(self) -> float:
+        return self._holds[0].begin if self._holds else inf
 
     def _end_hold(self) -> None:
         """Go on once the robot program is done at a point; the time there is no delay."""
         stream = self.stream
         if self._holds and self.monitor.motions_begun >= self._holds[0].motions:
             hold = self._holds.popleft()
-            self._set_next_hold(hold.end - hold.begin)
+            stream.go_on(hold.end - hold.begin, self._next_hold())
         self.monitor.start_delay += stream.stopped_time - self._stopped_time
         self._stopped_time = stream.stopped_time
 

@@ -28,7 +28,8 @@ class SetpointSource(Protocol):
         """
 
     def skip(self, rest: float) -> None:
-        """Leave out the next ``rest`` seconds, in which the path rests."""
+        """Leave out the next ``rest`` seconds, in which the path rests; most have no rests."""
+        return
 
     @property
     def done(self) -> bool:

@@ -35,8 +35,8 @@ The sender must
   with STREAM_END, or with the CANCEL of a stream;
 * end or cancel a stream before the next START; otherwise the new points extend the stream.
 
-``BUFFERED_SERVO`` is a mode of our own robot program. The pieces of its trajectories are not run but
-awaited: the set-points lead the arm along them.
+``BUFFERED_SERVO`` is a mode of our own robot program. The pieces of its trajectories are not run,
+but awaited: the set-points lead the arm along them.
 Word 3 of START exists only in our own program, too; URCL leaves it 0.
 Streams came with URCL 2.14; older programs ignore them. All other words have had the same place
 and scale since URCL 2.0.

@@ -18,7 +18,7 @@ import numpy as np
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows, ReferencePath
-from ur_cartesian_driver.motion.plan.primitive import still_spline, Wait
+from ur_cartesian_driver.motion.plan.primitive import Spline, still_spline, Wait
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_spline,
@@ -102,9 +102,11 @@ class Stops:
         primitives = list(segments.primitives)
         places = at + np.arange(len(at))
         for row, stop in zip(places.tolist(), stops, strict=True):
-            if only_rests and isinstance(stop, Wait):
-                stop = still_spline(primitives[row - 1], stop.duration)
-            primitives.insert(row, stop)
+            before = primitives[row - 1]
+            if only_rests and isinstance(stop, Wait) and isinstance(before, Spline):
+                primitives.insert(row, still_spline(before, stop.duration))
+            else:
+                primitives.insert(row, stop)
         lines = segments.report_lines
 
         def with_stops() -> list[str]:
