@@ -552,8 +552,8 @@ def servo_output_plan(start, values):
     made = output_plan(start, values).goal
     goal = Goal(
         waypoints=tuple(Waypoint(pose=point.pose) for point in made.waypoints),
-        segments=(Segment(velocity=0.2, acceleration=1.0),) * len(made.waypoints),
-        corner_deviation=0.001,
+        segments=(Segment(velocity=0.25, acceleration=1.0),) * len(made.waypoints),
+        corner_deviation=0.004,
         execution=ExecutionMode.SERVO,
         io_commands=made.io_commands,
         proportional_outputs=made.proportional_outputs,

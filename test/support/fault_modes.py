@@ -449,8 +449,18 @@ SERVO_OUTPUTS = _mode(
     3.0,
     {
         'an operator pauses the program': _STAYS_PAUSED,
+        'the network cable is cut': {'': {'steps': (*_PLUGGED_IN, 'resend')}},
         'the speed slider is moved to 0': {
             'before the time': {'waits': False, 'steps': ('move the slider up',)}
+        },
+        # servoj creeps up to the last set-point for a second before the arm stands for two.
+        **{
+            fault: {
+                '': {'result_within': 6.0, 'rest_within': 3.0},
+                # The registers tell, too, that the program has left the set-points.
+                'cancelling': {'state_after': S.READY},
+            }
+            for fault in ("the program's answers are lost", 'the trajectory socket is half-open')
         },
     },
     faults=(
@@ -461,6 +471,8 @@ SERVO_OUTPUTS = _mode(
         'the speed slider is moved to 0',
         'the network cable is cut',
         "the program's sockets are cut",
+        "the program's answers are lost",
+        'the trajectory socket is half-open',
         'the node is silent',
     ),
     pendant=('protective stop',),
@@ -473,7 +485,7 @@ SERVO_WAITS = _mode(
     'the fault.',
     {'waiting for an input': 'the arm rests at the second point, the input has not come'},
     4.0,
-    {'an operator pauses the program': _STAYS_PAUSED},
+    {'the network cable is cut': {'': {'steps': (*_PLUGGED_IN, 'resend')}}},
     faults=(
         'protective stop',
         'an operator stops the program',

@@ -233,8 +233,13 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         return self.monitor.records.count_until(time) if time > 0.0 else 0
 
     def is_read(self, now: float) -> bool:
-        """Return whether the robot program has lately read a set-point."""
-        return now - self._last_answer < ANSWER_TIMEOUT
+        """
+        Return whether the robot program has lately read a set-point.
+
+        That alone does not show that it still does something along the path.
+        """
+        is_alone = self._points is None or self.stream.is_held
+        return is_alone and now - self._last_answer < ANSWER_TIMEOUT
 
     def has_arrived(self, packet: RobotState) -> bool:
         """Return whether the target is at the last set-point, which servoj may overshoot."""
