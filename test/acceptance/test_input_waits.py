@@ -144,9 +144,10 @@ def test_the_level_of_an_analog_input_counts(kind, below):
     run_cell(scenario)
 
 
-def test_a_pause_does_not_count_as_waiting():
+@pytest.mark.parametrize('execution', MODES, ids=lambda mode: mode.name)
+def test_a_pause_does_not_count_as_waiting(execution):
     async def scenario(cell):
-        motion, _ = start(cell)
+        motion, _ = start(cell, execution)
         await cell.until(lambda: torch(cell))
         cell.robot.inject('pause')
         controller = cell.robot.controller
@@ -162,11 +163,12 @@ def test_a_pause_does_not_count_as_waiting():
     run_cell(scenario)
 
 
-def test_the_payload_changes_where_the_arm_stands():
+@pytest.mark.parametrize('execution', MODES, ids=lambda mode: mode.name)
+def test_the_payload_changes_where_the_arm_stands(execution):
     async def scenario(cell):
         payload = PayloadChange(waypoint=0, mass=1.25, center_of_gravity=(0.0, 0.01, 0.06))
         before = cell.robot.controller.payload.mass
-        motion, is_at = start(cell, payload_changes=(payload,))
+        motion, is_at = start(cell, execution, payload_changes=(payload,))
         await cell.until(lambda: torch(cell))
         assert cell.robot.controller.payload.mass == before
         inputs(cell)[ARC] = True
