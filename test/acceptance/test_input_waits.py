@@ -6,6 +6,8 @@ The arm waits at a point for an input, or ends there; payloads change where it s
 Places and times are read from RTDE, the payload from the controller; all in virtual time.
 """
 
+from dataclasses import replace
+
 import pytest
 from robot_cell import run_cell
 
@@ -85,6 +87,20 @@ def test_the_arm_goes_on_when_the_input_has_come(execution):
         # The wait is no delay of the motion: the tolerance of its time is less.
         assert motion.outcome.succeeded, motion.outcome.text
         assert is_at(1)
+
+    run_cell(scenario)
+
+
+@pytest.mark.parametrize('execution', MODES, ids=lambda mode: mode.name)
+def test_a_wait_at_the_last_point_is_no_delay_either(execution):
+    async def scenario(cell):
+        motion, is_at = start(cell, execution, replace(DIGITAL, waypoint=1, timeout=5.0))
+        await cell.until(lambda: is_at(1), 3.0)
+        await cell.sleep(1.5)
+        assert not motion.outcome
+        inputs(cell)[ARC] = True
+        await cell.until(lambda: motion.outcome, 0.5)
+        assert motion.outcome.succeeded, motion.outcome.text
 
     run_cell(scenario)
 

@@ -395,6 +395,8 @@ class ServoStream:
         """Make the set-point of the next write, which covers ``steps`` control steps."""
         moves, time = self.phase is ServoPhase.SERVOING, steps * self._clock.step
         passed = self._motion_rate * time if moves else 0.0
+        if self._recovers:
+            self.held_time += time - passed
         if self.source_time + passed >= self.hold_time:
             reached = max(0.0, self.hold_time - self.source_time)
             self.stopped_time += passed - reached
@@ -404,12 +406,10 @@ class ServoStream:
         self.source_time += passed
         self._moved_time += passed
         self._state_time += time
-        if self._recovers:
-            self.held_time += time - passed
         setpoint = _Setpoint(self._sequence, self._state_time, self.source_time)
         self._unread.append(setpoint)
         self._unfinished.append(setpoint)
-        if moves and self._source.done:
+        if moves and self._source.done and self.hold_time == inf:
             self._apply(ServoEvent.AT_END)
 
     def _apply(self, change: ServoEvent) -> None:
