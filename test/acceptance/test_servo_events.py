@@ -9,6 +9,7 @@ switch follows from the points of the goal. Nothing is taken from the plan.
 
 import asyncio
 from dataclasses import replace
+import os
 
 import numpy as np
 import pytest
@@ -45,6 +46,8 @@ SPEED, DEVIATION, ACROSS = 0.1, 0.001, 0.002
 PLACES = ((0.0, 0.05), (0.06, 0.05), (0.1, 0.05))
 #: The valve, the lamp that goes on 0.1 s behind the middle of the line, the light at the end.
 VALVE, LAMP, LIGHT, NOTHING = 1, 2, 3, 4
+#: How many random paths are drawn.
+SEEDS = int(os.environ.get('SERVO_EVENTS', '2'))
 #: Set-points, servoj and a cycle bend times by no more than this [m].
 BOUND = 3e-4
 FIELDS = (
@@ -134,13 +137,16 @@ class Recorded:
     def table(self):
         return np.array(self.rows)
 
-    def switched(self, pin, on=True):
-        """Return where the tool is in the first packet with an output at its new value (3,)."""
-        table = self.table
-        states = table[:, 6].astype(int) >> pin & 1
+    def row(self, pin, on=True):
+        """Return the number of the first packet with an output at its new value."""
+        states = self.table[:, 6].astype(int) >> pin & 1
         (changes,) = np.nonzero(np.diff(states) == (1 if on else -1))
         assert len(changes) == 1, (pin, changes)
-        return table[changes[0] + 1, 1:4]
+        return int(changes[0]) + 1
+
+    def switched(self, pin, on=True):
+        """Return where the tool is in that packet (3,)."""
+        return self.table[self.row(pin, on), 1:4]
 
 
 @pytest.mark.parametrize('slider', [1.0, 0.5, 0.1])
@@ -169,6 +175,47 @@ def test_outputs_switch_where_the_tool_is_beside_its_path(slider):
     assert run.switched(LIGHT)[:2] == pytest.approx(PLACES[-1], abs=1e-4)
     speeds = run.table[:, 4]
     assert speeds.max() == pytest.approx(SPEED * slider, rel=0.05)
+
+
+def wandering(seed, count=9):
+    """Return points of a path with corners of 20 to 150 degrees, in a square of 16 cm [m]."""
+    rng, points, heading = np.random.default_rng(seed), [np.zeros(2)], 0.0
+    while len(points) <= count:
+        turn = heading + np.radians(rng.uniform(20.0, 150.0)) * rng.choice((-1.0, 1.0))
+        there = points[-1] + rng.uniform(0.025, 0.04) * np.array([np.cos(turn), np.sin(turn)])
+        if np.abs(there).max() < 0.08:
+            points, heading = [*points, there], turn
+    return points[1:]
+
+
+@pytest.mark.parametrize('seed', range(SEEDS))
+def test_outputs_switch_in_the_middle_of_random_corners(seed):
+    async def scenario(cell):
+        (x, y, z), turned = (
+            cell.memory.read().actual_tcp_pose.position,
+            cell.memory.read().actual_tcp_pose.quaternion,
+        )
+        run = await Recorded(
+            cell,
+            waypoints=tuple(
+                Waypoint(pose=Pose((x + dx, y + dy, z), turned)) for dx, dy in wandering(seed)
+            ),
+            segments=(Segment(velocity=SPEED, acceleration=1.0),) * 9,
+            io_commands=tuple(command(pin, pin) for pin in range(8)),
+            path_offset=PathOffset(),
+        ).start()
+        outcome = await run.end()
+        assert outcome.code is ErrorCode.SUCCESSFUL, outcome
+        return run
+
+    run = run_cell(scenario)
+    corners, places = np.array(wandering(seed)), run.table[:, 1:3]
+    rows = [run.row(pin) for pin in range(8)]
+    assert rows == sorted(rows)
+    for corner, row in zip(corners, rows, strict=False):
+        near = places[max(row - 40, 0) : row + 40]
+        middle = near[np.argmin(np.linalg.norm(near - corner, axis=1))]
+        assert np.linalg.norm(places[row] - middle) < SPEED * CYCLE + BOUND
 
 
 @pytest.mark.parametrize('gap', [0.03, 0.1])
