@@ -150,6 +150,7 @@ def unbuffered(slider: float, seconds: float, late: int = 0) -> Result:
             *q,
             *(0.3,) * 6,
             number * CYCLE,
+            0.0,  # the time of the motion, which the guide's program does not read
         )
 
     experiment.run(take, seconds, late)
