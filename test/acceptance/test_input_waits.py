@@ -6,6 +6,8 @@ The arm waits at a point for an input, or ends there; payloads change where it s
 Places and times are read from RTDE, the payload from the controller; all in virtual time.
 """
 
+from dataclasses import replace
+
 import pytest
 from robot_cell import run_cell
 
@@ -31,7 +33,7 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 ARM, OPTIONS = Arm(robot_model('ur5e')), PlanningOptions(max_tool_speed=1.0)
-MODES = (ExecutionMode.PRIMITIVES, ExecutionMode.SPLINE)
+MODES = (ExecutionMode.PRIMITIVES, ExecutionMode.SPLINE, ExecutionMode.SERVO)
 #: The torch, and the input that says that its arc burns.
 TORCH, ARC = 1, 3
 DIGITAL = InputWait(waypoint=0, input=InputKind.STANDARD_DIGITAL, pin=ARC, value=1.0, timeout=1.0)
@@ -85,6 +87,20 @@ def test_the_arm_goes_on_when_the_input_has_come(execution):
         # The wait is no delay of the motion: the tolerance of its time is less.
         assert motion.outcome.succeeded, motion.outcome.text
         assert is_at(1)
+
+    run_cell(scenario)
+
+
+@pytest.mark.parametrize('execution', MODES, ids=lambda mode: mode.name)
+def test_a_wait_at_the_last_point_is_no_delay_either(execution):
+    async def scenario(cell):
+        motion, is_at = start(cell, execution, replace(DIGITAL, waypoint=1, timeout=5.0))
+        await cell.until(lambda: is_at(1), 3.0)
+        await cell.sleep(1.5)
+        assert not motion.outcome
+        inputs(cell)[ARC] = True
+        await cell.until(lambda: motion.outcome, 0.5)
+        assert motion.outcome.succeeded, motion.outcome.text
 
     run_cell(scenario)
 
@@ -144,9 +160,10 @@ def test_the_level_of_an_analog_input_counts(kind, below):
     run_cell(scenario)
 
 
-def test_a_pause_does_not_count_as_waiting():
+@pytest.mark.parametrize('execution', MODES, ids=lambda mode: mode.name)
+def test_a_pause_does_not_count_as_waiting(execution):
     async def scenario(cell):
-        motion, _ = start(cell)
+        motion, _ = start(cell, execution)
         await cell.until(lambda: torch(cell))
         cell.robot.inject('pause')
         controller = cell.robot.controller
@@ -162,11 +179,12 @@ def test_a_pause_does_not_count_as_waiting():
     run_cell(scenario)
 
 
-def test_the_payload_changes_where_the_arm_stands():
+@pytest.mark.parametrize('execution', MODES, ids=lambda mode: mode.name)
+def test_the_payload_changes_where_the_arm_stands(execution):
     async def scenario(cell):
         payload = PayloadChange(waypoint=0, mass=1.25, center_of_gravity=(0.0, 0.01, 0.06))
         before = cell.robot.controller.payload.mass
-        motion, is_at = start(cell, payload_changes=(payload,))
+        motion, is_at = start(cell, execution, payload_changes=(payload,))
         await cell.until(lambda: torch(cell))
         assert cell.robot.controller.payload.mass == before
         inputs(cell)[ARC] = True

@@ -138,7 +138,18 @@ def rounded_seam():
     return replace(goal, segments=segments, corner_deviation=0.001)
 
 
-SEAMS = {'by speed': seam, 'by time': timed_seam, 'spline': spline_seam, 'rounded': rounded_seam}
+def streamed_seam():
+    """Return the seam with rounded corners as set-points."""
+    return replace(rounded_seam(), execution=ExecutionMode.SERVO)
+
+
+SEAMS = {
+    'by speed': seam,
+    'by time': timed_seam,
+    'spline': spline_seam,
+    'rounded': rounded_seam,
+    'set-points': streamed_seam,
+}
 STOPS = ('cancel', 'protective_stop')
 
 

@@ -96,7 +96,7 @@ def is_on(cell, pin=2):
 
 @pytest.mark.parametrize(
     ('headless', 'execution'),
-    [(True, 'PRIMITIVES'), (False, 'PRIMITIVES'), (True, 'SPLINE')],
+    [(True, 'PRIMITIVES'), (False, 'PRIMITIVES'), (True, 'SPLINE'), (True, 'SERVO')],
 )
 def test_the_arm_stands_until_the_function_returns(run, start, headless, execution):
     async def scenario(cell):
@@ -118,10 +118,11 @@ def test_the_arm_stands_until_the_function_returns(run, start, headless, executi
     run(scenario, headless=headless)
 
 
-def test_a_function_that_does_not_return_ends_the_goal_by_its_name(run, start):
+@pytest.mark.parametrize('execution', [ExecutionMode.PRIMITIVES, ExecutionMode.SERVO])
+def test_a_function_that_does_not_return_ends_the_goal_by_its_name(run, start, execution):
     async def scenario(cell):
         safe = (SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=2, value=0.0),)
-        motion, is_at = start(cell, 'grip', 2.0, 1.0, safe_outputs=safe)
+        motion, is_at = start(cell, 'grip', 2.0, 1.0, safe_outputs=safe, execution=execution)
         await cell.until(lambda: is_on(cell))
         assert await cell.until(lambda: motion.outcome, 3.0) == pytest.approx(1.0, abs=0.1)
         assert motion.outcome.code is ErrorCode.EXECUTION_FAILED
@@ -140,16 +141,21 @@ def test_a_function_that_does_not_return_ends_the_goal_by_its_name(run, start):
 
 
 @pytest.mark.parametrize(
-    ('function', 'code', 'text'),
+    ('function', 'execution', 'code', 'text'),
     [
-        ('halts', ErrorCode.PROGRAM_STOPPED, '(in halts() at point 0)'),
-        ('fails', ErrorCode.PROGRAM_STOPPED, '(in fails() at point 0)'),
-        ('moves', ErrorCode.EXECUTION_FAILED, 'The controller itself left the plan'),
+        ('halts', 'PRIMITIVES', ErrorCode.PROGRAM_STOPPED, '(in halts() at point 0)'),
+        ('halts', 'SERVO', ErrorCode.PROGRAM_STOPPED, '(in halts() at point 0)'),
+        ('fails', 'PRIMITIVES', ErrorCode.PROGRAM_STOPPED, '(in fails() at point 0)'),
+        ('moves', 'PRIMITIVES', ErrorCode.EXECUTION_FAILED, 'The controller itself left the plan'),
+        # servoj holds the arm, and only one thread may move it.
+        ('moves', 'SERVO', ErrorCode.PROGRAM_STOPPED, '(in moves() at point 0)'),
     ],
 )
-def test_what_a_function_does_to_the_goal_is_its_reason(run, start, function, code, text):
+def test_what_a_function_does_to_the_goal_is_its_reason(
+    run, start, function, execution, code, text
+):
     async def scenario(cell):
-        motion, _ = start(cell, function)
+        motion, _ = start(cell, function, execution=ExecutionMode[execution])
         await cell.until(lambda: motion.outcome, 3.0)
         assert motion.outcome.code is code, motion.outcome.text
         assert text in motion.outcome.text

@@ -25,8 +25,3 @@ def test_every_mode_has_a_planner_and_a_feeder():
         assert list(inspect.signature(planner).parameters) == ['planner']
     for feeder in FEEDERS.values():
         assert list(inspect.signature(feeder).parameters) == ['request', 'config']
-
-
-def test_outputs_are_switched_only_where_the_robot_program_gets_points():
-    for mode, traits in EXECUTION_MODES.items():
-        assert not (traits.switches_outputs and traits.streams_setpoints), mode.name

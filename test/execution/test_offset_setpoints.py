@@ -15,6 +15,7 @@ from ur_cartesian_driver.execution.servo.offset_setpoints import (
     OffsetSetpoints,
     STEP,
 )
+from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.goal.goal import StaleOffset
@@ -51,7 +52,7 @@ def band(duration, *, limits=LIMITS, speed=SPEED, acceleration=ACCELERATION, **c
     )
 
 
-class Still:
+class Still(SetpointSource):
     """An arm that stands for some time."""
 
     def __init__(self, duration):

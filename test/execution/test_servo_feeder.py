@@ -124,8 +124,8 @@ class Cell:
         before = self.joint
         if mode == 2:
             self.joint = self.row[4]
-            self.lag = max(0.0, self.lag + self.row[-1] - self.read - STEP)
-            self.read = self.row[-1]
+            self.lag = max(0.0, self.lag + self.row[-2] - self.read - STEP)
+            self.read = self.row[-2]
         tcp = NOZZLE if any(isinstance(c, SetTemporaryTcp) for c in self.commands) else IDENTITY
         self.event(ServoReceived(feedback=registers(mode, sequence, self.lag, timestamp=self.now)))
         if self.goal.state is until:

@@ -7,6 +7,8 @@ Slider, pauses and the wire do what they want; what must not happen are set-poin
 out of order or too many, and a buffer that runs empty although little was late.
 """
 
+from math import inf
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -21,7 +23,7 @@ from ur_cartesian_driver.execution.servo.servo_stream import (
     ServoStream,
     TRANSITIONS,
 )
-from ur_cartesian_driver.execution.servo.setpoint_source import SplineSetpoints
+from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource, SplineSetpoints
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.primitive import Spline
 from ur_cartesian_driver.motion.state.servo_report import ServoActivity, ServoFeedback
@@ -36,7 +38,7 @@ HOME, OUT = (0.0,) * 6, (0.3,) * 6
 REST = (0.0,) * 6
 
 
-class Ramp:
+class Ramp(SetpointSource):
     """Set-points whose every joint is the time that was asked for [s]."""
 
     def __init__(self, end=np.inf):
@@ -261,6 +263,39 @@ def test_stop_is_written_at_once_and_with_a_new_number():
     robot.inputs = row
     run(stream, robot, seconds=0.02)
     assert stream.phase is ServoPhase.LEFT
+
+
+def test_setpoints_are_held_at_a_stop_and_leave_its_rest_out():
+    """Joints move to 0.1 rad, rest there for 0.3 s of the path, and move on to 0.2 rad."""
+    there, end = (0.1,) * 6, (0.2,) * 6
+    spline = JointSpline.of(
+        REST,
+        [
+            Spline(target=target, velocities=REST, accelerations=REST, duration=duration)
+            for target, duration in ((there, 0.4), (there, 0.3), (end, 0.4))
+        ],
+    )
+    stream, robot = ServoStream(SplineSetpoints(spline), SETTINGS), Robot()
+    stream.hold_time = 0.4
+    assert run(stream, robot, seconds=2.0) is None
+    assert robot.done[-1] == pytest.approx(np.array(there), abs=1e-12)
+    assert stream.source_time == pytest.approx(0.4)
+    held = stream.stopped_time
+    assert held > 1.0
+    stream.go_on(0.3, inf)
+    assert stream.stopped_time == pytest.approx(held - 0.3)
+    times = []
+    assert run(
+        stream,
+        robot,
+        seconds=4.0,  # its clock begins at 0 again
+        watch=lambda: times.append(robot.inputs['input_double_register_47']),
+    )
+    assert robot.done[-1] == pytest.approx(np.array(end), abs=1e-12)
+    # The time for the robot program counts motion only.
+    assert times[0] == pytest.approx(0.4, abs=2.0 * STEP)
+    assert times[-1] == pytest.approx(0.8)
+    assert np.diff(times).min() >= 0.0
 
 
 def test_packets_in_one_go_are_answered_once():

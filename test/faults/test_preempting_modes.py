@@ -21,6 +21,7 @@ LEFT_OUT = (
     'Waiting for the arm',
     'At a point',
     'At a point, SERVO',
+    'Waits, SERVO',
     'Scripts',
     'Press',
     'Path offset',
@@ -35,6 +36,7 @@ MIDDLE = {
     'SERVO': 'between points',
     'Appendable goals': 'moving',
     'Outputs': 'before the trigger pose',
+    'Outputs, SERVO': 'before the trigger pose',
     'Freedrive': 'freedrive',
 }
 #: No joint sees more [rad/s^2], whatever takes the place of what.

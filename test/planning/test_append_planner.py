@@ -446,3 +446,13 @@ def test_what_is_remembered_of_a_goal_does_not_grow():
         )
         held.append((len(part.next_goal.replannable), len(part.next_goal.outputs)))
     assert set(held) == {(2, 1)}, 'two points, and what stands behind the last of them'
+
+
+def test_points_that_are_appended_to_set_points_bring_no_outputs():
+    goal = replace(spline(offsets=(0.0, 0.3)), execution=ExecutionMode.SERVO)
+    opened = replace(goal, **of(goal, 0, 4, io_commands=()), keep_open=True)
+    part = plan_first_part(plan(opened, STATE, ARM, OPTIONS), ARM, OPTIONS)
+    with pytest.raises(NotAvailable, match=r'^io_commands is not empty, but a SERVO goal with'):
+        plan_append(
+            part.next_goal, AppendedPoints(**of(goal, 4, 6)), ARM, OPTIONS, from_rest=False
+        )

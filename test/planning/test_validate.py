@@ -329,6 +329,7 @@ REFUSALS = [
         replace(
             TIMED,
             execution=ExecutionMode.SERVO,
+            keep_open=True,
             io_commands=(
                 IOCommand(
                     waypoint=0, offset=0.0, output=OutputKind.TOOL_DIGITAL, pin=0, value=1.0
@@ -336,7 +337,7 @@ REFUSALS = [
             ),
         ),
         NotAvailable,
-        'io_commands is not empty, but SERVO switches no outputs',
+        'io_commands is not empty, but a SERVO goal with keep_open switches no outputs; set',
     ),
     (
         replace(PLAIN, safe_outputs=(replace(GLUE, pin=8),)),
@@ -614,11 +615,6 @@ REFUSALS = [
         'input_waits[0].timeout is 0 s; it must be more than 0, and at most 600 s',
     ),
     (
-        with_fields(SPLINE, input_waits=(BURNING,), execution=ExecutionMode.SERVO),
-        NotAvailable,
-        'input_waits is not empty, but SERVO does nothing at points but rest; set execution to',
-    ),
-    (
         with_fields(PLAIN, input_waits=(BURNING,), keep_open=True),
         NotAvailable,
         'input_waits[0].point_index is set, but a goal with keep_open does nothing at points but',
@@ -655,11 +651,6 @@ REFUSALS = [
         ),
         InvalidGoal,
         'io_commands[0].pin is 1, but that standard analog output follows the speed from point 0',
-    ),
-    (
-        with_fields(SPLINE, proportional_outputs=(BEAD,), execution=ExecutionMode.SERVO),
-        NotAvailable,
-        'proportional_outputs is not empty, but SERVO switches no outputs; set execution to',
     ),
     (
         with_fields(PLAIN, proportional_outputs=(BEAD,), keep_open=True),

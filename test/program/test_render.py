@@ -164,7 +164,7 @@ def test_a_fraction_after_an_int_is_found(widened):
 def test_handles_of_threads_are_killed_and_not_compared():
     """No manual says how a controller compares a handle with a number."""
     handles = re.findall(r'(\w+) = run ', text())
-    assert len(handles) == 7
+    assert len(handles) == 8
     for handle in handles:
         assert re.search(rf'kill {handle}\b', text())
         assert not re.search(rf'\b{handle} *[!=]=|[!=]= *{handle}\b', text())

@@ -50,7 +50,7 @@ def test_the_registers_of_the_servo_exist():
         f'input_double_register_{i}' for i in range(24, 30)
     )
     assert all(name in INPUT_TYPES for name in registers.SERVO_INPUTS)
-    assert len(set(registers.SERVO_INPUTS)) == 4 + 6 + 6 + 1
+    assert len(set(registers.SERVO_INPUTS)) == 4 + 6 + 6 + 2
     assert all(name in OUTPUT_TYPES for name in registers.SERVO_OUTPUTS)
 
 

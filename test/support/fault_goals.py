@@ -546,6 +546,40 @@ class OutputGoal(BlendGoal):
         return [outputs[AT_CORNER], outputs[AFTER_END]]
 
 
+@lru_cache
+def servo_output_plan(start, values):
+    """Return the same around rounded corners, by set-points."""
+    made = output_plan(start, values).goal
+    goal = Goal(
+        waypoints=tuple(Waypoint(pose=point.pose) for point in made.waypoints),
+        segments=(Segment(velocity=0.25, acceleration=1.0),) * len(made.waypoints),
+        corner_deviation=0.004,
+        execution=ExecutionMode.SERVO,
+        io_commands=made.io_commands,
+        proportional_outputs=made.proportional_outputs,
+        path_tolerance=Tolerance(position=(PATH_TOLERANCE,) * 3),
+        goal_tolerance=Tolerance(position=(GOAL_TOLERANCE,) * 3),
+        goal_time_tolerance=SETTLING,
+        safe_outputs=made.safe_outputs,
+    )
+    return plan(goal, start.state, ARM, OPTIONS)
+
+
+class ServoOutputGoal(OutputGoal):
+    """Three sides of a square with rounded corners and the same outputs, by set-points."""
+
+    cancel = ServoGoal.cancel
+
+    def plan_from(self, start):
+        return servo_output_plan(start, tuple(not value for value in self._before))
+
+    def is_in(self, phase):
+        x, y = self.tool_offset()
+        if phase == 'before the time':
+            return x > 0.9 * SIDE and y < 1e-3 and self.cell.at_rest()
+        return x > 0.4 * SIDE
+
+
 #: How long the arm rests in a corner, and how long after the fault an input comes for which it
 #: waits in another one [s]; the number of that input.
 REST, COMES_AFTER, AWAITED = 0.8, 0.4, 6
@@ -625,6 +659,29 @@ def servo_rest_plan(start):
         execution=ExecutionMode.SERVO,
     )
     return plan(goal, state, ARM, OPTIONS)
+
+
+@lru_cache
+def servo_wait_plan(start):
+    """Return the plan of two sides of a square, by set-points, with a wait between them."""
+    goal = servo_rest_plan(start).goal
+    wait = InputWait(
+        waypoint=0, input=InputKind.STANDARD_DIGITAL, pin=AWAITED, value=1.0, timeout=5.0
+    )
+    return plan(replace(goal, segments=(), input_waits=(wait,)), start.state, ARM, OPTIONS)
+
+
+class ServoWaitGoal(RestGoal):
+    """Two sides of a square by set-points, with a wait for an input between them."""
+
+    cancel = ServoGoal.cancel
+
+    def plan_from(self, start):
+        return servo_wait_plan(start)
+
+    def is_in(self, phase):
+        assert phase == 'waiting for an input'
+        return dist(self.tool_offset(), (0.0, SIDE)) < 2e-4 and self.cell.at_rest()
 
 
 class ServoRestGoal(ServoGoal):
@@ -827,6 +884,8 @@ GOALS = {
     'Outputs': OutputGoal,
     'At a point': RestGoal,
     'At a point, SERVO': ServoRestGoal,
+    'Outputs, SERVO': ServoOutputGoal,
+    'Waits, SERVO': ServoWaitGoal,
     'Scripts': CallGoal,
     'Press': PressGoal,
     'Freedrive': FreedriveGoal,

@@ -437,6 +437,66 @@ SERVO_AT_A_POINT = _mode(
     continued=(),
 )
 
+SERVO_OUTPUTS = _mode(
+    'Outputs, SERVO',
+    'Set-points around rounded corners, with an output at the second corner, one after the end, '
+    'and an analog one that follows the speed. What becomes of them is as in PRIMITIVES.',
+    {
+        'before the trigger pose': 'before the output at the second corner',
+        'before the time': 'the arm is at rest at the last point, an output is pending',
+        'cancelling': 'the driver has left the mode of set-points, the arm still moves',
+    },
+    3.0,
+    {
+        'an operator pauses the program': _STAYS_PAUSED,
+        'the network cable is cut': {'': {'steps': (*_PLUGGED_IN, 'resend')}},
+        'the speed slider is moved to 0': {
+            'before the time': {'waits': False, 'steps': ('move the slider up',)}
+        },
+        # servoj creeps up to the last set-point for a second before the arm stands for two.
+        **{
+            fault: {
+                '': {'result_within': 6.0, 'rest_within': 3.0},
+                # The registers tell, too, that the program has left the set-points.
+                'cancelling': {'state_after': S.READY},
+            }
+            for fault in ("the program's answers are lost", 'the trajectory socket is half-open')
+        },
+    },
+    faults=(
+        'protective stop',
+        'emergency stop',
+        'an operator stops the program',
+        'an operator pauses the program',
+        'the speed slider is moved to 0',
+        'the network cable is cut',
+        "the program's sockets are cut",
+        "the program's answers are lost",
+        'the trajectory socket is half-open',
+        'the node is silent',
+    ),
+    pendant=('protective stop',),
+    continued=(),
+)
+
+SERVO_WAITS = _mode(
+    'Waits, SERVO',
+    'Set-points that are held while the robot program waits for an input, which comes 0.4 s after '
+    'the fault.',
+    {'waiting for an input': 'the arm rests at the second point, the input has not come'},
+    4.0,
+    {'the network cable is cut': {'': {'steps': (*_PLUGGED_IN, 'resend')}}},
+    faults=(
+        'protective stop',
+        'an operator stops the program',
+        'an operator pauses the program',
+        'the network cable is cut',
+        'the node is silent',
+    ),
+    pendant=('protective stop',),
+    continued=(),
+)
+
 SCRIPTS = replace(
     _mode(
         'Scripts',
@@ -586,6 +646,8 @@ MODES = (
     OUTPUTS,
     AT_A_POINT,
     SERVO_AT_A_POINT,
+    SERVO_OUTPUTS,
+    SERVO_WAITS,
     SCRIPTS,
     PRESS,
     FREEDRIVE,

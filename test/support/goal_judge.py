@@ -217,13 +217,14 @@ class Judge:
         self._end()
         if run.promise.execution in (ExecutionMode.SPLINE, ExecutionMode.SERVO):
             self._spline()
+            self._outputs(len(run.goal.waypoints))
             if run.promise.execution == ExecutionMode.SPLINE:
                 self._duration()
         else:
             passages = self._passages()
             self._paths(passages)
             self._times(passages)
-            self._outputs(passages)
+            self._outputs(len(passages))
         return self.wrong
 
     # -- limits ----------------------------------------------------------------------------------
@@ -539,12 +540,14 @@ class Judge:
             if off > SERVO_PATH:
                 self.say('servo path', f'{1e3 * off:.4f} mm off')
 
-    def _outputs(self, passages: list[_Passage]) -> None:
+    def _outputs(self, reached: int) -> None:
+        is_servo = self.run.promise.execution == ExecutionMode.SERVO
+        place = max(SERVO_PATH, self._servo_deviation()) if is_servo else OUTPUT_PLACE
         goal, outputs = self.run.goal, np.array([row.digital_outputs for row in self.run.rows])
         for command in goal.io_commands:
             if sum(other.pin == command.pin for other in goal.io_commands) > 1:
                 continue
-            if command.waypoint >= len(passages):
+            if command.waypoint >= reached:
                 continue
             on = (outputs >> command.pin) & 1
             if on[-1] != command.value:
@@ -557,7 +560,7 @@ class Judge:
             way = (
                 OUTPUT_CYCLES * self.run.cycle * float(self.speed[max(row - 3, 0) : row + 1].max())
             )
-            if distance > radius + way + OUTPUT_PLACE:
+            if distance > radius + way + place:
                 self.say('output', f'{command.pin} switches {1e3 * distance:.3f} mm off its point')
 
 

@@ -179,7 +179,7 @@ class MixedDraw(GoalDraw):
             segments=tuple(self.segments),
             execution=self.execution,
         )
-        if self.chance(0.15) and self.execution != ExecutionMode.SERVO:
+        if self.chance(0.15):
             goal = replace(goal, io_commands=self._outputs())
         T_flange_tcp = self.tool
         if self.T_flange_tcp not in (None, self.tool) or self.chance(0.2):

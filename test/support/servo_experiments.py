@@ -18,6 +18,7 @@ import numpy as np
 from servo_cell import CYCLE, GUIDE, GuideCell, OpenLoopStream
 
 from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoSettings, ServoStream
+from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -46,7 +47,7 @@ def up_and_down(home):
     return np.array(rows)
 
 
-class UpAndDown:
+class UpAndDown(SetpointSource):
     """Set-points of a number of periods, or without end."""
 
     def __init__(self, rows, periods=np.inf):
@@ -149,6 +150,7 @@ def unbuffered(slider: float, seconds: float, late: int = 0) -> Result:
             *q,
             *(0.3,) * 6,
             number * CYCLE,
+            0.0,  # the time of the motion, which the guide's program does not read
         )
 
     experiment.run(take, seconds, late)

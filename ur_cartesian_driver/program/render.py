@@ -70,6 +70,12 @@ SERVO_MAX_REPEATS = 500
 #: If more controller steps than this lie between two set-points, one step is assumed, as in the
 #: guide.
 SERVO_MAX_STEPS = 50
+#: The buffered servo has come to rest at a set-point if the target is within this distance [rad],
+#: and slower than this speed [rad/s]; both are norms over all joints.
+SERVO_END_TOLERANCE, SERVO_REST_SPEED = 1e-4, 1e-3
+#: It is taken to be at rest, too, when the time of the motion, delayed by the lag of servoj, is
+#: within this time [s] of the set-point's: nine lookahead times later.
+SERVO_SETTLED = 1e-5
 
 #: Stands for the first version with a feature if no version is known to have it; above any.
 _NO_VERSION = (1000, 0, 0)
@@ -388,10 +394,14 @@ def _servo_constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'SERVO_BUFFER_DEPTH = {settings.servo_buffer_depth}'
     # A list as long as the buffer, written out because old controllers have no other way.
     yield f'SERVO_ONES = {[1.0] * settings.servo_buffer_depth}'
-    yield f'SERVO_ROW = {[0.0] * 6}'
+    # The joint positions, and their time on the path.
+    yield f'SERVO_ROW = {[0.0] * 7}'
     yield f'SERVO_MAX_STEPS = {SERVO_MAX_STEPS}'
     yield f'SERVO_MAX_REPEATS = {SERVO_MAX_REPEATS}'
     yield f'SERVO_TOLERANCE = {[SERVO_TOLERANCE] * 6}'
+    yield f'SERVO_END_TOLERANCE = {SERVO_END_TOLERANCE}'
+    yield f'SERVO_REST_SPEED = {SERVO_REST_SPEED}'
+    yield f'SERVO_SETTLED = {SERVO_SETTLED:.10f}'
     yield from _enum('SERVO_IN', registers.InputInteger)
     yield from _enum('SERVO_IN', registers.InputDouble)
     yield from _enum('SERVO_OUT', registers.OutputInteger)

@@ -170,6 +170,11 @@ class GoalMonitor:
         if self.latest is not None:
             self.records.forget(self.records_begun() - 2)
 
+    @property
+    def motions_begun(self) -> int:
+        """How many motions of the goal the robot program has begun."""
+        return self._motions_begun
+
     def awaits_count(self) -> bool:
         """Return whether the program has yet to report a motion of this goal after START."""
         return self._awaits_count

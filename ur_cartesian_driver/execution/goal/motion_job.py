@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import count
 from math import inf
 from typing import Any
 
@@ -38,6 +39,17 @@ from ur_cartesian_driver.motion.plan.primitive import (
     Stop,
     SwitchOutput,
 )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hold:
+    """Where set-points are held while the robot program does something at a point."""
+
+    #: When the arm arrives there [s]; when the path goes on, after all planned rests [s].
+    begin: float
+    end: float
+    #: How many motions have begun once the robot program is done; inf = the goal ends there.
+    motions: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -110,8 +122,9 @@ class MotionJob:
     following_outputs: frozenset[int] = frozenset()
     #: The band within which offsets may displace the path; None = no offsets.
     offset_band: OffsetBand | None = None
-    #: For SERVO: the joint positions over time.
+    #: For SERVO: the joint positions over time, and where they are held, in order.
     spline: JointSpline | None = None
+    holds: tuple[Hold, ...] = ()
 
     def __post_init__(self) -> None:
         """Fill in the columns that are left empty."""
@@ -125,6 +138,11 @@ class MotionJob:
         rows = np.searchsorted(self.reference.point, self.waypoint, side='right') - 1
         fill('end_times', self.reference.time[np.maximum(rows, 0)])
         fill('request_times', self.end_times)
+
+    @property
+    def has_events(self) -> bool:
+        """Whether the robot program does something along the path or at points."""
+        return self.has_stops or not self.is_motion.all()
 
     @property
     def own_program_needs(self) -> str:
@@ -216,7 +234,21 @@ def job_from_plan(
         end_times=np.repeat(end_times, rows.records),
         request_times=np.repeat(end_times - _blend_lead_times(rows), rows.records),
         spline=(spline or plan.joint_spline) if streams else None,
+        holds=tuple(_holds(standing, end_times)) if streams else (),
     )
+
+
+def _holds(standing: Mapping[int, Stop], end_times: Floats) -> Iterator[Hold]:
+    """Yield a hold for each row of consecutive stops."""
+    for row in standing:
+        if row - 1 in standing:
+            continue
+        last = next(after for after in count(row) if after + 1 not in standing)
+        yield Hold(
+            begin=float(end_times[row - 1]),
+            end=float(end_times[last]),
+            motions=last + 2 if last + 1 < len(end_times) else inf,
+        )
 
 
 def _input_waits(rows: PlannedRows, standing: Mapping[int, Stop]) -> dict[int, tuple[float, str]]:

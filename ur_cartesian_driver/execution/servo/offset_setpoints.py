@@ -137,6 +137,12 @@ class OffsetSetpoints(Displaced):
         self._joints = self._displaced(on_path, value)
         return self._joints
 
+    def skip(self, rest: float) -> None:
+        """Leave out the next ``rest`` seconds, in which path and offset rest."""
+        self._setpoints.skip(rest)
+        self._time += rest
+        self._used += rest
+
     def _displaced(self, on_path: Joints, offset: Vector3) -> Joints:
         """Return the joints of a set-point whose tool is displaced, and remember it."""
         q, shift, self._change = on_path, ZERO3, ZERO6 if offset == ZERO3 else self._change

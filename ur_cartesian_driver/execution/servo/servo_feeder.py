@@ -14,12 +14,18 @@ goal (:mod:`~ur_cartesian_driver.execution.goal.goal_transitions`) then mean:
 * in CANCELLING the mode IDLE is written instead of a CANCEL; the program answers by leaving the
   servo.
 
+A goal that does more along its path than move is also sent as points
+(:mod:`~ur_cartesian_driver.execution.points.point_feeder`): the robot program switches outputs,
+waits and calls functions as along any spline, but the set-points lead the arm. While it does
+something at a point, the set-points are held there, until it has begun the next motion.
+
 At the end of every goal, successful or not, the robot program is told to brake and stop reading,
 and the inputs are released.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from math import inf
 
 import numpy as np
@@ -42,6 +48,7 @@ from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor, START_A
 from ur_cartesian_driver.execution.goal.goal_transitions import GoalState, INTERRUPTIBLE_STATES
 from ur_cartesian_driver.execution.goal.outcome_codes import GoalSignal, Meaning, NO_MEANING
 from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT, NO_INPUTS
+from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoStream
 from ur_cartesian_driver.execution.servo.wait_for_arm import WaitForArm
 from ur_cartesian_driver.motion.events import Event, ServoReceived, TrajectoryEnded
@@ -79,6 +86,11 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         self._max_servo_lag = MAX_LAG_LOOKAHEADS * stream.settings.lookahead_time
         self._last_read, self._last_answer = -1, -inf
         self._has_filled = self._has_left = False
+        #: Sends what the robot program does along the path; None = nothing.
+        self._points = PointFeeder(monitor) if monitor.job.has_events else None
+        self._holds = deque(monitor.job.holds)
+        self._stopped_time = 0.0
+        self.stream.hold_time = self._next_hold()
 
     # ---- before the motion --------------------------------------------------------------------
 
@@ -118,15 +130,18 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         """Begin the set-points in MOVING, and end them when the goal stops or ends."""
         match state:
             case GoalState.MOVING:
-                self.monitor.start(0)
                 self._has_filled = False
                 self.stream.begin()  # the next packet is answered with the first set-point
+                if self._points is not None:
+                    return self._points.enter(state, packet)
+                self.monitor.start(0)
             case GoalState.RESTORING:
                 # No inputs are written in RESTORING, so the program must not wait for a write.
                 return self._leave()
             case GoalState.CANCELLING | GoalState.PROGRAM_LOST:
                 # A program that is started after this must not find set-points in the inputs.
-                return self._stop()
+                commands = self._points.enter(state, packet) if self._points is not None else []
+                return commands + self._stop()
             case GoalState.ENDED:
                 return [*self._leave(), *self.reports()]
         return []
@@ -143,9 +158,10 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         return [] if row is None else [WriteInputs(values=row)]
 
     def feed(self, event: Event, now: float) -> list[GoalCommand]:
-        """Answer a packet of the servo's registers with a write."""
+        """Answer a packet of the servo's registers with a write, and others with points."""
         if not isinstance(event, ServoReceived):
-            return []
+            self._end_hold()
+            return [] if self._points is None else self._points.feed(event, now)
         if event.feedback.last_sequence != self._last_read:
             self._last_read, self._last_answer = event.feedback.last_sequence, now
         before = self.stream.phase
@@ -161,14 +177,27 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
             commands.append(EnterServo())
         return commands
 
+    def _next_hold(self) -> float:
+        return self._holds[0].begin if self._holds else inf
+
+    def _end_hold(self) -> None:
+        """Go on once the robot program is done at a point; the time there is no delay."""
+        stream = self.stream
+        if self._holds and self.monitor.motions_begun >= self._holds[0].motions:
+            hold = self._holds.popleft()
+            stream.go_on(hold.end - hold.begin, self._next_hold())
+        self.monitor.start_delay += stream.stopped_time - self._stopped_time
+        self._stopped_time = stream.stopped_time
+
     def interpret(self, event: Event, state: GoalState) -> Meaning | None:
         """Return the meaning of the servo's phase after a packet."""
-        if isinstance(event, TrajectoryEnded):  # the result of an earlier goal
-            return NO_MEANING
+        if isinstance(event, TrajectoryEnded):
+            return NO_MEANING if self._points is None else None  # that of an earlier goal
         if not isinstance(event, ServoReceived):
             return None
         if self.stream.phase is ServoPhase.ARRIVED and state is GoalState.MOVING:
-            return GoalSignal.SUCCESS, ''
+            # The robot program may still have something to do.
+            return (GoalSignal.SUCCESS, '') if self._points is None else NO_MEANING
         if self.stream.phase is not ServoPhase.LEFT:
             return NO_MEANING
         if state is GoalState.CANCELLING:
@@ -186,17 +215,31 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         """Return the count of spline pieces begun (None = no spline), and the target's lag."""
         if self._spline is None:
             return None, 0
+        if self._points is not None:
+            return packet.points_begun, self._behind(packet.points_begun)
         time = self.stream.motion_time
         begun = self._pieces_begun(time)
         return begun, begun - self._pieces_begun(time - self._max_servo_lag)
+
+    def _behind(self, begun: int) -> int:
+        """Return how many motions the controller's target may lag behind that one [count]."""
+        records = self.monitor.records
+        begin = records.end_time(records.begun_records(begun) - 1)
+        first = records.count_until(begin - self._max_servo_lag)
+        return max(0, begun - records.motions_before(first))
 
     def _pieces_begun(self, time: float) -> int:
         """Return how many pieces of the spline begin before a time [s]; 0 = none yet."""
         return self.monitor.records.count_until(time) if time > 0.0 else 0
 
     def is_read(self, now: float) -> bool:
-        """Return whether the robot program has lately read a set-point."""
-        return now - self._last_answer < ANSWER_TIMEOUT
+        """
+        Return whether the robot program has lately read a set-point.
+
+        That alone does not show that it still does something along the path.
+        """
+        is_alone = self._points is None or self.stream.is_held
+        return is_alone and now - self._last_answer < ANSWER_TIMEOUT
 
     def has_arrived(self, packet: RobotState) -> bool:
         """Return whether the target is at the last set-point, which servoj may overshoot."""

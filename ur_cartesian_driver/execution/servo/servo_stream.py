@@ -212,6 +212,11 @@ class ServoStream:
         self._motion_rate = 1.0
         #: Whether the motion is held at its place on the path; its total delay by being held [s].
         self.is_held, self.held_time = False, 0.0
+        #: The time of the source at which set-points are repeated until :meth:`go_on` [s]; by how
+        #: much this delays the motion in total, beyond rests of the source [s].
+        self.hold_time, self.stopped_time = inf, 0.0
+        #: Time of the motion [s]: that of the source without the rests that were left out.
+        self._moved_time = 0.0
         self._recovers = False
         self._last_write = -inf
         self._sent = self._underruns = 0
@@ -270,6 +275,18 @@ class ServoStream:
         self._first_servo = self._sequence + 1
         # The source may have been reset since, and the first write may precede its next set-point.
         self._joints = self._source.next(0.0)
+
+    def go_on(self, rest: float, hold_time: float) -> None:
+        """
+        Go on after a hold.
+
+        :param rest: how long the source would rest here [s]; this time has passed in the hold.
+        :param hold_time: the time of the source at the next hold [s]; inf = none.
+        """
+        self._source.skip(rest)
+        self.source_time += rest
+        self.stopped_time -= rest
+        self.hold_time = hold_time
 
     def stop(self) -> tuple[float, ...] | None:
         """Leave the servo; return the inputs to write at once, None = nothing."""
@@ -378,16 +395,21 @@ class ServoStream:
         """Make the set-point of the next write, which covers ``steps`` control steps."""
         moves, time = self.phase is ServoPhase.SERVOING, steps * self._clock.step
         passed = self._motion_rate * time if moves else 0.0
+        if self._recovers:
+            self.held_time += time - passed
+        if self.source_time + passed >= self.hold_time:
+            reached = max(0.0, self.hold_time - self.source_time)
+            self.stopped_time += passed - reached
+            passed = reached
         self._sent += steps
         self._joints = self._source.next(passed)
         self.source_time += passed
+        self._moved_time += passed
         self._state_time += time
-        if self._recovers:
-            self.held_time += time - passed
         setpoint = _Setpoint(self._sequence, self._state_time, self.source_time)
         self._unread.append(setpoint)
         self._unfinished.append(setpoint)
-        if moves and self._source.done:
+        if moves and self._source.done and self.hold_time == inf:
             self._apply(ServoEvent.AT_END)
 
     def _apply(self, change: ServoEvent) -> None:
@@ -408,4 +430,5 @@ class ServoStream:
             *self._joints,
             *(self.settings.max_divergence,) * 6,
             self._state_time,
+            self._moved_time,
         )

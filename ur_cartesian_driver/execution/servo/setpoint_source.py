@@ -27,6 +27,10 @@ class SetpointSource(Protocol):
         :param dt: nominal time since the last call [s]; 0 = hold.
         """
 
+    def skip(self, rest: float) -> None:
+        """Leave out the next ``rest`` seconds, in which the path rests; most have no rests."""
+        return
+
     @property
     def done(self) -> bool:
         """Whether the positions returned last are the end, where the arm rests."""
@@ -52,6 +56,11 @@ class SplineSetpoints:
     def replace_tail(self, spline: JointSpline) -> None:
         """Go on along another spline from its start, or from the present time if that is later."""
         self.spline = self.spline.followed_by(spline, self.time)
+        self._rows, self._row = [], 0
+
+    def skip(self, rest: float) -> None:
+        """Leave out the next ``rest`` seconds, in which the path rests."""
+        self.time += rest
         self._rows, self._row = [], 0
 
     def next(self, dt: float) -> Vector6:

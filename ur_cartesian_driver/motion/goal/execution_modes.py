@@ -43,8 +43,6 @@ class ModeTraits:
     is_spline: bool
     #: Whether the driver streams set-points; if not, it sends points to the robot program.
     streams_setpoints: bool
-    #: Whether the robot program carries out ``io_commands``.
-    switches_outputs: bool
     #: Whether offsets can displace the path while the arm moves (``path_offset``).
     takes_offsets: bool
 
@@ -54,19 +52,16 @@ EXECUTION_MODES: Mapping[ExecutionMode, ModeTraits] = {
     ExecutionMode.PRIMITIVES: ModeTraits(
         is_spline=False,
         streams_setpoints=False,
-        switches_outputs=True,
         takes_offsets=True,
     ),
     ExecutionMode.SPLINE: ModeTraits(
         is_spline=True,
         streams_setpoints=False,
-        switches_outputs=True,
         takes_offsets=False,
     ),
     ExecutionMode.SERVO: ModeTraits(
         is_spline=True,
         streams_setpoints=True,
-        switches_outputs=False,
         takes_offsets=True,
     ),
 }

@@ -29,7 +29,9 @@ from ur_cartesian_driver.motion.plan.primitive import (
     OutputRecord,
     Primitive,
     Spline,
+    still_spline,
     Stop,
+    Wait,
 )
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowStretch
 
@@ -288,8 +290,13 @@ class Plan:
 
     @property
     def joint_spline(self) -> JointSpline:
-        """The joints over time, for a plan whose motions are all splines."""
-        pieces = (piece for piece in self.rows.primitives if isinstance(piece, Spline))
+        """The joints over time, rests included, for a plan whose motions are all splines."""
+        pieces: list[Spline] = []
+        for primitive in self.rows.primitives:
+            if isinstance(primitive, Spline):
+                pieces.append(primitive)
+            elif isinstance(primitive, Wait):  # a rest follows a motion
+                pieces.append(still_spline(pieces[-1], primitive.duration))
         return JointSpline.of(self.start, pieces)
 
     @property

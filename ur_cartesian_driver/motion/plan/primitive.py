@@ -114,6 +114,16 @@ class Spline:
     duration: float
 
 
+def still_spline(before: Spline, duration: float) -> Spline:
+    """Return the piece in which the joints rest at the end of another piece for a time [s]."""
+    return Spline(
+        target=before.target,
+        velocities=ZERO6,
+        accelerations=None if before.accelerations is None else ZERO6,
+        duration=duration,
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SwitchOutput:
     """

@@ -26,24 +26,6 @@ class ModeRule:
     remedy: str = ''
 
 
-def only_rests(field: str) -> ModeRule:
-    """Return the rule for a field whose events happen where the arm stops."""
-    return ModeRule(
-        field,
-        lambda traits: not traits.streams_setpoints,
-        'is not empty, but {mode} does nothing at points but rest',
-    )
-
-
-def switches_nothing(field: str) -> ModeRule:
-    """Return the rule for a field whose outputs are switched while the arm moves."""
-    return ModeRule(
-        field,
-        lambda traits: traits.switches_outputs,
-        'is not empty, but {mode} switches no outputs',
-    )
-
-
 #: Rules for fields of the goal as a whole; those for events at points are in ``point_events``.
 GOAL_RULES = {
     rule.field: rule

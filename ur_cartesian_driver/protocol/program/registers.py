@@ -17,6 +17,7 @@ to the program     int         27         synchronization (:class:`SyncState`)
 to the program     double      24 - 29    joint positions [rad]
 to the program     double      30 - 35    max deviation of the joints from these [rad]
 to the program     double      46         time of these joint positions [s]
+to the program     double      47         time of the motion at these joint positions [s]
 to the program     double      24 - 41    path offset of a trajectory (:class:`OffsetInput`)
 from the program   int         24         actual mode
 from the program   int         25         last sequence number that the program read
@@ -64,6 +65,8 @@ class InputDouble(IntEnum):
     DESIRED_JOINT_POSITIONS = 24
     MAX_JOINT_DIVERGENCE_THRESHOLDS = 30
     STATE_TIME = 46
+    #: Time of the motion, which stands still while the arm rests or waits; ours, not the guide's.
+    MOTION_TIME = 47
 
 
 class OutputInteger(IntEnum):
@@ -143,7 +146,7 @@ class ExternalError(IntEnum):
 
 
 #: Incremented when the robot program gains a feature that the driver relies on.
-PROGRAM_VERSION = 1
+PROGRAM_VERSION = 2
 
 Register: TypeAlias = (
     InputInteger | InputDouble | OutputInteger | OutputDouble | OffsetInput | OffsetOutput
@@ -179,6 +182,7 @@ SERVO_INPUTS = (
     *six_register_names(InputDouble.DESIRED_JOINT_POSITIONS),
     *six_register_names(InputDouble.MAX_JOINT_DIVERGENCE_THRESHOLDS),
     register_name(InputDouble.STATE_TIME),
+    register_name(InputDouble.MOTION_TIME),
 )
 #: Reports of the buffered servo, in this order; the guide's program has the first three, too.
 SERVO_OUTPUTS = (

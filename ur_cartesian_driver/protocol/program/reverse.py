@@ -16,6 +16,8 @@ index  mode          meaning
 1 - 6  TORQUE        joint torques [Nm] x S
 1, 2   FORWARD       trajectory action, number of points, both unscaled
 3      FORWARD       START: 1 = the path accepts offsets (:mod:`~.registers`)
+1, 2   BUFFERED_     trajectory action, number of points: what is done along the set-points
+       SERVO
 1      FREEDRIVE     freedrive action, unscaled
 1 - 6  IDLE,         no meaning; URCL sends uninitialized memory
        STOPPED
@@ -33,7 +35,8 @@ The sender must
   with STREAM_END, or with the CANCEL of a stream;
 * end or cancel a stream before the next START; otherwise the new points extend the stream.
 
-``BUFFERED_SERVO`` is a mode of our own robot program; its words 1 to 6 have no meaning either.
+``BUFFERED_SERVO`` is a mode of our own robot program. The pieces of its trajectories are not run,
+but awaited: the set-points lead the arm along them.
 Word 3 of START exists only in our own program, too; URCL leaves it 0.
 Streams came with URCL 2.14; older programs ignore them. All other words have had the same place
 and scale since URCL 2.0.
@@ -76,7 +79,8 @@ class ControlMode(IntEnum):
     TOOL_IN_CONTACT = 7
     TORQUE = 8
     #: Our own program only: set-points come through RTDE registers (:mod:`~.registers`), are
-    #: buffered and fed to ``servoj``; reverse messages only keep the program alive.
+    #: buffered and fed to ``servoj``; reverse messages keep the program alive, and start what is
+    #: done along the set-points.
     BUFFERED_SERVO = 100
 
 
@@ -212,14 +216,15 @@ def trajectory(
     read_timeout: int = 200,
     step_time: int = DEFAULT_STEP_TIME,
     takes_offsets: bool = False,
+    mode: ControlMode = ControlMode.FORWARD,
 ) -> ReverseMessage:
     """
     Return the message that starts, ends, cancels or keeps alive a trajectory.
 
     :param count: number of points, for START, STREAM_END, and CANCEL of a stream.
     :param takes_offsets: for START: whether the path accepts offsets, through registers.
+    :param mode: BUFFERED_SERVO for a trajectory along which set-points lead the arm.
     """
-    mode = ControlMode.FORWARD
     return ReverseMessage(
         read_timeout=read_timeout_for(mode, read_timeout, step_time),
         mode=mode,

@@ -26,7 +26,7 @@ from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.program import ProgramSettings, render
 from ur_cartesian_driver.protocol.framing import INT32_MAX
 from ur_cartesian_driver.protocol.program import reverse, script_sender
-from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
+from ur_cartesian_driver.protocol.program.reverse import ControlMode, TrajectoryAction
 from ur_cartesian_driver.protocol.program.trajectory_points import TrajectoryResultDecoder
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.link_settings import LinkSettings
@@ -163,8 +163,11 @@ class ProgramSockets:
     ) -> None:
         """Send a trajectory action."""
         self._settings.dialect.check_action(action)
+        mode = ControlMode.BUFFERED_SERVO if self.servo else ControlMode.FORWARD
         self._send(
-            reverse.trajectory(action, count, self._read_timeout, takes_offsets=takes_offsets)
+            reverse.trajectory(
+                action, count, self._read_timeout, takes_offsets=takes_offsets, mode=mode
+            )
         )
 
     def send_points(self, data: bytes) -> None:

@@ -11,7 +11,6 @@ from ur_cartesian_driver.motion.goal.goal import InputKind, InputWait
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan.primitive import AwaitInput
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.mode_rules import only_rests
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
 from ur_cartesian_driver.planning.request.point_events.point_event import PlacedStop, PointEvent
 
@@ -31,7 +30,6 @@ class InputWaits(PointEvent[InputWait]):
     """Waits for inputs, at most one at a point."""
 
     field = 'input_waits'
-    mode_rule = only_rests('input_waits')
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
         """Refuse a second wait at a point, and what :meth:`check_event` refuses."""

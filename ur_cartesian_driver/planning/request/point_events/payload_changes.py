@@ -12,7 +12,6 @@ from ur_cartesian_driver.motion.goal.goal import PayloadChange
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan.primitive import ChangePayload
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.mode_rules import only_rests
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
 from ur_cartesian_driver.planning.request.point_events.point_event import PlacedStop, PointEvent
 
@@ -24,7 +23,6 @@ class PayloadChanges(PointEvent[PayloadChange]):
     """Payloads that the robot program sets at points."""
 
     field = 'payload_changes'
-    mode_rule = only_rests('payload_changes')
 
     def check_event(self, where: str, change: PayloadChange) -> None:
         """Refuse a centre of gravity that must be a mistake."""

@@ -12,7 +12,6 @@ from ur_cartesian_driver.motion.goal.goal import OutputKind, ProportionalOutput
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan.primitive import SpeedLaw, SwitchOutput
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.mode_rules import switches_nothing
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
 from ur_cartesian_driver.planning.request.point_events.output_event import OutputEvent
 from ur_cartesian_driver.planning.request.point_events.timed_path import (
@@ -26,7 +25,6 @@ class ProportionalOutputs(OutputEvent[ProportionalOutput]):
     """Parts of the path on which an output follows the speed."""
 
     field = 'proportional_outputs'
-    mode_rule = switches_nothing('proportional_outputs')
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
         """Refuse entries, or an entry and a command, that drive one output at the same time."""

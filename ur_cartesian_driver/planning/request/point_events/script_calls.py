@@ -13,7 +13,6 @@ from ur_cartesian_driver.motion.goal.goal import ScriptCall
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan.primitive import CallFunction
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.mode_rules import only_rests
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest, NO_FRACTION
 from ur_cartesian_driver.planning.request.point_events.point_event import PlacedStop, PointEvent
 from ur_cartesian_driver.program.prelude import MAX_ARGUMENTS, Prelude
@@ -23,7 +22,6 @@ class ScriptCalls(PointEvent[ScriptCall]):
     """Calls that the robot program makes at points."""
 
     field = 'script_calls'
-    mode_rule = only_rests('script_calls')
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
         """Refuse calls that do not match a function of the prelude in name and arguments."""

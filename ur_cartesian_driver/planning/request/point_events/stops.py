@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Floats
-from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows, ReferencePath
-from ur_cartesian_driver.motion.plan.primitive import Primitive, Spline, Stop, Wait
+from ur_cartesian_driver.motion.plan.primitive import Spline, still_spline, Wait
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_spline,
@@ -27,7 +26,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     resolve_execution_mode,
 )
 from ur_cartesian_driver.planning.request.point_events.point_event import PlacedStop
-from ur_cartesian_driver.planning.request.point_events.registry import STOP_EVENTS
+from ur_cartesian_driver.planning.request.point_events.registry import OUTPUT_EVENTS, STOP_EVENTS
 
 
 class Stops:
@@ -99,16 +98,15 @@ class Stops:
                 ('joints', segments.joints[at - 1]),
             )
         }
-        streamed = resolve_execution_mode(goal).traits.streams_setpoints
+        only_rests = self._only_rests(goal)
         primitives = list(segments.primitives)
         places = at + np.arange(len(at))
         for row, stop in zip(places.tolist(), stops, strict=True):
-            primitives.insert(
-                row,
-                _still_spline(stop, primitives[row - 1], columns['joints'][row])
-                if streamed
-                else stop,
-            )
+            before = primitives[row - 1]
+            if only_rests and isinstance(stop, Wait) and isinstance(before, Spline):
+                primitives.insert(row, still_spline(before, stop.duration))
+            else:
+                primitives.insert(row, stop)
         lines = segments.report_lines
 
         def with_stops() -> list[str]:
@@ -134,17 +132,12 @@ class Stops:
             _resting_path(reference, np.array(waypoints), np.array(durations)),
         )
 
-
-def _still_spline(stop: Stop, before: Primitive, joints: Floats) -> Spline:
-    """Return a spline that keeps the servo at rest for a wait after a motion."""
-    assert isinstance(stop, Wait)
-    is_quintic = isinstance(before, Spline) and before.accelerations is not None
-    return Spline(
-        target=vector6(joints.tolist()),
-        velocities=ZERO6,
-        accelerations=ZERO6 if is_quintic else None,
-        duration=stop.duration,
-    )
+    def _only_rests(self, goal: GoalTable) -> bool:
+        """Return whether set-points lead the arm, and nothing is done along them but to rest."""
+        return resolve_execution_mode(goal).traits.streams_setpoints and not (
+            any(kind.of(goal) for kind in OUTPUT_EVENTS)
+            or any(not isinstance(each.stop, Wait) for each in self._stops)
+        )
 
 
 def _resting_path(path: ReferencePath, points: Any, durations: Floats) -> ReferencePath:

@@ -7,13 +7,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind, SafeOutput
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.goal.output_names import output_fault, output_name
 from ur_cartesian_driver.motion.plan.primitive import SwitchOutput
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.mode_rules import switches_nothing
+from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
 from ur_cartesian_driver.planning.request.point_events.output_event import OutputEvent
 from ur_cartesian_driver.planning.request.point_events.point_event import check_point
@@ -31,11 +31,17 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
     """The output commands of a goal."""
 
     field = 'io_commands'
-    mode_rule = switches_nothing('io_commands')
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
         """Refuse commands whose point or output does not exist."""
         super().check(goal, options)
+        mode = resolve_execution_mode(goal)
+        if goal.io_commands and goal.keep_open and mode.traits.streams_setpoints:
+            raise NotAvailable(
+                self.field,
+                f'is not empty, but a {mode.name} goal with keep_open switches no outputs',
+                'set execution to SPLINE or PRIMITIVES, or send all points at once',
+            )
         for field, waypoint in self.places(goal):
             check_point(field, waypoint, goal)
 
