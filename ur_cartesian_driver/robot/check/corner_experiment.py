@@ -49,8 +49,9 @@ def corner_pieces(start: Sequence[float]) -> list[Spline]:
         q, speed = q + 0.5 * time * (speed + after), after
         parts.append(_piece(q, speed, np.zeros(6), time))
     whole = JointSpline.of(vector6(start), parts)
-    rows = whole.rows(PIECE * np.arange(1, PIECES + 1))
-    return [_piece(*row, PIECE) for row in zip(*rows, strict=True)]
+    times: Floats = PIECE * np.arange(1.0, PIECES + 1.0)
+    q_rows, qd_rows, qdd_rows = whole.rows(times)
+    return [_piece(*row, PIECE) for row in zip(q_rows, qd_rows, qdd_rows, strict=True)]
 
 
 def _piece(q: Floats, qd: Floats, qdd: Floats, duration: float) -> Spline:

@@ -165,16 +165,18 @@ async def _follow_corner(
 
 
 async def _pause(recorder: RtdeRecorder, probe: PrimaryProbe) -> None:
-    """Pause the program in the corner for a while."""
+    """
+    Pause the program in the corner for a while, if the robot takes the command.
+
+    :raises OSError: the program does not get as far as the corner.
+    """
     if not await recorder.wait_for(lambda row: row[_PIECES_BEGUN] >= PAUSE_IN, END_TIMEOUT):
         raise OSError('the program does not follow its pieces')
     probe.send(encode_command(PrimaryCommand.PAUSE_PROGRAM))
-    is_paused = await recorder.wait_for(
+    if await recorder.wait_for(
         lambda row: row['runtime_state'] == RuntimeState.PAUSED, START_TIMEOUT
-    )
-    if not is_paused:
-        raise OSError('the program is not paused by the command of the primary interface')
-    await asyncio.sleep(PAUSE)
+    ):
+        await asyncio.sleep(PAUSE)
 
 
 async def _play(recorder: RtdeRecorder, probe: PrimaryProbe, script: bytes) -> None:
