@@ -241,8 +241,9 @@ def test_a_robot_without_the_registers_confirms_nothing(check):
 
 
 def test_the_corner_is_smooth_and_turns_two_wrists():
-    pieces = corner_pieces([0.1 * k for k in range(6)])
-    path = JointSpline.of(tuple(0.1 * k for k in range(6)), pieces)
+    start = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
+    pieces = corner_pieces(start)
+    path = JointSpline.of(start, pieces)
     q, qd, qdd = path.rows(np.arange(0.0, PIECE * PIECES, 1e-3))
     assert len(pieces) == PIECES
     assert q[-1] - q[0] == pytest.approx([0.0] * 4 + [TURN] * 2, abs=1e-5)

@@ -127,10 +127,10 @@ def distances_from_corner(q: Floats) -> Floats:
     """
     path = JointSpline.of(vector6(q[0].tolist()), corner_pieces(q[0].tolist()))
     places = path.rows(np.arange(0.0, PIECES * PIECE + 5e-4, 1e-3))[0]
-    begins, ways = places[:-1], np.diff(places, axis=0)
-    square = np.maximum(np.einsum('ij,ij->i', ways, ways), 1e-30)
+    begins, sides = places[:-1], np.diff(places, axis=0)
+    square = np.maximum(np.einsum('ij,ij->i', sides, sides), 1e-30)
     found = np.empty(len(q))
     for row, here in enumerate(q):
-        share = np.clip(np.einsum('ij,ij->i', here - begins, ways) / square, 0.0, 1.0)
-        found[row] = np.linalg.norm(begins + share[:, None] * ways - here, axis=1).min()
+        share = np.clip(np.einsum('ij,ij->i', here - begins, sides) / square, 0.0, 1.0)
+        found[row] = np.linalg.norm(begins + share[:, None] * sides - here, axis=1).min()
     return found
