@@ -41,6 +41,7 @@ from ur_cartesian_driver.robot.check.rtde_recorder import RtdeRecorder
 from ur_cartesian_driver.robot.rtde.probe import read_state
 from ur_cartesian_driver.robot.services.rtde_input_writer import speed_slider_write, write_inputs
 from ur_cartesian_driver.robot.services.service_calls import SetSpeedSliderCall
+from ur_cartesian_driver.robot.transport import plain_address
 
 _PIECES_BEGUN = f'output_int_register_{int(OutputInteger.POINTS_BEGUN)}'
 _SPLINE_TIME = f'output_double_register_{SPLINE_TIME}'
@@ -142,6 +143,11 @@ async def _follow_corner(
     connected: list[asyncio.StreamWriter] = []
 
     async def send(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        if plain_address(writer.get_extra_info('peername')[0]) != plain_address(
+            recorder.peer_address
+        ):
+            writer.close()  # only the robot is served
+            return
         connected.append(writer)
         writer.write(first if experiment.pauses else first + rest)
 

@@ -58,6 +58,11 @@ class RtdeRecorder:
         return self._connection.local_address
 
     @property
+    def peer_address(self) -> str:
+        """The IP address of the robot."""
+        return self._connection.peer_address
+
+    @property
     def missing(self) -> tuple[str, ...]:
         """The outputs that the robot lacks."""
         return tuple(name for name in self._requested if name not in self.names)
