@@ -14,7 +14,6 @@ from ur_cartesian_driver.robot.check.experiments import (
     EXPERIMENTS,
     JOINT_ACCELERATION,
     JOINT_SPEED,
-    MotionSamples,
     program,
     return_program,
     TIMED_DISTANCE,
@@ -26,6 +25,7 @@ from ur_cartesian_driver.robot.check.experiments import (
     WRIST_TURN,
 )
 from ur_cartesian_driver.robot.check.finding import Verdict
+from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 
 CYCLE = 0.002
 ANALYSES = {experiment.check: experiment.analyse for experiment in EXPERIMENTS}

@@ -18,8 +18,9 @@ from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.program.render import has_feature
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.robot.check.experiment_runner import motion_refusal, run_experiment
-from ur_cartesian_driver.robot.check.experiments import Experiment, EXPERIMENTS, MotionSamples
+from ur_cartesian_driver.robot.check.experiments import Experiment, EXPERIMENTS
 from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, skipped, Verdict
+from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 from ur_cartesian_driver.robot.check.observations import observe
 
 #: Exit status: nothing answers at the address; something keeps the driver from working.

@@ -28,11 +28,11 @@ from ur_cartesian_driver.robot.check.corner_experiment import (
 )
 from ur_cartesian_driver.robot.check.experiments import (
     Experiment,
-    MotionSamples,
     program,
     return_program,
 )
 from ur_cartesian_driver.robot.check.finding import RobotAddress
+from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 from ur_cartesian_driver.robot.check.primary_observations import (
     LOCAL_CONTROL,
     PrimaryProbe,

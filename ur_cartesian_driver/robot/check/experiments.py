@@ -10,21 +10,15 @@ analyses are pure: samples in, a sentence and numbers out.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from math import degrees, radians
-from typing import Any
 
 import numpy as np
 
-from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
-from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
-from ur_cartesian_driver.robot.check.corner_experiment import (
-    corner_script,
-    distances_from_corner,
-    PIECES,
-    TURN,
-)
+from ur_cartesian_driver.robot.check.corner_experiment import corner_script, TURN
+from ur_cartesian_driver.robot.check.corner_findings import corner_pause, followed, steps
 from ur_cartesian_driver.robot.check.finding import Finding, note, ok
+from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 
 #: Speed and acceleration: of joint motions [rad/s, rad/s^2]; of tool motions [m/s, m/s^2].
 JOINT_SPEED, JOINT_ACCELERATION = 0.2, 0.5
@@ -42,61 +36,8 @@ OFFSET, OFFSET_SPEED, OFFSET_REST = 0.004, 0.01, 0.4
 #: Difference below which two heights are equal [m]; speed below which the tool is at rest [m/s],
 #: although the filter of the path offset may still move it a little.
 SAME_HEIGHT, RESTING_SPEED = 3e-4, 1e-4
-#: How far the joints may be from the path of a corner, and in a pause [rad]. On the simulated
-#: controller they keep within 0.01 mrad, with calls that come a step late within 0.1.
-FOLLOWED, FOLLOWED_IN_PAUSE = 1e-4, 1.4e-3
 #: Fractions of the speed slider at which a corner is followed.
 CORNER_SLIDERS = (1.0, 0.5, 0.1)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MotionSamples:
-    """
-    Samples of a recorded motion, one row per cycle.
-
-    :param time: time by the controller's clock (n,) [s].
-    :param target_q: target joint positions (n, 6) [rad].
-    :param actual_q: measured joint positions (n, 6) [rad].
-    :param tool_speed: speed of the target TCP (n,) [m/s].
-    :param scaling: speed_scaling (n,).
-    :param fraction: target_speed_fraction (n,).
-    :param stop_sent: time of the stop command by the controller's clock [s]; NaN = none was sent.
-    """
-
-    time: Floats
-    target_q: Floats
-    actual_q: Floats
-    tool_speed: Floats
-    scaling: Floats
-    fraction: Floats
-    stop_sent: float = float('nan')
-    #: Distances of the target TCP from its first position (n,) [m].
-    target_distance: Floats = field(default_factory=lambda: np.empty(0))
-    #: Distances of the measured TCP from its first position (n,) [m].
-    actual_distance: Floats = field(default_factory=lambda: np.empty(0))
-    #: Time in its piece that the program of a corner reports (n,) [s].
-    spline_time: Floats = field(default_factory=lambda: np.empty(0))
-    #: Number of pieces that it has begun (n,).
-    pieces_begun: Floats = field(default_factory=lambda: np.empty(0))
-    #: Runtime state (n,), see :class:`RuntimeState`.
-    runtime_state: Floats = field(default_factory=lambda: np.empty(0))
-
-    def as_lists(self) -> dict[str, Any]:
-        """Return the columns as lists for JSON, rounded to 6 decimals."""
-        columns = {f.name: getattr(self, f.name) for f in fields(self) if f.name != 'stop_sent'}
-        return {name: np.round(column, 6).tolist() for name, column in columns.items()}
-
-    @property
-    def moving(self) -> Flags:
-        """Return a mask (n,) of the rows whose target differs from the row before."""
-        steps = np.abs(np.diff(self.target_q, axis=0)).max(axis=1) > 1e-9
-        return np.concatenate([[False], steps])
-
-    @property
-    def duration(self) -> float:
-        """The time from the first to the last motion of the target [s]; 0 = no motion."""
-        rows = np.flatnonzero(self.moving)
-        return float(self.time[rows[-1]] - self.time[rows[0] - 1]) if len(rows) else 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -246,102 +187,6 @@ def _path_offset(samples: MotionSamples) -> Finding:
     return (note if missing else ok)('path_offset', text, heights=heights, missing=missing)
 
 
-def _followed(check: str, slider: float) -> Callable[[MotionSamples], Finding]:
-    """Return the analysis that compares the joints with the pieces of the corner."""
-
-    def analyse(samples: MotionSamples) -> Finding:
-        own = _following(samples)
-        if not own.any():
-            return note(check, _NOT_FOLLOWED)
-        beside = float(distances_from_corner(_since_start(samples, own)).max())
-        lag = _lag(samples, own) if slider == 1.0 else 0.0
-        cycle = float(np.median(np.diff(samples.time)))
-        text = f'At {slider:.0%} of the speed the joints keep within {1e3 * beside:.3f} mrad of '
-        text += f'their path (bound {1e3 * FOLLOWED:g})'
-        if slider == 1.0:
-            text += f', and the arm follows after {1e3 * lag:.1f} ms (bound {1e3 * cycle:.0f})'
-        holds = beside <= FOLLOWED and lag <= cycle
-        law = 'speedj is followed within a step'
-        return (ok if holds else note)(
-            check, f'{text}: {law}: {_verdict(holds)}.', beside=beside, lag=lag, confirmed=holds
-        )
-
-    return analyse
-
-
-def _steps(check: str) -> Callable[[MotionSamples], Finding]:
-    """Return the analysis that counts the cycles in which the program made no step."""
-
-    def analyse(samples: MotionSamples) -> Finding:
-        # With the slider below 100 %, the first calls take more than a cycle by design, because
-        # the program learns the slider from the way of the arm. The last ones only slow it down.
-        own = _following(samples)
-        own[own] = (samples.pieces_begun[own] > 1) & (samples.pieces_begun[own] < PIECES)
-        steps = np.diff(samples.spline_time[own])
-        passed = np.diff(samples.time[own])
-        follows = passed < 1.5 * np.median(passed) if len(passed) else passed > 0.0
-        missed, cycles = int((follows & (steps == 0.0)).sum()), int(follows.sum())
-        if not cycles:
-            return note(check, _NOT_FOLLOWED)
-        holds = missed == 0
-        return (ok if holds else note)(
-            check,
-            f'{missed} of {cycles} cycles passed without a step of the program (bound 0): its '
-            f'step ends within its cycle: {_verdict(holds)}.',
-            missed=missed,
-            cycles=cycles,
-            confirmed=holds,
-        )
-
-    return analyse
-
-
-def _corner_pause(samples: MotionSamples) -> Finding:
-    """Check that the program read the pieces that were sent after a pause."""
-    own = _following(samples)
-    paused = float(np.sum(np.diff(samples.time)[samples.runtime_state[1:] == RuntimeState.PAUSED]))
-    if not own.any() or not paused:
-        return note('corner_pause', 'The program was not paused in the corner.')
-    begun = int(np.nanmax(samples.pieces_begun))
-    beside = float(distances_from_corner(_since_start(samples, own)).max())
-    holds = begun == PIECES and beside <= FOLLOWED_IN_PAUSE
-    return (ok if holds else note)(
-        'corner_pause',
-        f'After a pause of {paused:.1f} s the program began {begun} of {PIECES} pieces (bound '
-        f'{PIECES}) and kept within {1e3 * beside:.3f} mrad of the path (bound '
-        f'{1e3 * FOLLOWED_IN_PAUSE:g}): a socket goes on after a pause: {_verdict(holds)}.',
-        pause=paused,
-        pieces=begun,
-        beside=beside,
-        confirmed=holds,
-    )
-
-
-def _verdict(holds: bool) -> str:
-    return 'confirmed' if holds else 'not confirmed'
-
-
-def _following(samples: MotionSamples) -> Flags:
-    """Return a mask (n,) of the rows in which the program follows the pieces."""
-    found = np.zeros(len(samples.time), dtype=np.bool_)
-    changes = np.flatnonzero(np.abs(np.diff(samples.spline_time)) > 0.0)
-    if len(changes):
-        found[changes[0] + 1 : changes[-1] + 2] = True
-    return found
-
-
-def _since_start(samples: MotionSamples, own: Flags) -> Floats:
-    """Return the target joints (m, 6) of rows, after those at which the arm rested."""
-    return np.vstack([samples.target_q[:1], samples.target_q[own]])
-
-
-def _lag(samples: MotionSamples, own: Flags) -> float:
-    """Return the time [s] by which the measured joints follow the target, by least squares."""
-    speed = np.gradient(samples.target_q, samples.time, axis=0)[own]
-    behind = (samples.target_q - samples.actual_q)[own]
-    return float((behind * speed).sum() / max((speed * speed).sum(), 1e-12))
-
-
 def _resting_heights(samples: MotionSamples) -> list[float]:
     """Return the distances [m] of the target TCP from its start wherever it rests, in order."""
     speeds = np.abs(np.gradient(samples.target_distance, samples.time))
@@ -401,7 +246,6 @@ path_offset_disable(2)
 sleep({OFFSET_REST:g})"""
 _SLOW = f'a={TOOL_ACCELERATION:g}, v={TOOL_SPEED:g}'
 _WRIST = f'Wrist 3 turns by {degrees(WRIST_TURN):.0f} degrees and back, at up to'
-_NOT_FOLLOWED = 'The program followed no pieces: its log tells why.'
 _CORNER = (
     f'Wrist 3, then wrist 2 turn by {degrees(TURN):.0f} degrees with a rounded corner between '
     f'them, at up to {degrees(JOINT_SPEED):.0f} degrees/s'
@@ -474,8 +318,8 @@ EXPERIMENTS = (
             motion=f'The speed slider goes to {slider:.0%} and back to where it is. {_CORNER} '
             'times that, and back.',
             script=corner_script(),
-            analyse=_followed(f'corner_{100.0 * slider:.0f}', slider),
-            more=(_steps(f'steps_{100.0 * slider:.0f}'),),
+            analyse=followed(f'corner_{100.0 * slider:.0f}', slider),
+            more=(steps(f'steps_{100.0 * slider:.0f}'),),
             slider=slider,
             is_corner=True,
         )
@@ -488,7 +332,7 @@ EXPERIMENTS = (
             f'{_CORNER} times that, and back; the program is paused in the corner, and goes on.'
         ),
         script=corner_script(),
-        analyse=_corner_pause,
+        analyse=corner_pause,
         slider=0.1,
         is_corner=True,
         pauses=True,
