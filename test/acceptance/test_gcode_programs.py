@@ -11,6 +11,7 @@ written down here by hand.
 from math import atan2, cos, hypot, pi, sin
 from pathlib import Path
 
+from curve_distance import places_along
 import numpy as np
 import pytest
 from robot_cell import run_cell
@@ -104,24 +105,6 @@ def goal_of(folder, name):
     return goal_from_fields(read_goal_file(goal))
 
 
-def places_along(curve, positions):
-    """For each position the number of the side that it is on, and its distance from that [m]."""
-    side, found = 0, []
-    a, along = curve[:-1], np.diff(curve, axis=0)
-    square = np.einsum('ij,ij->i', along, along)
-    begins = np.concatenate(((0.0,), np.cumsum(square**0.5)))[:-1]
-    for position in positions:
-        # Between two reports the tool skips no side that is longer than its step.
-        last = int(np.searchsorted(begins, begins[side] + square[side] ** 0.5 + SHORT))
-        near = slice(side, last)
-        share = np.einsum('ij,ij->i', position - a[near], along[near]) / square[near]
-        foot = a[near] + np.clip(share, 0.0, 1.0)[:, None] * along[near]
-        off = np.linalg.norm(foot - position, axis=1)
-        side += int(np.argmin(off))
-        found.append((side, float(off.min())))
-    return found
-
-
 @pytest.mark.parametrize('name', CURVES)
 def test_a_file_is_carried_out_where_it_leads(tmp_path, name):
     goal = goal_of(tmp_path, name)
@@ -146,7 +129,7 @@ def test_a_file_is_carried_out_where_it_leads(tmp_path, name):
     positions, outputs = run_cell(scenario)
     begun = int(np.argmax(np.linalg.norm(positions - curve[0], axis=1) < NEAR))
     assert begun > 0
-    sides = places_along(curve, positions[begun:])
+    sides = places_along(curve, positions[begun:], SHORT)
     assert max(off for _, off in sides) < NEAR
     # Every side of the curve is passed, to its end.
     lengths = np.linalg.norm(np.diff(curve, axis=0), axis=1)

@@ -3,6 +3,7 @@
 """check-robot with robots of each generation, and with some that are closed or busy."""
 
 import asyncio
+from dataclasses import replace
 from io import StringIO
 import json
 import socket
@@ -14,10 +15,12 @@ from waiting import wait_for
 from ur_cartesian_driver.cli import check_robot, main
 from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec, RtdeState
+from ur_cartesian_driver.robot.check.corner_experiment import PAUSE_IN, PIECES
 from ur_cartesian_driver.robot.check.experiment_runner import run_experiment
 from ur_cartesian_driver.robot.check.experiments import EXPERIMENTS
 from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, skipped, Verdict
 from ur_cartesian_driver.robot.check.rtde_observations import INPUT_GROUPS
+from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
 
 pytestmark = pytest.mark.slow
 
@@ -185,9 +188,10 @@ def test_each_experiment_is_asked_for_moves_and_returns(ur_sim):
 
     findings, recordings = run_experiments(ur_sim, agree)
     assert asked == [experiment.motion for experiment in EXPERIMENTS]
-    for name, finding in findings.items():
+    for finding in findings.values():
         assert finding.verdict is Verdict.OK, finding.text
-        assert recordings[name].duration > 0.1
+    for experiment in EXPERIMENTS:
+        assert recordings[experiment.check].duration > 0.1
     for name in 'turn', 'timed_line', 'slider':
         assert findings[name].data['law']
     end = ur_sim.state()
@@ -208,11 +212,11 @@ def test_the_other_generations_move_too(ur_sim, generation):
     assert findings['joint_move'].verdict is Verdict.OK
 
 
-@pytest.mark.parametrize(('version', 'asked'), [('5.21.0.0', 6), ('10.12.0.0', 5)])
+@pytest.mark.parametrize(('version', 'asked'), [('5.21.0.0', 10), ('10.12.0.0', 9)])
 def test_what_the_software_is_not_known_to_have_is_not_tried(version, asked, monkeypatch):
     def experiment(address, experiment, agrees, recordings):
         tried.append(experiment.check)
-        return skipped(experiment.check, 'Not wanted')
+        return [skipped(experiment.check, 'Not wanted')]
 
     tried = []
     monkeypatch.setattr(check_robot, '_experiment', experiment)
@@ -220,9 +224,9 @@ def test_what_the_software_is_not_known_to_have_is_not_tried(version, asked, mon
     findings = check_robot.experiment_findings(
         RobotAddress(host='127.0.0.1'), observed, lambda _: True, {}
     )
-    assert len(findings) == 6
+    assert len(findings) == 10
     assert len(tried) == asked
-    assert ('path_offset' in tried) == (asked == 6)
+    assert ('path_offset' in tried) == (asked == 10)
 
 
 def test_nothing_moves_without_a_yes(ur_sim):
@@ -312,3 +316,62 @@ def test_who_interrupts_an_experiment_stops_the_arm_and_gets_the_slider_back(ur_
     wait_for(lambda: ur_sim.state().runtime_state is RuntimeState.STOPPED)
     wait_for(lambda: max(map(abs, ur_sim.state().qd)) == 0.0)
     assert ur_sim.state().speed_slider == 1.0
+
+
+# ---- what rounded corners assume of the robot -------------------------------------------------
+
+CORNER = {experiment.check: experiment for experiment in EXPERIMENTS}
+
+
+def corner(ur_sim, experiment):
+    """Carry out an experiment; return its findings by name."""
+    samples = asyncio.run(run_experiment(address(ur_sim), experiment))
+    analyses = (experiment.analyse, *experiment.more)
+    return {finding.check: finding for finding in (each(samples) for each in analyses)}
+
+
+@pytest.mark.ur_sim(frequency=125.0, imperfections=Imperfections(lag=0.02))
+def test_an_arm_that_lags_does_not_follow_speedj_within_a_step(ur_sim):
+    found = corner(ur_sim, CORNER['corner_100'])
+    assert found['corner_100'].verdict is Verdict.NOTE
+    assert found['corner_100'].data['lag'] == pytest.approx(0.02, abs=0.004)
+    assert 'followed within a step: not confirmed' in found['corner_100'].text
+    assert found['steps_100'].data['confirmed']
+
+
+@pytest.mark.ur_sim(frequency=125.0)
+def test_a_program_that_takes_too_long_misses_cycles(ur_sim):
+    late = CORNER['corner_100'].script.replace('  speedj(', '  sync()\n  speedj(')
+    found = corner(ur_sim, replace(CORNER['corner_100'], script=late))
+    assert found['steps_100'].verdict is Verdict.NOTE
+    assert found['steps_100'].data['missed'] > 40
+    assert 'ends within its cycle: not confirmed' in found['steps_100'].text
+
+
+@pytest.mark.ur_sim(frequency=125.0)
+def test_a_socket_that_dies_in_a_pause_is_found(ur_sim):
+    experiment = CORNER['corner_pause']
+
+    async def dying():
+        running = asyncio.create_task(run_experiment(address(ur_sim), experiment))
+        paused = asyncio.to_thread(
+            wait_for, lambda: ur_sim.state().runtime_state is RuntimeState.PAUSED, 30.0
+        )
+        await paused
+        ur_sim.inject('half_open sockets')
+        return await running
+
+    finding = experiment.analyse(asyncio.run(dying()))
+    assert finding.verdict is Verdict.NOTE
+    assert PAUSE_IN <= finding.data['pieces'] < PIECES
+    assert 'goes on after a pause: not confirmed' in finding.text
+    wait_for(lambda: max(map(abs, ur_sim.state().qd)) == 0.0)
+
+
+@pytest.mark.ur_sim(frequency=125.0)
+def test_a_robot_that_cannot_be_paused_answers_nothing(ur_sim):
+    finding = CORNER['corner_pause'].analyse(
+        asyncio.run(run_experiment(address(ur_sim), replace(CORNER['corner_10'], more=())))
+    )
+    assert finding.verdict is Verdict.NOTE
+    assert finding.text == 'The program was not paused in the corner.'

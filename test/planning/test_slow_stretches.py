@@ -7,6 +7,7 @@ Stretches on which a plan is slower than asked, the reasons, and goals refused f
 """
 
 from dataclasses import replace
+from math import nan
 
 import pytest
 
@@ -98,6 +99,26 @@ def test_the_cause_is_named_and_refused_on_demand(of, options, cause):
         planned(replace(of, min_speed_fraction=0.9), **options)
     assert SlowCause(cause).value in str(refusal.value)
     assert any(cause.value in line for line in speed_advice(planned(of).find_slow_stretches()))
+
+
+def test_the_acceleration_on_the_arc_of_a_blend_is_no_joint_limit():
+    segment = Segment(type=PROCESS, velocity=0.2, blend_radius=0.005)
+    of = replace(goal(*CORNER, segment=segment), min_speed_fraction=0.9)
+    with pytest.raises(InvalidGoal, match='because of max_linear_acceleration = 1 m/s') as refusal:
+        planned(of, max_linear_acceleration=1.0)
+    assert SlowCause.ACCELERATION_LIMIT.value in str(refusal.value)
+
+
+def test_a_spline_slowed_by_the_acceleration_of_the_tool_is_not_advised_to_raise_its_speed():
+    places = (0.02, 0.3), (0.04, 0.6), (0.07, 1.0), (0.09, 1.3), (0.11, 1.7)
+    points = tuple(
+        Waypoint(pose=at(y=y), time=time, twist=(0.0 if time == 1.7 else nan,) * 6)
+        for y, time in places
+    )
+    of = Goal(waypoints=points, execution=ExecutionMode.SPLINE)
+    found = planned(of, max_linear_acceleration=0.8, on_too_fast='slow', max_tool_speed=1.0)
+    slow = [each for each in found.find_slow_stretches() if 'max_linear' in each.reason]
+    assert {each.cause for each in slow} == {SlowCause.ACCELERATION_LIMIT}
 
 
 def test_a_joint_limit_is_refused_as_one():

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from math import pi
+import re
 
 import numpy as np
 import pytest
@@ -74,6 +75,21 @@ def test_the_table_has_a_line_for_each_segment_and_the_sum():
     assert lines[3].split()[:2] == ['2', 'MoveJ']
     assert lines[4].split()[0] == 'sum'
     assert f'{PLAN.duration:.3f} s' in lines[4]
+
+
+def test_the_columns_of_the_table_are_as_wide_as_their_widest_cell():
+    """A rounded path has more pieces to a point than the column was wide."""
+    points = tuple(Waypoint(pose=moved(0.1 * k, 0.0, 0.01 * (k % 2))) for k in (1, 2, 3))
+    goal = Goal(waypoints=points, segments=(Segment(velocity=0.02),) * 3, corner_deviation=2e-4)
+    head, *rows, total = table(plan(goal, STATE, ARM, PlanningOptions())).splitlines()
+    assert any(re.search(r'Spline x \d\d', row) for row in rows)
+    for column in ('length', 'turn', 'time', 'blend'):
+        end = head.index(column) + len(column)
+        for row in rows:
+            assert row[end - 1] != ' '
+            assert row[end : end + 1] in ('', ' ')
+    for unit in (' m ', ' s'):
+        assert {row.rindex(unit) for row in (*rows, total)} == {rows[0].rindex(unit)}
 
 
 def test_postures_are_those_of_the_start_and_of_each_segment():

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.robot.check import experiments
+from ur_cartesian_driver.robot.check.corner_experiment import corner_pieces, PIECE, PIECES, TURN
 from ur_cartesian_driver.robot.check.experiments import (
     EXPERIMENTS,
     JOINT_ACCELERATION,
     JOINT_SPEED,
-    MotionSamples,
     program,
     return_program,
     TIMED_DISTANCE,
@@ -24,9 +25,15 @@ from ur_cartesian_driver.robot.check.experiments import (
     WRIST_TURN,
 )
 from ur_cartesian_driver.robot.check.finding import Verdict
+from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 
 CYCLE = 0.002
 ANALYSES = {experiment.check: experiment.analyse for experiment in EXPERIMENTS}
+ANALYSES_MORE = {
+    experiment.check.replace('corner', 'steps'): analyse
+    for experiment in EXPERIMENTS
+    for analyse in experiment.more
+}
 
 
 def trapezoid(distance, speed, acceleration, stretched=1.0):
@@ -195,3 +202,50 @@ def test_a_path_offset_shows_where_and_how_long_it_is_applied(made, missing):
     finding = ANALYSES['path_offset'](made)
     assert finding.data['missing'] == missing
     assert finding.verdict is (Verdict.NOTE if missing else Verdict.OK)
+
+
+def cornered(time, spline_time):
+    """Return the samples of a program that reports its time in pieces of 20 ms."""
+    n = len(time)
+    return replace(
+        samples(np.zeros(n - 2 * int(0.3 / CYCLE))),
+        time=np.asarray(time),
+        spline_time=np.asarray(spline_time),
+        pieces_begun=np.floor(np.linspace(0.0, PIECES, n)),
+    )
+
+
+def test_cycles_without_a_step_are_counted_behind_the_first_piece_and_without_gaps_of_rtde():
+    time = CYCLE * np.arange(900.0)
+    made = 1.0 + CYCLE * np.arange(900.0)
+    made[3:6] = made[3]  # the program learns the slider
+    finding = ANALYSES_MORE['steps_100'](cornered(time, made))
+    assert finding.data['confirmed']
+    gap = np.delete(time, 500), np.delete(made, 500)
+    assert ANALYSES_MORE['steps_100'](cornered(*gap)).data['missed'] == 0
+    made[600:603] = made[600]
+    finding = ANALYSES_MORE['steps_100'](cornered(time, made))
+    assert finding.data['missed'] == 2
+    assert finding.verdict is Verdict.NOTE
+
+
+@pytest.mark.parametrize('check', ['corner_100', 'steps_100', 'corner_pause'])
+def test_a_robot_without_the_registers_confirms_nothing(check):
+    nothing = np.full(900, np.nan)
+    made = replace(
+        cornered(CYCLE * np.arange(900.0), nothing), runtime_state=nothing, pieces_begun=nothing
+    )
+    finding = {**ANALYSES, **ANALYSES_MORE}[check](made)
+    assert finding.verdict is Verdict.NOTE
+    assert 'confirmed' not in finding.data
+
+
+def test_the_corner_is_smooth_and_turns_two_wrists():
+    start = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
+    pieces = corner_pieces(start)
+    path = JointSpline.of(start, pieces)
+    q, qd, qdd = path.rows(np.arange(0.0, PIECE * PIECES, 1e-3))
+    assert len(pieces) == PIECES
+    assert q[-1] - q[0] == pytest.approx([0.0] * 4 + [TURN] * 2, abs=1e-5)
+    assert np.abs(np.diff(qdd, axis=0)).max() < 0.3
+    assert np.linalg.norm(qd, axis=1).max() < 1.001 * JOINT_SPEED

@@ -83,3 +83,24 @@ def _dense(curve):
         for i, n in enumerate(counts)
     ]
     return np.vstack([*parts, curve[-1:]])
+
+
+def places_along(curve: np.ndarray, positions: np.ndarray, reach: float):
+    """
+    Return for each position (n, 3) the side of a polyline that it is on, and its distance [m].
+
+    :param reach: two positions skip no side that is longer than this [m].
+    """
+    side, found = 0, []
+    a, along = curve[:-1], np.diff(curve, axis=0)
+    square = np.einsum('ij,ij->i', along, along)
+    begins = np.concatenate(((0.0,), np.cumsum(square**0.5)))[:-1]
+    for position in positions:
+        last = int(np.searchsorted(begins, begins[side] + square[side] ** 0.5 + reach))
+        near = slice(side, last)
+        share = np.einsum('ij,ij->i', position - a[near], along[near]) / square[near]
+        foot = a[near] + np.clip(share, 0.0, 1.0)[:, None] * along[near]
+        off = np.linalg.norm(foot - position, axis=1)
+        side += int(np.argmin(off))
+        found.append((side, float(off.min())))
+    return found

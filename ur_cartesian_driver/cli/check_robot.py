@@ -18,8 +18,9 @@ from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.program.render import has_feature
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.robot.check.experiment_runner import motion_refusal, run_experiment
-from ur_cartesian_driver.robot.check.experiments import Experiment, EXPERIMENTS, MotionSamples
+from ur_cartesian_driver.robot.check.experiments import Experiment, EXPERIMENTS
 from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, skipped, Verdict
+from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 from ur_cartesian_driver.robot.check.observations import observe
 
 #: Exit status: nothing answers at the address; something keeps the driver from working.
@@ -79,10 +80,12 @@ def experiment_findings(
         findings = []
         for experiment in EXPERIMENTS:
             if _is_known_by(experiment, observed):
-                findings.append(_experiment(address, experiment, agrees, recordings))
+                found = _experiment(address, experiment, agrees, recordings)
             else:
-                findings.append(skipped(experiment.check, 'The software is not known to have it'))
-            show(findings[-1])
+                found = [skipped(experiment.check, 'The software is not known to have it')]
+            for finding in found:
+                show(finding)
+            findings += found
     return findings
 
 
@@ -102,20 +105,20 @@ def _experiment(
     experiment: Experiment,
     agrees: Callable[[str], bool],
     recordings: dict[str, MotionSamples],
-) -> Finding:
+) -> list[Finding]:
     try:
         if refusal := asyncio.run(motion_refusal(address)):
-            return skipped(experiment.check, f'No motion: {refusal}')
+            return [skipped(experiment.check, f'No motion: {refusal}')]
         if not agrees(experiment.motion):
-            return skipped(experiment.check, 'Not wanted')
+            return [skipped(experiment.check, 'Not wanted')]
         if refusal := asyncio.run(motion_refusal(address)):  # again, after the person's answer
-            return skipped(experiment.check, f'No motion: {refusal}')
+            return [skipped(experiment.check, f'No motion: {refusal}')]
         samples = asyncio.run(run_experiment(address, experiment))
     except (OSError, DriverError) as error:
         text = f'Not finished: {str(error).rstrip(".")}.'
-        return Finding(check=experiment.check, verdict=Verdict.PROBLEM, text=text)
+        return [Finding(check=experiment.check, verdict=Verdict.PROBLEM, text=text)]
     recordings[experiment.check] = samples
-    return experiment.analyse(samples)
+    return [analyse(samples) for analyse in (experiment.analyse, *experiment.more)]
 
 
 def ask(motion: str) -> bool:

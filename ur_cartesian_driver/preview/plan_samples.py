@@ -71,10 +71,16 @@ def sample(plan: Plan, arm: Arm, T_flange_tcp: Pose, period: float) -> Preview:
 def table(plan: Plan) -> str:
     """Return the plan as text: a line for the motion to each point, and one for the sum."""
     length = sum(segment.length for segment in plan.segments)
-    lines = [f'{"point":>5}  {"command":<10} {"length":>9} {"turn":>8} {"time":>9} {"blend":>7}']
-    lines += [_line(segments) for segments in _to_points(plan)]
-    lines.append(f'{"sum":>5}  {"":<10} {length:7.3f} m {"":>8} {_time(plan.segments)}')
-    return '\n'.join(lines)
+    motions = _to_points(plan)
+    commands = [_command(segments) for segments in motions]
+    width = max(10, *map(len, commands))
+    head = f'{"point":>5}  {"command":<{width}} {"length":>9} {"turn":>7} {"time":>9} {"blend":>7}'
+    lines = [
+        _line(segments, f'{command:<{width}}')
+        for segments, command in zip(motions, commands, strict=True)
+    ]
+    total = f'{"sum":>5}  {"":<{width}} {length:7.3f} m {"":>7} {_time(plan.segments)}'
+    return '\n'.join([head, *lines, total])
 
 
 def postures(plan: Plan) -> str:
@@ -99,16 +105,24 @@ def _to_points(plan: Plan) -> list[list[PlannedSegment]]:
     ]
 
 
-def _line(segments: Sequence[PlannedSegment]) -> str:
-    moving = [segment for segment in segments if not isinstance(segment.primitive, Stop)]
-    primitive, pieces = moving[-1].primitive, len(moving)
-    name = type(primitive).__name__ + (f' x {pieces}' if pieces > 1 else '')
-    blend = 1e3 * getattr(primitive, 'blend_radius', 0.0)
+def _moving(segments: Sequence[PlannedSegment]) -> list[PlannedSegment]:
+    return [segment for segment in segments if not isinstance(segment.primitive, Stop)]
+
+
+def _command(segments: Sequence[PlannedSegment]) -> str:
+    """Return the name of the motion to a point, and the number of its pieces if several."""
+    moving = _moving(segments)
+    name = type(moving[-1].primitive).__name__
+    return f'{name} x {len(moving)}' if len(moving) > 1 else name
+
+
+def _line(segments: Sequence[PlannedSegment], command: str) -> str:
+    blend = 1e3 * getattr(_moving(segments)[-1].primitive, 'blend_radius', 0.0)
     length, angle = (
         sum(getattr(segment, quantity) for segment in segments) for quantity in ('length', 'angle')
     )
     return (
-        f'{segments[0].waypoint:>5}  {name:<10} {length:7.3f} m {degrees(angle):6.1f}'
+        f'{segments[0].waypoint:>5}  {command} {length:7.3f} m {degrees(angle):6.1f}'
         f'\N{DEGREE SIGN} {_time(segments)} {blend:4.0f} mm'
     )
 

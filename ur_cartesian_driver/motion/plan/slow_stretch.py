@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 #: A tool that is slower by less than this fraction is not slow.
 SLOWER_BY = 0.02
@@ -34,8 +35,20 @@ class SlowCause(Enum):
         'take another posture, a free_axis, a path away from singularities, or less speed'
     )
     TOOL_LIMIT = 'raise max_tool_speed, or ask for less speed'
+    ACCELERATION_LIMIT = (
+        'raise max_linear_acceleration or max_angular_acceleration, widen the curve, or ask for '
+        'less speed'
+    )
     TURN = 'turn the tool less, or over more of the path, or leave its axis free (free_axis)'
     TIMES = 'space points and times evenly, with twists of .nan (chosen by the driver)'
+
+
+class SpeedLimit(NamedTuple):
+    """A limit that slows the tool."""
+
+    cause: SlowCause
+    #: Name and value of the limit, and the place where it holds.
+    text: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,6 +20,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
 from ur_cartesian_driver.motion.plan.plan import PlannedSegment
+from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
 from ur_cartesian_driver.planning.moves.move_chain import MoveChain, Moves
 from ur_cartesian_driver.planning.moves.path_samples import BlendSamples
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
@@ -251,24 +252,27 @@ class SegmentTimings:
         slowed: Flags = np.append(self._arc_leads, False)[self._slowed_at]  # -1 = none
         return slowed
 
-    def _limit_name(self, row: int) -> str:
-        """Return the name of the limit that slows a segment."""
+    def _limit(self, row: int) -> SpeedLimit:
+        """Return the limit that slows a segment."""
         sample, samples = int(self._slowed_at[row]), self._samples
         if sample < 0:
-            return self.requests.limits.name(row)
+            return self.requests.limits.limit(row)
         if self._arc_leads[sample]:
             point = samples.index[sample]
             radius = self._geometries.path.arc_radius[point - self._geometries.begin]
-            return (
+            return SpeedLimit(
+                SlowCause.ACCELERATION_LIMIT,
                 f'max_linear_acceleration = {self._options.max_linear_acceleration:g} m/s^2 (in '
-                f'the blend at point {point}, an arc with a radius of {1e3 * radius:.3g} mm)'
+                f'the blend at point {point}, an arc with a radius of {1e3 * radius:.3g} mm)',
             )
         if samples.joint_time[sample] < self._tool_time[sample]:
-            return f'max_tool_speed = {self._options.max_tool_speed:g} m/s'
+            text = f'max_tool_speed = {self._options.max_tool_speed:g} m/s'
+            return SpeedLimit(SlowCause.TOOL_LIMIT, text)
         joint = int(samples.joint[sample])
-        return (
+        return SpeedLimit(
+            SlowCause.JOINT_LIMIT,
             f'the joint speed limits ({JOINT_NAMES[joint]} in the blend at point '
-            f'{samples.index[sample]}{self._model.speed_source(joint)})'
+            f'{samples.index[sample]}{self._model.speed_source(joint)})',
         )
 
     def bounds(self) -> tuple[Floats, Floats]:
@@ -329,19 +333,19 @@ class SegmentTimings:
         for row in rows_where(is_late | takes_longer | is_slower | is_ahead | refused):
             point = self._geometries.begin + row
             if is_late[row] or takes_longer[row] or is_slower[row]:
-                requests.limited[row] = self._limit_name(row)
+                requests.limited[row] = self._limit(row)
             if is_late[row]:
                 remarks[row] = self._too_fast(row)
             elif takes_longer[row]:
                 remarks[row] = (
                     f'point {point}: takes {self.wire_times[row]:.3f} s instead of '
-                    f'{1.0 / requests.rate[row]:.3f} s, because of {self._limit_name(row)}'
+                    f'{1.0 / requests.rate[row]:.3f} s, because of {self._limit(row).text}'
                 )
             elif is_slower[row]:
                 remarks[row] = (
                     f'point {point}: slowed from {requests.speed[row]:.3g} to '
                     f'{self._moves.speed[row]:.3g} {requests.limits.unit(row)} by '
-                    f'{self._limit_name(row)}'
+                    f'{self._limit(row).text}'
                 )
             elif is_ahead[row]:
                 remarks[row] = (
@@ -411,7 +415,7 @@ class SegmentTimings:
         requests, limits, options = self.requests, self.requests.limits, self._options
         point, min_time = self._geometries.begin + row, float(self._wanted[row])
         time, length = self._geometries.times[row], requests.length[row]
-        unit, name = limits.unit(row), self._limit_name(row)
+        unit, name = limits.unit(row), self._limit(row).text
         where = point_field(point, 'time_from_start')
         if min_time > options.max_segment_time:
             raise TooFast(

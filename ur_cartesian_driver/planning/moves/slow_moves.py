@@ -212,10 +212,7 @@ class _SlowMoves:
                 speed = times.cruise[row] * self._ratio[row]
                 reason = f'the segment is too short for more than {speed:.3g} m/s'
             elif limit is not None:
-                cause = (
-                    SlowCause.TOOL_LIMIT if 'max_tool_speed' in limit else SlowCause.JOINT_LIMIT
-                )
-                reason = f'of {limit}'
+                cause, reason = limit.cause, f'of {limit.text}'
             elif self._turns[row]:
                 cause, reason = SlowCause.TURN, 'the tool turns that far on the segment'
             else:

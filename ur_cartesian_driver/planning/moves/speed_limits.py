@@ -18,6 +18,7 @@ from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
+from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
 from ur_cartesian_driver.planning.geometry.blended_path import CurveRows
 from ur_cartesian_driver.planning.geometry.curves import SAME_POSITION
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
@@ -81,18 +82,20 @@ class SpeedLimits:
         """Return the unit of the speed of a segment."""
         return 'of the limits' if self.is_optimized[row] else f'{self.length_unit(row)}/s'
 
-    def name(self, row: int) -> str:
-        """Return the name of the limit on the speed of a segment."""
+    def limit(self, row: int) -> SpeedLimit:
+        """Return the limit on the speed of a segment."""
         if not self._is_joint_limit[row]:
-            return f'max_tool_speed = {self._options.max_tool_speed:g} m/s'
+            text = f'max_tool_speed = {self._options.max_tool_speed:g} m/s'
+            return SpeedLimit(SlowCause.TOOL_LIMIT, text)
         joint, fraction = int(self._joint[row]), self._bounds.fractions[row]
         name, source = JOINT_NAMES[joint], self._model.speed_source(joint)
         if self._is_joint_move[row]:
             limit = self._model.max_joint_speed[joint]
-            return f'the speed limit of {name}, {limit:.3f} rad/s{source}'
-        return (
-            f'the joint speed limits ({name} at {100.0 * fraction:.0f} % of the segment{source})'
-        )
+            text = f'the speed limit of {name}, {limit:.3f} rad/s{source}'
+        else:
+            place = f'{name} at {100.0 * fraction:.0f} % of the segment'
+            text = f'the joint speed limits ({place}{source})'
+        return SpeedLimit(SlowCause.JOINT_LIMIT, text)
 
     def _joint_moves(self, rows: Indices, curves: CurveRows) -> tuple[Floats, Indices]:
         """Return the greatest speeds (m,) of joint moves, and the joints (m,) that limit them."""

@@ -19,6 +19,7 @@ from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
 from ur_cartesian_driver.motion.plan.plan import PlannedSegment
 from ur_cartesian_driver.motion.plan.primitive import Spline, Stop
+from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
 from ur_cartesian_driver.planning.moves.move_chain import Moves
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.speed_limits import SpeedLimits
@@ -123,7 +124,7 @@ class SpeedRequests:
         #: Remarks on changes due to the limits, by row.
         self.remarks: dict[int, str] = {}
         #: Names of the limits that make a segment slower than requested, by row.
-        self.limited: dict[int, str] = {}
+        self.limited: dict[int, SpeedLimit] = {}
         self._wanted = np.full(len(geometries), nan)
         self._source = np.zeros(len(geometries), dtype=np.intp)
         self.time, self.min_time = geometries.times.copy(), np.zeros(len(geometries))
@@ -216,13 +217,13 @@ class SpeedRequests:
         both = self._source == _SOURCES.index(_BOTH)
         self._wanted = np.where(both, np.minimum(wanted, options.linear_velocity), wanted)
         for row in rows_where(velocity < wanted * _ROUNDED):
-            name, unit = limits.name(row), limits.unit(row)
+            limit, unit = limits.limit(row), limits.unit(row)
             if at_speed_of_tool[row]:
-                name, unit = 'max_tool_speed', 'm/s'
-            self.limited[row] = name
+                limit, unit = SpeedLimit(SlowCause.TOOL_LIMIT, 'max_tool_speed'), 'm/s'
+            self.limited[row] = limit
             self.remarks[row] = (
                 f'point {self.geometries.begin + row}: slowed from {wanted[row]:.3g} to '
-                f'{velocity[row]:.3g} {unit} by {name}'
+                f'{velocity[row]:.3g} {unit} by {limit.text}'
             )
         own = self.geometries.segments.accelerations
         acceleration = np.where(own > 0.0, np.maximum(own, _TINY), self._default_accelerations())
@@ -301,11 +302,11 @@ class SpeedRequests:
         )
         for k in rows_where(time > wanted * _NOTICEABLY):
             row = int(rows[k])
-            self.limited[row] = self.limits.name(row)
+            self.limited[row] = self.limits.limit(row)
             before = f'{self.remarks[row]}; ' if row in self.remarks else ''
             self.remarks[row] = (
                 f'{before}point {self.geometries.begin + row}: turns in {time[k]:.3f} s instead '
-                f'of {wanted[k]:.3f} s, because of {self.limits.name(row)}'
+                f'of {wanted[k]:.3f} s, because of {self.limited[row].text}'
             )
         # If no time is sent, speeding up, cruising and braking take a third of the time each.
         speed = length / time * np.where(timed, peak, _PEAK)

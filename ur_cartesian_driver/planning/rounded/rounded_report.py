@@ -102,8 +102,9 @@ class RoundedReport:
             f'joints: {pieces} quintic pieces in {total:.3f} s ({pieces / total:.0f} a second), '
             f'which keep the tool within {1e3 * polynomials.distance:.3f} mm and '
             f'{polynomials.angle:.5f} rad of the rounded path',
-            'assumed of the robot: it follows each piece within a control cycle, at any speed of '
-            'the slider and after a pause (doc/robot_program.md); all else here is planned',
+            'assumed of the robot: speedj is followed within a step, the program steps in every '
+            'cycle, a socket goes on after a pause; ur-cartesian check-robot --with-motion checks '
+            'them (corner_*, steps_*, corner_pause); all else here is planned',
             motion.path.tightest_margins.remark,
         ]
 

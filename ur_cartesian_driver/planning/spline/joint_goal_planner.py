@@ -320,7 +320,7 @@ def _fit_to_limits(
         raise found.refusal(rates='velocities')
     slowed = trajectory.stretched(found.factor)
     found.check_slowed(slowed.times, slowed.first, options)
-    return slowed, (stretch_remark(found.factor, found.reason, slowed.times[-1]),)
+    return slowed, (stretch_remark(found.factor, found.speed_limit, slowed.times[-1]),)
 
 
 def _segments(trajectory: _Trajectory, samples: _Samples, durations: Floats) -> PlannedRows:

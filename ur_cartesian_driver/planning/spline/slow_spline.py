@@ -15,7 +15,12 @@ import numpy as np
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Int64s
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
-from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SLOWER_BY, SlowStretch
+from ur_cartesian_driver.motion.plan.slow_stretch import (
+    SlowCause,
+    SLOWER_BY,
+    SlowStretch,
+    SpeedLimit,
+)
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.spline.joint_polynomials import JointPolynomials
 from ur_cartesian_driver.planning.spline.spline_path import SplinePath
@@ -37,14 +42,15 @@ def slow_spline_stretches(
     polynomials: JointPolynomials,
     twists: Floats,
     stretch: float,
-    limit: str,
+    limit: SpeedLimit | None,
     slower_by: float = SLOWER_BY,
 ) -> tuple[SlowStretch, ...]:
     """
     Return the slow stretches of a spline from rest to rest.
 
     :param twists: (n, 6) the twists of the goal's points; NaN and 0 = none.
-    :param stretch: the factor by which the times of the goal were stretched because of a limit.
+    :param stretch: the factor by which the times of the goal were stretched because of the limit.
+    :param limit: that limit; None = there was none.
     :param slower_by: a speed is too low if it is more than this fraction below the requested one.
     """
     piece, u, times = _places(path)
@@ -66,9 +72,8 @@ def slow_spline_stretches(
         point, rests = path.first + int(piece[slowest]), bool(speeds[slowest] < _REST)
         reason = f'times and twists at both ends of the segment to point {point} leave it so'
         cause = SlowCause.TIMES
-        if stretch * speeds[slowest] >= wanted[slowest]:
-            cause = SlowCause.TOOL_LIMIT if 'tool' in limit else SlowCause.JOINT_LIMIT
-            reason = f'of {limit}'
+        if limit and stretch * speeds[slowest] >= wanted[slowest]:
+            cause, reason = limit.cause, f'of {limit.text}'
         elif is_ramp:
             cause = SlowCause.RAMP
             reason = 'the arm starts from rest' if first == 0 else 'the arm comes to rest'

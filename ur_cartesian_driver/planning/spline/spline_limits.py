@@ -20,6 +20,7 @@ from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Int32s
+from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
@@ -29,8 +30,9 @@ _ROUNDING = 1e-6
 
 
 #: A quantity along a spline: name of the tool or joint to which it belongs, values (m,), limit,
-#: power of time (1 for speeds, 2 for accelerations), unit, and name of the limit.
-_Quantity: TypeAlias = tuple[str, Floats, float, int, str, str]
+#: power of time (1 for speeds, 2 for accelerations), unit, name of the limit, and why the tool is
+#: slow where the limit holds.
+_Quantity: TypeAlias = tuple[str, Floats, float, int, str, str, SlowCause]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,6 +51,8 @@ class LimitExcess:
     fraction: float
     #: The greatest value.
     needed: float
+    #: Why the tool is slow if the times are stretched to keep the limit.
+    cause: SlowCause
 
     @property
     def limit_text(self) -> str:
@@ -71,9 +75,10 @@ class LimitExcess:
         )
 
     @property
-    def reason(self) -> str:
+    def speed_limit(self) -> SpeedLimit:
         """The limit, and the place where it is exceeded."""
-        return f'{self.limit_text} ({self.what}, on the segment to point {self.point})'
+        text = f'{self.limit_text} ({self.what}, on the segment to point {self.point})'
+        return SpeedLimit(self.cause, text)
 
     def check_slowed(self, times: Floats, first: int, options: PlanningOptions) -> None:
         """
@@ -93,10 +98,11 @@ class LimitExcess:
             )
 
 
-def stretch_remark(factor: float, reason: str, duration: float) -> str:
+def stretch_remark(factor: float, limit: SpeedLimit, duration: float) -> str:
     """Return the remark on times that are stretched by ``factor``, with the total duration."""
     return (
-        f'all times are stretched by {factor:.4g}, because of {reason}: {duration:.3f} s in total'
+        f'all times are stretched by {factor:.4g}, because of {limit.text}: {duration:.3f} s '
+        'in total'
     )
 
 
@@ -141,7 +147,7 @@ def worst_excess_of(
 ) -> LimitExcess | None:
     """Return the quantity in samples that exceeds its limit most; None if none does."""
     worst: LimitExcess | None = None
-    for what, values, limit, power, unit, name in _quantities(samples, model, options):
+    for what, values, limit, power, unit, name, cause in _quantities(samples, model, options):
         row = int(np.argmax(values))
         peak = float(values[row])
         factor = (peak / limit) ** (1.0 / power)
@@ -155,6 +161,7 @@ def worst_excess_of(
                 point=int(samples.points[row]),
                 fraction=float(samples.u[row]),
                 needed=peak,
+                cause=cause,
             )
     return worst
 
@@ -164,15 +171,18 @@ def _quantities(
 ) -> Iterator[_Quantity]:
     if options.max_tool_speed > 0.0:
         speed = np.linalg.norm(samples.twists[:, :3], axis=1)
-        yield 'the tool', speed, options.max_tool_speed, 1, 'm/s', 'max_tool_speed'
+        limit, name = options.max_tool_speed, 'max_tool_speed'
+        yield 'the tool', speed, limit, 1, 'm/s', name, SlowCause.TOOL_LIMIT
+    cause = SlowCause.ACCELERATION_LIMIT
     for part, name, unit in (
         (slice(0, 3), 'max_linear_acceleration', 'm/s^2'),
         (slice(3, 6), 'max_angular_acceleration', 'rad/s^2'),
     ):
         values = np.linalg.norm(samples.accelerations[:, part], axis=1)
-        yield 'the tool', values, getattr(options, name), 2, unit, name
+        yield 'the tool', values, getattr(options, name), 2, unit, name, cause
     bound, name = options.max_joint_acceleration, 'max_joint_acceleration'
+    cause = SlowCause.JOINT_LIMIT
     for k, (joint, limit) in enumerate(zip(JOINT_NAMES, model.max_joint_speed, strict=True)):
         source = f'the joint speed limit{model.speed_source(k)}'
-        yield joint, np.abs(samples.qd[:, k]), limit, 1, 'rad/s', source
-        yield joint, np.abs(samples.qdd[:, k]), bound, 2, 'rad/s^2', name
+        yield joint, np.abs(samples.qd[:, k]), limit, 1, 'rad/s', source, cause
+        yield joint, np.abs(samples.qdd[:, k]), bound, 2, 'rad/s^2', name, cause

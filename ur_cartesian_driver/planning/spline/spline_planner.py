@@ -40,7 +40,7 @@ from ur_cartesian_driver.motion.plan.plan import (
     ReferencePath,
 )
 from ur_cartesian_driver.motion.plan.primitive import Spline
-from ur_cartesian_driver.motion.plan.slow_stretch import SlowStretch
+from ur_cartesian_driver.motion.plan.slow_stretch import SlowStretch, SpeedLimit
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.min_speed import slower_by
@@ -274,17 +274,17 @@ def _fit_to_limits(
     start: SplineState,
     goal: GoalTable,
     options: PlanningOptions,
-) -> tuple[SplinePath, float, str]:
-    """Return the path, slowed if necessary, the factor on times, and the limit ('' = none)."""
+) -> tuple[SplinePath, float, SpeedLimit | None]:
+    """Return the path, slowed if necessary, the factor on times, and the limit, if any."""
     found = worst_excess(kinematics, path, options)
     if found is None:
-        return path, 1.0, ''
+        return path, 1.0, None
     in_parts = start.is_moving or goal.keep_open
     if options.on_too_fast != 'slow' or in_parts:
         raise found.refusal(may_slow=not in_parts)
     path = path.stretch_times(found.factor)
     found.check_slowed(path.spline.times, path.first, options)
-    return path, found.factor, found.reason
+    return path, found.factor, found.speed_limit
 
 
 def _segments(path: SplinePath, polynomials: JointPolynomials, goal: GoalTable) -> PlannedRows:

@@ -326,6 +326,8 @@ class PrimaryCommand(Enum):
     RUN = 'set robotmode run'
     UNLOCK_PROTECTIVE_STOP = 'set unlock protective stop'
     STOP_PROGRAM = 'stop program'
+    PAUSE_PROGRAM = 'pause program'
+    RESUME_PROGRAM = 'resume program'
 
 
 def encode_command(line: PrimaryCommand) -> bytes:

@@ -12,18 +12,27 @@ from typing import Any
 import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     encode_command,
     PrimaryCommand,
 )
+from ur_cartesian_driver.protocol.program.registers import OutputInteger
+from ur_cartesian_driver.robot.check.corner_experiment import (
+    corner_messages,
+    HOST,
+    PAUSE_IN,
+    PORT,
+    SPLINE_TIME,
+)
 from ur_cartesian_driver.robot.check.experiments import (
     Experiment,
-    MotionSamples,
     program,
     return_program,
 )
 from ur_cartesian_driver.robot.check.finding import RobotAddress
+from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 from ur_cartesian_driver.robot.check.primary_observations import (
     LOCAL_CONTROL,
     PrimaryProbe,
@@ -32,13 +41,19 @@ from ur_cartesian_driver.robot.check.rtde_recorder import RtdeRecorder
 from ur_cartesian_driver.robot.rtde.probe import read_state
 from ur_cartesian_driver.robot.services.rtde_input_writer import speed_slider_write, write_inputs
 from ur_cartesian_driver.robot.services.service_calls import SetSpeedSliderCall
+from ur_cartesian_driver.robot.transport import plain_address
 
+_PIECES_BEGUN = f'output_int_register_{int(OutputInteger.POINTS_BEGUN)}'
+_SPLINE_TIME = f'output_double_register_{SPLINE_TIME}'
 RECORDED = (
     'timestamp', 'target_q', 'actual_q', 'target_TCP_pose', 'actual_TCP_pose', 'target_TCP_speed',
     'speed_scaling', 'target_speed_fraction', 'runtime_state', 'safety_mode',
+    _PIECES_BEGUN, _SPLINE_TIME,
 )  # fmt: skip
 #: Longest time until a program moves the arm [s]; until the program ends [s].
 START_TIMEOUT, END_TIMEOUT = 3.0, 30.0
+#: How long a program is paused [s].
+PAUSE = 0.5
 #: Time recorded before and after the motion [s].
 MARGIN = 0.3
 #: The tool is moved back if it ends farther than this from its start [m].
@@ -106,6 +121,9 @@ async def _move(experiment: Experiment, recorder: RtdeRecorder, probe: PrimaryPr
     """Run the program; return the stop command's time by the controller's clock [s], or NaN."""
     await asyncio.sleep(MARGIN)
     stop_sent = float('nan')
+    if experiment.is_corner:
+        await _follow_corner(experiment, recorder, probe)
+        return stop_sent
     await _start(recorder, probe, program(experiment.check, experiment.script))
     if experiment.stop_after is not None:
         due = recorder.newest['timestamp'] + experiment.stop_after
@@ -115,6 +133,56 @@ async def _move(experiment: Experiment, recorder: RtdeRecorder, probe: PrimaryPr
     await _finish(recorder)
     await asyncio.sleep(MARGIN)
     return stop_sent
+
+
+async def _follow_corner(
+    experiment: Experiment, recorder: RtdeRecorder, probe: PrimaryProbe
+) -> None:
+    """Run the program that follows a corner, and be the other end of its socket."""
+    first, rest = corner_messages(vector6(recorder.newest['target_q']))
+    connected: list[asyncio.StreamWriter] = []
+
+    async def send(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        if plain_address(writer.get_extra_info('peername')[0]) != plain_address(
+            recorder.peer_address
+        ):
+            writer.close()  # only the robot is served
+            return
+        connected.append(writer)
+        writer.write(first if experiment.pauses else first + rest)
+
+    host = recorder.local_address
+    server = await asyncio.start_server(send, host, 0)
+    try:
+        port = str(server.sockets[0].getsockname()[1])
+        script = experiment.script.replace(HOST, host).replace(PORT, port)
+        await _start(recorder, probe, program(experiment.check, script))
+        if experiment.pauses:
+            await _pause(recorder, probe)
+            for writer in connected:
+                writer.write(rest)
+            probe.send(encode_command(PrimaryCommand.RESUME_PROGRAM))
+        await _finish(recorder)
+        await asyncio.sleep(MARGIN)
+    finally:
+        for writer in connected:
+            writer.close()
+        server.close()
+
+
+async def _pause(recorder: RtdeRecorder, probe: PrimaryProbe) -> None:
+    """
+    Pause the program in the corner for a while, if the robot takes the command.
+
+    :raises OSError: the program does not get as far as the corner.
+    """
+    if not await recorder.wait_for(lambda row: row[_PIECES_BEGUN] >= PAUSE_IN, END_TIMEOUT):
+        raise OSError('the program does not follow its pieces')
+    probe.send(encode_command(PrimaryCommand.PAUSE_PROGRAM))
+    if await recorder.wait_for(
+        lambda row: row['runtime_state'] == RuntimeState.PAUSED, START_TIMEOUT
+    ):
+        await asyncio.sleep(PAUSE)
 
 
 async def _play(recorder: RtdeRecorder, probe: PrimaryProbe, script: bytes) -> None:
@@ -166,6 +234,9 @@ def _samples(recorder: RtdeRecorder, stop_sent: float) -> MotionSamples:
         stop_sent=stop_sent,
         target_distance=_distance(recorder, 'target_TCP_pose'),
         actual_distance=_distance(recorder, 'actual_TCP_pose'),
+        spline_time=recorder.column(_SPLINE_TIME),
+        pieces_begun=recorder.column(_PIECES_BEGUN),
+        runtime_state=recorder.column('runtime_state'),
     )
 
 

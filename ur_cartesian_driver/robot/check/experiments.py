@@ -10,14 +10,15 @@ analyses are pure: samples in, a sentence and numbers out.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from math import degrees, radians
-from typing import Any
 
 import numpy as np
 
-from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
+from ur_cartesian_driver.robot.check.corner_experiment import corner_script, TURN
+from ur_cartesian_driver.robot.check.corner_findings import corner_pause, followed, steps
 from ur_cartesian_driver.robot.check.finding import Finding, note, ok
+from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 
 #: Speed and acceleration: of joint motions [rad/s, rad/s^2]; of tool motions [m/s, m/s^2].
 JOINT_SPEED, JOINT_ACCELERATION = 0.2, 0.5
@@ -35,50 +36,8 @@ OFFSET, OFFSET_SPEED, OFFSET_REST = 0.004, 0.01, 0.4
 #: Difference below which two heights are equal [m]; speed below which the tool is at rest [m/s],
 #: although the filter of the path offset may still move it a little.
 SAME_HEIGHT, RESTING_SPEED = 3e-4, 1e-4
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MotionSamples:
-    """
-    Samples of a recorded motion, one row per cycle.
-
-    :param time: time by the controller's clock (n,) [s].
-    :param target_q: target joint positions (n, 6) [rad].
-    :param actual_q: measured joint positions (n, 6) [rad].
-    :param tool_speed: speed of the target TCP (n,) [m/s].
-    :param scaling: speed_scaling (n,).
-    :param fraction: target_speed_fraction (n,).
-    :param stop_sent: time of the stop command by the controller's clock [s]; NaN = none was sent.
-    """
-
-    time: Floats
-    target_q: Floats
-    actual_q: Floats
-    tool_speed: Floats
-    scaling: Floats
-    fraction: Floats
-    stop_sent: float = float('nan')
-    #: Distances of the target TCP from its first position (n,) [m].
-    target_distance: Floats = field(default_factory=lambda: np.empty(0))
-    #: Distances of the measured TCP from its first position (n,) [m].
-    actual_distance: Floats = field(default_factory=lambda: np.empty(0))
-
-    def as_lists(self) -> dict[str, Any]:
-        """Return the columns as lists for JSON, rounded to 6 decimals."""
-        columns = {f.name: getattr(self, f.name) for f in fields(self) if f.name != 'stop_sent'}
-        return {name: np.round(column, 6).tolist() for name, column in columns.items()}
-
-    @property
-    def moving(self) -> Flags:
-        """Return a mask (n,) of the rows whose target differs from the row before."""
-        steps = np.abs(np.diff(self.target_q, axis=0)).max(axis=1) > 1e-9
-        return np.concatenate([[False], steps])
-
-    @property
-    def duration(self) -> float:
-        """The time from the first to the last motion of the target [s]; 0 = no motion."""
-        rows = np.flatnonzero(self.moving)
-        return float(self.time[rows[-1]] - self.time[rows[0] - 1]) if len(rows) else 0.0
+#: Fractions of the speed slider at which a corner is followed.
+CORNER_SLIDERS = (1.0, 0.5, 0.1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,6 +52,10 @@ class Experiment:
     :param slider: fraction of the speed slider during the motion; None = unchanged.
     :param stop_after: time from the start of the motion to the stop command, by the controller's
         clock [s]; None = no stop command.
+    :param more: derive further findings from the same samples.
+    :param is_corner: whether pieces of a corner are sent to the program, see
+        :mod:`~ur_cartesian_driver.robot.check.corner_experiment`.
+    :param pauses: whether the program is paused in the corner.
     :param feature: key in ``program.render.FEATURES`` of a feature that the controller's software
         must have; empty = none.
     """
@@ -103,6 +66,9 @@ class Experiment:
     analyse: Callable[[MotionSamples], Finding]
     slider: float | None = None
     stop_after: float | None = None
+    more: tuple[Callable[[MotionSamples], Finding], ...] = ()
+    is_corner: bool = False
+    pauses: bool = False
     feature: str = ''
 
 
@@ -280,6 +246,10 @@ path_offset_disable(2)
 sleep({OFFSET_REST:g})"""
 _SLOW = f'a={TOOL_ACCELERATION:g}, v={TOOL_SPEED:g}'
 _WRIST = f'Wrist 3 turns by {degrees(WRIST_TURN):.0f} degrees and back, at up to'
+_CORNER = (
+    f'Wrist 3, then wrist 2 turn by {degrees(TURN):.0f} degrees with a rounded corner between '
+    f'them, at up to {degrees(JOINT_SPEED):.0f} degrees/s'
+)
 _RETRACT = 'mm against its z axis, away from the work'
 
 EXPERIMENTS = (
@@ -341,6 +311,31 @@ EXPERIMENTS = (
         script=_BESIDE,
         analyse=_path_offset,
         feature='path_offset',
+    ),
+    *(
+        Experiment(
+            check=f'corner_{100.0 * slider:.0f}',
+            motion=f'The speed slider goes to {slider:.0%} and back to where it is. {_CORNER} '
+            'times that, and back.',
+            script=corner_script(),
+            analyse=followed(f'corner_{100.0 * slider:.0f}', slider),
+            more=(steps(f'steps_{100.0 * slider:.0f}'),),
+            slider=slider,
+            is_corner=True,
+        )
+        for slider in CORNER_SLIDERS
+    ),
+    Experiment(
+        check='corner_pause',
+        motion=(
+            'The speed slider goes to 10% and back to where it is. '
+            f'{_CORNER} times that, and back; the program is paused in the corner, and goes on.'
+        ),
+        script=corner_script(),
+        analyse=corner_pause,
+        slider=0.1,
+        is_corner=True,
+        pauses=True,
     ),
 )
 

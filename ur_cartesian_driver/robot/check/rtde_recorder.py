@@ -53,6 +53,16 @@ class RtdeRecorder:
         self._connection.close()
 
     @property
+    def local_address(self) -> str:
+        """The address of this computer on the connection to the robot."""
+        return self._connection.local_address
+
+    @property
+    def peer_address(self) -> str:
+        """The IP address of the robot."""
+        return self._connection.peer_address
+
+    @property
     def missing(self) -> tuple[str, ...]:
         """The outputs that the robot lacks."""
         return tuple(name for name in self._requested if name not in self.names)

@@ -11,22 +11,34 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ur_cartesian_driver.sim.builtins.arguments import index, not_negative, one_of, text
+from ur_cartesian_driver.sim.builtins.arguments import index, not_negative, one_of, text, whole
 from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import truth, type_name, Value
 
-#: Initial value of a signal, and whether the signal is an output; the index is `signal_type`.
-SIGNAL_TYPES = ((False, False), (False, True), (0, False), (0, True))
+#: Initial value of a signal, and whether the signal is an output, by `signal_type`.
+SIGNAL_TYPES = {
+    0: (False, False),
+    1: (False, True),
+    2: (0, False),
+    3: (0, True),
+    15: (False, True),
+    16: (0, True),
+}
 MAX_REGISTERS = 123
 
 
 @dataclass(slots=True)
 class _Signal:
-    value: Value
+    values: list[Value]
     is_output: bool
-    registers_to_write: int = 1
+    #: How many values a program may write.
+    writable: int
+
+    @property
+    def kind(self) -> type:
+        return type(self.values[0])
 
 
 class ModbusBuiltins(BuiltinGroup):
@@ -59,17 +71,16 @@ class ModbusBuiltins(BuiltinGroup):
         Add or replace a signal.
 
         :param signal_type: 0 = digital input, 1 = digital output, 2 = input register, 3 = output
-            register.
+            register, 15 = several digital outputs, 16 = several output registers.
         :param register_count: if it is more than one, the value of the signal is a list.
         """
         text(IP, 'IP')
         index(slave_number, 'slave_number', 256)
         index(signal_address, 'signal_address', 2**16)
-        count = index(register_count, 'register_count', MAX_REGISTERS + 1)
-        value, is_output = SIGNAL_TYPES[index(signal_type, 'signal_type', 4)]
-        self._signals[text(signal_name, 'signal_name')] = _Signal(
-            [value] * count if count > 1 else value, is_output, registers_to_write=count
-        )
+        count = _count(register_count, 'register_count')
+        value, is_output = SIGNAL_TYPES[one_of(signal_type, 'signal_type', tuple(SIGNAL_TYPES))]
+        signal = _Signal([value] * count, is_output, writable=count)
+        self._signals[text(signal_name, 'signal_name')] = signal
 
     def modbus_add_rw_signal(
         self,
@@ -87,9 +98,9 @@ class ModbusBuiltins(BuiltinGroup):
         index(slave_number, 'slave_number', 256)
         index(read_address, 'read_address', 2**16)
         index(write_address, 'write_address', 2**16)
-        count = index(read_register_count, 'read_register_count', MAX_REGISTERS + 1)
-        written = index(write_register_count, 'write_register_count', MAX_REGISTERS + 1)
-        signal = _Signal([0] * count, is_output=False, registers_to_write=written)
+        count = _count(read_register_count, 'read_register_count')
+        written = _count(write_register_count, 'write_register_count')
+        signal = _Signal([0] * count, is_output=False, writable=written)
         self._signals[text(signal_name, 'signal_name')] = signal
 
     def modbus_delete_signal(self, signal_name: Value) -> None:
@@ -100,8 +111,8 @@ class ModbusBuiltins(BuiltinGroup):
         self, signal_name: Value, is_secondary_program: Value = False
     ) -> Value:
         """Return the value of a signal: a bool, a register, or a list of registers."""
-        value = self._signal(signal_name).value
-        return value[:] if type(value) is list else value
+        values = self._signal(signal_name).values
+        return values[:] if len(values) > 1 else values[0]
 
     def modbus_get_error(self, signal_name: Value) -> int:
         """Return 0 (no error), because every device seems to answer."""
@@ -111,27 +122,22 @@ class ModbusBuiltins(BuiltinGroup):
     def modbus_set_output_register(
         self, signal_name: Value, register_value: Value, is_secondary_program: Value = False
     ) -> None:
-        """Write one register or, for a signal that reads and writes, the list of all registers."""
+        """Write one register, or a list of them; registers behind a shorter list stay."""
         signal = self._signal(signal_name)
-        given = register_value if type(register_value) is list else [register_value]
-        if len(given) != signal.registers_to_write:
-            raise RuntimeException(
-                f'register_value has {len(given)} registers; the signal {signal_name!r} writes '
-                f'{signal.registers_to_write}'
-            )
-        values = [index(value, 'register_value', 2**16) for value in given]
+        given = _given(signal, int, signal_name, register_value, 'register_value')
+        values: list[Value] = [index(value, 'register_value', 2**16) for value in given]
         if signal.is_output:
-            _check_kind(signal, int, signal_name)
-            signal.value = values[0]
+            signal.values[: len(values)] = values
 
     def modbus_set_output_signal(
         self, signal_name: Value, digital_value: Value, is_secondary_program: Value = False
     ) -> None:
-        """Write a digital output."""
+        """Write one digital output, or a list of them; outputs behind a shorter list stay."""
         signal = self._signal(signal_name)
-        _check_kind(signal, bool, signal_name)
+        given = _given(signal, bool, signal_name, digital_value, 'digital_value')
+        values: list[Value] = [truth(value) for value in given]
         if signal.is_output:
-            signal.value = truth(digital_value)
+            signal.values[: len(values)] = values
 
     def modbus_send_custom_command(
         self, IP: Value, slave_number: Value, function_code: Value, data: Value
@@ -163,7 +169,30 @@ class ModbusBuiltins(BuiltinGroup):
         not_negative(update_frequency, 'update_frequency')
 
 
-def _check_kind(signal: _Signal, kind: type, name: Value) -> None:
-    if type(signal.value) is not kind:
+def _count(value: Value, name: str) -> int:
+    count = whole(value, name)
+    if not 1 <= count <= MAX_REGISTERS:
+        raise RuntimeException(f'{name} is {count}; it must be within 1..{MAX_REGISTERS}')
+    return count
+
+
+def _given(
+    signal: _Signal, kind: type, signal_name: Value, value: Value, name: str
+) -> list[Value]:
+    """
+    Return the values to write, one or a list.
+
+    :param kind: the type that the values of the signal must have.
+    :param name: the argument's name.
+    :raises RuntimeException: the signal is of the other kind, or takes fewer values.
+    """
+    if signal.kind is not kind:
         wanted = 'register' if kind is int else 'digital'
-        raise RuntimeException(f'The Modbus signal {name!r} is no {wanted} signal.')
+        raise RuntimeException(f'The Modbus signal {signal_name!r} is no {wanted} signal.')
+    given = value if type(value) is list else [value]
+    if not 1 <= len(given) <= signal.writable:
+        raise RuntimeException(
+            f'{name} has {len(given)} values; the signal {signal_name!r} takes 1 to '
+            f'{signal.writable}'
+        )
+    return given

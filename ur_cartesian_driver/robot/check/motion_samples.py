@@ -1,0 +1,62 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The recording of a motion, which the analyses of the experiments read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionSamples:
+    """
+    Samples of a recorded motion, one row per cycle.
+
+    :param time: time by the controller's clock (n,) [s].
+    :param target_q: target joint positions (n, 6) [rad].
+    :param actual_q: measured joint positions (n, 6) [rad].
+    :param tool_speed: speed of the target TCP (n,) [m/s].
+    :param scaling: speed_scaling (n,).
+    :param fraction: target_speed_fraction (n,).
+    :param stop_sent: time of the stop command by the controller's clock [s]; NaN = none was sent.
+    """
+
+    time: Floats
+    target_q: Floats
+    actual_q: Floats
+    tool_speed: Floats
+    scaling: Floats
+    fraction: Floats
+    stop_sent: float = float('nan')
+    #: Distances of the target TCP from its first position (n,) [m].
+    target_distance: Floats = field(default_factory=lambda: np.empty(0))
+    #: Distances of the measured TCP from its first position (n,) [m].
+    actual_distance: Floats = field(default_factory=lambda: np.empty(0))
+    #: Time in its piece that the program of a corner reports (n,) [s].
+    spline_time: Floats = field(default_factory=lambda: np.empty(0))
+    #: Number of pieces that it has begun (n,).
+    pieces_begun: Floats = field(default_factory=lambda: np.empty(0))
+    #: Runtime state (n,), see :class:`RuntimeState`.
+    runtime_state: Floats = field(default_factory=lambda: np.empty(0))
+
+    def as_lists(self) -> dict[str, Any]:
+        """Return the columns as lists for JSON, rounded to 6 decimals."""
+        columns = {f.name: getattr(self, f.name) for f in fields(self) if f.name != 'stop_sent'}
+        return {name: np.round(column, 6).tolist() for name, column in columns.items()}
+
+    @property
+    def moving(self) -> Flags:
+        """Return a mask (n,) of the rows whose target differs from the row before."""
+        steps = np.abs(np.diff(self.target_q, axis=0)).max(axis=1) > 1e-9
+        return np.concatenate([[False], steps])
+
+    @property
+    def duration(self) -> float:
+        """The time from the first to the last motion of the target [s]; 0 = no motion."""
+        rows = np.flatnonzero(self.moving)
+        return float(self.time[rows[-1]] - self.time[rows[0] - 1]) if len(rows) else 0.0
