@@ -27,6 +27,7 @@ LEFT_OUT = (
     'Path offset',
     'Path offset, PRIMITIVES',
     'Replaced tails',
+    'Rounded corners',
 )
 for left_out in LEFT_OUT:
     del KINDS[left_out]

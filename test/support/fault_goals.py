@@ -547,14 +547,14 @@ class OutputGoal(BlendGoal):
 
 
 @lru_cache
-def servo_output_plan(start, values):
-    """Return the same around rounded corners, by set-points."""
+def rounded_output_plan(start, values, execution):
+    """Return the same around rounded corners."""
     made = output_plan(start, values).goal
     goal = Goal(
         waypoints=tuple(Waypoint(pose=point.pose) for point in made.waypoints),
         segments=(Segment(velocity=0.25, acceleration=1.0),) * len(made.waypoints),
         corner_deviation=0.004,
-        execution=ExecutionMode.SERVO,
+        execution=execution,
         io_commands=made.io_commands,
         proportional_outputs=made.proportional_outputs,
         path_tolerance=Tolerance(position=(PATH_TOLERANCE,) * 3),
@@ -565,19 +565,32 @@ def servo_output_plan(start, values):
     return plan(goal, start.state, ARM, OPTIONS)
 
 
-class ServoOutputGoal(OutputGoal):
-    """Three sides of a square with rounded corners and the same outputs, by set-points."""
+class RoundedGoal(OutputGoal):
+    """Three sides of a square with rounded corners and the same outputs."""
 
-    cancel = ServoGoal.cancel
+    execution = ExecutionMode.SPLINE
 
     def plan_from(self, start):
-        return servo_output_plan(start, tuple(not value for value in self._before))
+        values = tuple(not value for value in self._before)
+        return rounded_output_plan(start, values, self.execution)
 
     def is_in(self, phase):
         x, y = self.tool_offset()
-        if phase == 'before the time':
-            return x > 0.9 * SIDE and y < 1e-3 and self.cell.at_rest()
-        return x > 0.4 * SIDE
+        match phase:
+            case 'in a corner':
+                return x > 1e-3 and y > 0.9 * SIDE
+            case 'before the trigger pose' | 'cancelling':
+                return x > 0.4 * SIDE
+            case 'before the time':
+                return x > 0.9 * SIDE and y < 1e-3 and self.cell.at_rest()
+        raise AssertionError(phase)
+
+
+class ServoOutputGoal(RoundedGoal):
+    """The same by set-points."""
+
+    execution = ExecutionMode.SERVO
+    cancel = ServoGoal.cancel
 
 
 #: How long the arm rests in a corner, and how long after the fault an input comes for which it
@@ -884,6 +897,7 @@ GOALS = {
     'Outputs': OutputGoal,
     'At a point': RestGoal,
     'At a point, SERVO': ServoRestGoal,
+    'Rounded corners': RoundedGoal,
     'Outputs, SERVO': ServoOutputGoal,
     'Waits, SERVO': ServoWaitGoal,
     'Scripts': CallGoal,

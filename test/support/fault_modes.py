@@ -437,6 +437,25 @@ SERVO_AT_A_POINT = _mode(
     continued=(),
 )
 
+ROUNDED_CORNERS = _mode(
+    'Rounded corners',
+    'SPLINE around rounded corners, with the outputs of the square with blends. What becomes of '
+    'them is as there.',
+    {
+        'in a corner': 'in the first corner',
+        'before the trigger pose': 'between the corners, before the output at the second one',
+        'cancelling': 'CANCEL is on the wire, the arm still moves',
+    },
+    3.0,
+    {},
+    faults=tuple(
+        name
+        for name in FAULTS
+        if name not in ("another client's program replaces ours", 'the controller crashes')
+    ),
+    pendant=('protective stop', 'an operator pauses the program'),
+)
+
 SERVO_OUTPUTS = _mode(
     'Outputs, SERVO',
     'Set-points around rounded corners, with an output at the second corner, one after the end, '
@@ -646,6 +665,7 @@ MODES = (
     OUTPUTS,
     AT_A_POINT,
     SERVO_AT_A_POINT,
+    ROUNDED_CORNERS,
     SERVO_OUTPUTS,
     SERVO_WAITS,
     SCRIPTS,
