@@ -55,6 +55,8 @@ _AIM = 0.975
 _ROUNDS = 8
 _FAR, _LESS, _MORE, _EXTRA = 2.0, 0.6, 1.5, 1.01
 CLOSE = 1.0
+#: Speeds may be this much higher than their limits, as a factor, between places.
+_SPEED_MARGIN = 1.005
 #: Samples while the window of the average passes a place at which limits change.
 _AROUND = 13
 #: Time between anchors [s].
@@ -318,10 +320,15 @@ class SectionLaw:
             / tool.turn_accelerations[row],
             np.linalg.norm(x1 * jerk + 3.0 * x2 * v * a + rows(samples.x3) * v**3, axis=1)
             / tool.jerk,
+            # Speeds have their limits at the places; between them they may be a little higher.
+            np.linalg.norm(x1 * v, axis=1) / (_SPEED_MARGIN * tool.speeds[row]),
         ]
         if samples.q1.shape[1]:
-            qdd = rows(samples.q1) * a + rows(samples.q2) * v * v
+            q1 = rows(samples.q1)
+            qdd = q1 * a + rows(samples.q2) * v * v
             values.append(np.abs(qdd).max(axis=1) / options.max_joint_acceleration)
+            speeds = np.abs(q1 * v) / (_SPEED_MARGIN * np.array(self._model.max_joint_speed))
+            values.append(speeds.max(axis=1))
         worst = np.maximum.reduce(values)
         excess = np.zeros(len(samples.s))
         np.maximum.at(excess, at, worst)
