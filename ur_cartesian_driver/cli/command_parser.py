@@ -468,6 +468,17 @@ def _add_where(command: CommandParser) -> None:
     add_ports(command, 'its RTDE port', rtde=30004)
 
 
+def _add_calibration(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import calibration_command
+
+    command.set_defaults(run=calibration_command.write_calibration)
+    command.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
+    add_ports(command, 'its primary port', primary=30001)
+    command.add_argument(
+        '-o', '--output', metavar='FILE', help='YAML file; by default standard output'
+    )
+
+
 def _add_check_robot(command: CommandParser) -> None:
     from ur_cartesian_driver.cli import check_robot
 
@@ -554,6 +565,10 @@ COMMANDS: dict[str, tuple[str, Callable[[CommandParser], None]]] = {
         _add_teach,
     ),
     'where': ('print the pose of the robot, as a point to paste into a goal', _add_where),
+    'calibration': (
+        'write the kinematics of the robot as the YAML that ur_description takes',
+        _add_calibration,
+    ),
     'check-robot': (
         'tell what works with a robot and how it differs from what is assumed; moves nothing '
         'without being asked',

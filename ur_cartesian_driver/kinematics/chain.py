@@ -192,6 +192,17 @@ class Arm:
         )
 
 
+def table_frames(geometry: DhTable) -> list[Pose]:
+    """Return ``T_base_frame`` behind theta and d of each DH row, with all joints at 0."""
+    T, frames = IDENTITY, []
+    for link in _links(geometry):
+        half = 0.5 * link.theta
+        T = T @ Pose((0.0, 0.0, link.d), (0.0, 0.0, sin(half), cos(half)))
+        frames.append(T)
+        T = T @ Pose((link.a, 0.0, 0.0), (link.sin_half_alpha, 0.0, 0.0, link.cos_half_alpha))
+    return frames
+
+
 def jacobian_at(frames: ChainFramesOf[N], point: tuple[N, N, N]) -> Floats:
     """
     Return the Jacobian of a point [m] fixed to the last link, in base axes.

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
-from math import atan2, cos, hypot, sin
+from math import atan2, hypot
 import os
 from pathlib import Path
 from types import MappingProxyType
@@ -26,7 +26,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.chain import Arm, table_frames
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, CONNECTOR, Link
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import (
@@ -281,14 +281,14 @@ class LinkFrames:
 
     def __init__(self, arm: Arm) -> None:
         """Place the frames on the axes of the arm."""
-        nominal = _nominal_frames(arm)
+        nominal = table_frames(arm.model.geometry)
         true = arm.frames(_ZERO)
         #: ``T_base_link`` of each link while all joints are at 0.
         self.at_zero: tuple[Pose, ...] = (
             IDENTITY,
             *(
                 _on_axis(frame, origin, axis)
-                for frame, origin, axis in zip(nominal[1:], true.origins, true.axes, strict=True)
+                for frame, origin, axis in zip(nominal, true.origins, true.axes, strict=True)
             ),
         )
         #: The frame of each joint in the frame of the link before, while the joint is at 0; the
@@ -316,16 +316,6 @@ class LinkFrames:
             rows[:, 3:] = multiply_rows(rows[:, 3:], turn)
             result.append(rows)
         return np.stack(result, axis=1)
-
-
-def _nominal_frames(arm: Arm) -> list[Pose]:
-    """Return ``T_base_link`` of the nominal arm at joints 0: each frame follows d of a DH row."""
-    g, T, frames = arm.model.geometry, IDENTITY, [IDENTITY]
-    for theta, d, a, alpha in zip(g.theta, g.d, g.a, g.alpha, strict=True):
-        T = T @ Pose((0.0, 0.0, d), (0.0, 0.0, sin(0.5 * theta), cos(0.5 * theta)))
-        frames.append(T)
-        T = T @ Pose((a, 0.0, 0.0), (sin(0.5 * alpha), 0.0, 0.0, cos(0.5 * alpha)))
-    return frames
 
 
 def _on_axis(frame: Pose, origin: Vector3, axis: Vector3) -> Pose:

@@ -12,7 +12,7 @@ is installed, else as cylinders.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import atan2, hypot, isfinite
+from math import isfinite
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
@@ -25,7 +25,7 @@ from ur_cartesian_driver.kinematics.link_shapes import (
     LinkShape,
 )
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose, roll_pitch_yaw_from_quaternion
 from ur_cartesian_driver.motion.geometry.vectors import Vector3
 from ur_cartesian_driver.motion.goal.known_frames import (
     BASE,
@@ -41,8 +41,6 @@ LINK_NAMES: tuple[str, ...] = (BASE, *(f'{link.name.lower()}_link' for link in A
 
 # Colour of the links that have none of their own.
 _COLOUR = '0.69 0.72 0.76 1'
-# Below this cosine of the pitch, roll and yaw turn about the same axis.
-_GIMBAL_LOCK = 1e-9
 
 
 def robot_description(arm: Arm, tf_prefix: str = '') -> str:
@@ -124,17 +122,8 @@ def _fixed(robot: Element, tf_prefix: str, parent: str, child: str, T_parent_chi
 
 
 def _origin(element: Element, pose: Pose) -> None:
-    SubElement(element, 'origin', xyz=_text(pose.position), rpy=_text(_roll_pitch_yaw(pose)))
-
-
-def _roll_pitch_yaw(pose: Pose) -> Vector3:
-    """Return the angles about the fixed axes x, y, z [rad]."""
-    R = pose.matrix()
-    across = hypot(R[0, 0], R[1, 0])
-    pitch = atan2(-R[2, 0], across)
-    if across < _GIMBAL_LOCK:
-        return atan2(-R[1, 2], R[1, 1]), pitch, 0.0
-    return atan2(R[2, 1], R[2, 2]), pitch, atan2(R[1, 0], R[0, 0])
+    rpy = roll_pitch_yaw_from_quaternion(pose.quaternion)
+    SubElement(element, 'origin', xyz=_text(pose.position), rpy=_text(rpy))
 
 
 def _text(values: Vector3) -> str:

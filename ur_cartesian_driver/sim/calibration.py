@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from ur_cartesian_driver.kinematics.calibration_file import CALIBRATION_FIELDS, CALIBRATION_LINKS
 from ur_cartesian_driver.kinematics.robot_models import DhTable, RobotModel
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 
@@ -25,8 +26,6 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats
 #: all axes together displace the flange by 1 to 2 mm, as on real arms.
 AXIS_TURN, AXIS_SHIFT = 1e-3, 3e-4
 
-_LINKS = ('shoulder', 'upper_arm', 'forearm', 'wrist_1', 'wrist_2', 'wrist_3')
-_FIELDS = ('x', 'y', 'z', 'roll', 'pitch', 'yaw')
 # Axes at a smaller angle [rad] are treated as parallel, because files are rounded to ten digits.
 _PARALLEL = 1e-8
 # Tolerated deviation of the first joint from the axis of the base [m, rad].
@@ -66,7 +65,8 @@ def read_calibration(path: Path, model: RobotModel) -> DhTable:
     links = content.get('kinematics') if isinstance(content, Mapping) else None
     if not isinstance(links, Mapping):
         raise ValueError(f'The calibration {path} has no mapping `kinematics`.')
-    return _table(_axes_of_links([_link(path, links, name) for name in _LINKS], path), model)
+    poses = [_link(path, links, name) for name in CALIBRATION_LINKS]
+    return _table(_axes_of_links(poses, path), model)
 
 
 def random_calibration(model: RobotModel, seed: int) -> DhTable:
@@ -91,7 +91,7 @@ def _link(path: Path, links: Mapping[Any, Any], name: str) -> Floats:
     """Return the pose of a joint in the preceding link (4, 4)."""
     link = links.get(name)
     values = []
-    for field in _FIELDS:
+    for field in CALIBRATION_FIELDS:
         value = link.get(field) if isinstance(link, Mapping) else None
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             raise ValueError(

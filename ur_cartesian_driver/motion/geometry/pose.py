@@ -28,6 +28,8 @@ Quaternion: TypeAlias = tuple[float, float, float, float]
 N = TypeVar('N', float, Floats)
 
 _SMALL_ANGLE = 1e-9
+# Below this cosine of the pitch, roll and yaw turn about the same axis.
+_GIMBAL_LOCK = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,6 +210,16 @@ def rotation_vector_from_quaternion(q: Quaternion) -> Vector3:
     length = hypot(x, y, z)
     scale = 2.0 if length < _SMALL_ANGLE else 2.0 * atan2(length, w) / length
     return (x * scale, y * scale, z * scale)
+
+
+def roll_pitch_yaw_from_quaternion(q: Quaternion) -> Vector3:
+    """Return the angles about the fixed axes x, y, z [rad], as a URDF has them."""
+    r11, _, _, r21, r22, r23, r31, r32, r33 = rotation_from_quaternion(q)
+    across = hypot(r11, r21)
+    pitch = atan2(-r31, across)
+    if across < _GIMBAL_LOCK:
+        return atan2(-r23, r22), pitch, 0.0
+    return atan2(r32, r33), pitch, atan2(r21, r11)
 
 
 def rotation_from_quaternion(q: tuple[N, N, N, N]) -> tuple[N, ...]:

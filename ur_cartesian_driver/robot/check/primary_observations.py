@@ -31,8 +31,9 @@ RIGHTS_MARK = 'ur-cartesian check-robot'
 RIGHTS_PROGRAM = f'sec ur_check_rights():\n  textmsg("{RIGHTS_MARK}")\nend\n'.encode()
 #: Error code of a request that the robot refuses because it is in local control.
 LOCAL_CONTROL = 'C210'
-#: How long the robot may take to report its configuration, and to run RIGHTS_PROGRAM [s].
-CONFIGURATION_TIMEOUT, RIGHTS_TIMEOUT = 6.0, 3.0
+#: How long the robot may take to report its configuration, then its kinematics, and to run
+#: RIGHTS_PROGRAM [s].
+CONFIGURATION_TIMEOUT, GEOMETRY_TIMEOUT, RIGHTS_TIMEOUT = 6.0, 2.0, 3.0
 
 
 class PrimaryProbe:
@@ -85,6 +86,11 @@ class PrimaryProbe:
         """
         return self._client.send(program, lambda: True)
 
+    async def find_geometry(self) -> DhTable | None:
+        """Wait for the calibrated geometry; return None if the robot does not report it."""
+        await self._wait(lambda: self.geometry is not None, GEOMETRY_TIMEOUT)
+        return self.geometry
+
     async def find_line(self, *parts: str, time: float = RIGHTS_TIMEOUT) -> str:
         """Wait up to ``time`` [s] for a line that contains one of the parts; return it, or ''."""
 
@@ -130,8 +136,7 @@ async def observe_primary(
             models = model_names(configuration.robot_type, version.major)
             yield _model(models)
             yield _limits(configuration)
-            await asyncio.sleep(0.2)  # the kinematics come in a later state frame
-            yield _calibration(models[0], probe.geometry, state)
+            yield _calibration(models[0], await probe.find_geometry(), state)
         yield await _rights(probe)
     finally:
         await probe.close()
