@@ -100,6 +100,23 @@ def as_expected(line):
     return (int(error[1]), error[2]) if error else line
 
 
+def test_a_loop_of_moves_to_one_blended_waypoint_takes_time(bench):
+    bench.start(
+        """goal = pose_add(get_target_tcp_pose(), p[0, 0.1, 0, 0, 0, 0])
+           while True:
+             movel(goal, r=0.05)
+           end"""
+    )
+    bench.wait(3.0)
+    assert bench.programs.state is RuntimeState.PLAYING
+    assert not bench.controller.motion.on_path
+
+
+def test_a_loop_of_speeds_without_a_time_is_still_an_error(bench):
+    log = bench.run('while True:\n  speedj([0.1, 0, 0, 0, 0, 0], 1, 0)\nend')
+    assert 'used too much time' in log[-1]
+
+
 def test_every_function_is_called_by_a_program_that_says_what_it_does(bench):
     text = ''.join(re.sub(r'#.*', '', path.read_text()) for path in PROGRAMS + CASES)
     called = set(re.findall(r'\b([a-z]\w*)\s*\(', text))
