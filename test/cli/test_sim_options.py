@@ -92,6 +92,10 @@ def test_options_reach_the_robot():
         'standard 3',
         '--input',
         'tool 1',
+        '--answer',
+        'yes',
+        '--answer',
+        '3',
     ]
     arguments = parser().parse_args(['sim', '--model', 'ur10e', *options])
     config = simulator_config(arguments)
@@ -101,7 +105,9 @@ def test_options_reach_the_robot():
         EventFault(action=FaultEvent.STOP, trigger=AfterTime(2.0)),
         DropFault(interface='rtde'),
     ]
-    assert assemble(config).controller.io.digital_in.packed() == 1 << 3 | 1 << 17
+    controller = assemble(config).controller
+    assert controller.io.digital_in.packed() == 1 << 3 | 1 << 17
+    assert list(controller.pendant.answers) == ['yes', '3']
 
 
 def test_programs_of_a_directory_and_the_loaded_one_have_the_names_of_the_dashboard(tmp_path):

@@ -17,6 +17,7 @@ from tracked_files import tracked_files
 
 from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
+from ur_cartesian_driver.protocol.client_interfaces.primary_messages import RawMessage
 from ur_cartesian_driver.sim.builtins import controller_builtins
 from ur_cartesian_driver.sim.programs.timed_function_guard import refuse_timed_functions
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
@@ -49,7 +50,7 @@ class World:
 
     Inputs and input registers have the values below; a peer on port 1 answers everything with
     itself; ten times a second a person closes the windows, unlocks a protective stop if that is
-    possible, and plays the program if it is paused.
+    possible, and plays the program if it is paused. Asked for values, the person has answers.
     """
 
     def __init__(self, bench):
@@ -65,6 +66,7 @@ class World:
         signals.inputs.bits[64] = True
         signals.inputs.integers[24] = -7
         signals.inputs.floats[47] = 0.125
+        bench.controller.pendant.answers.extend(('yes', '3', '2.5', 'part 7', 'False'))
 
     def echo(self):
         for peer in self.peers:
@@ -98,6 +100,52 @@ def test_the_program_does_what_it_says(bench, path):
 def as_expected(line):
     error = re.fullmatch(r'(\d+):\d+: Runtime error \(\1:\d+\): (.*)', line)
     return (int(error[1]), error[2]) if error else line
+
+
+def test_a_request_waits_until_a_person_answers(bench):
+    controller = bench.controller
+    bench.start('textmsg(request_boolean_from_primary_client("Go on?"))')
+    bench.wait(10.0)
+    controller.close_popups()
+    bench.wait(1.0)
+    assert bench.log == []
+    (request,) = (m for m in controller.messages.take() if isinstance(m, RawMessage))
+    assert (request.message_type, request.content[5:]) == (9, b'Go on?')
+    controller.pendant.answers.append('no')
+    bench.until(lambda: bench.programs.state is RuntimeState.STOPPED)
+    assert bench.log == ['False']
+
+
+def test_a_request_ends_when_the_person_stops_the_program(bench):
+    bench.start('request_string_from_primary_client("Which part?")\ntextmsg("after")')
+    bench.wait(0.1)
+    bench.programs.stop()
+    bench.until(lambda: bench.programs.state is RuntimeState.STOPPED)
+    assert bench.log == []
+
+
+def test_answers_can_be_configured(make_bench):
+    bench = make_bench(answers=(12, 'no'))
+    body = """textmsg(request_integer_from_primary_client("How many?"))
+              textmsg(request_boolean_from_primary_client("More?"))"""
+    assert bench.run(body) == ['12', 'False']
+
+
+def test_a_loop_of_moves_to_one_blended_waypoint_takes_time(bench):
+    bench.start(
+        """goal = pose_add(get_target_tcp_pose(), p[0, 0.1, 0, 0, 0, 0])
+           while True:
+             movel(goal, r=0.05)
+           end"""
+    )
+    bench.wait(3.0)
+    assert bench.programs.state is RuntimeState.PLAYING
+    assert not bench.controller.motion.on_path
+
+
+def test_a_loop_of_speeds_without_a_time_is_still_an_error(bench):
+    log = bench.run('while True:\n  speedj([0.1, 0, 0, 0, 0, 0], 1, 0)\nend')
+    assert 'used too much time' in log[-1]
 
 
 def test_every_function_is_called_by_a_program_that_says_what_it_does(bench):

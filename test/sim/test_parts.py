@@ -137,6 +137,7 @@ def test_a_watchdog_reports_once_until_it_is_fed_again():
         ({'frequency': 0.0}, '0.0 Hz'),
         ({'rate': -1.0}, '-1.0'),
         ({'q': (0.0,) * 5}, '5 values'),
+        ({'answers': 'yes'}, "answers is 'yes'; give a list of answers"),
     ],
 )
 def test_a_configuration_that_cannot_be_is_refused_by_name(settings, names):

@@ -14,6 +14,7 @@ from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     ErrorCodeMessage,
     KeyMessage,
+    RawMessage,
     RobotStateFrame,
     RuntimeExceptionMessage,
     SafetyModeMessage,
@@ -89,6 +90,14 @@ def test_a_program_that_comes_in_pieces_runs_and_all_clients_hear_of_it(robot):
             wire.await_(KeyMessage, title='PROGRAM_XXX_STARTED', text='hello')
             wire.await_(TextMessage, text='hi 1')
             wire.await_(KeyMessage, title='PROGRAM_XXX_STOPPED', text='hello')
+
+
+def test_clients_hear_of_a_request_and_a_person_answers(robot):
+    with Primary(robot.ports.primary) as wire:
+        wire.send(b'textmsg(request_integer_from_primary_client("How many?"))\n')
+        assert wire.await_(RawMessage, message_type=9).content.endswith(b'How many?')
+        robot.answer('3')
+        wire.await_(TextMessage, text='3')
 
 
 def test_a_program_that_lost_its_indentation_runs_too(robot):

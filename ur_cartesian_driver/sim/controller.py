@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Callable, Hashable
 from math import inf
 from pathlib import PurePosixPath
-from typing import Protocol
+from typing import Any, Protocol
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.geometry.pose import Pose
@@ -39,7 +39,13 @@ from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets, ScriptSockets
 from ur_cartesian_driver.sim.state.controller_io import ControllerIo
 from ur_cartesian_driver.sim.state.controller_messages import ControllerMessages
-from ur_cartesian_driver.sim.state.controller_state import Payload, Pendant, Popup, ProcessState
+from ur_cartesian_driver.sim.state.controller_state import (
+    Payload,
+    Pendant,
+    Popup,
+    ProcessState,
+    StoredSettings,
+)
 from ur_cartesian_driver.sim.state.power_and_safety import (
     ArmPower,
     OPERATIONAL,
@@ -134,7 +140,8 @@ class Controller:
         self.waypoint: Pose | None = None
         self.external_ft = False
         self._unlock_at = inf
-        self.pendant = Pendant()
+        self.pendant = Pendant(answers=deque(map(str, config.answers)))
+        self.stored = StoredSettings()
         self.remote_control = config.remote_control and config.has_remote_control
         #: The speed slider, 0..1.
         self.speed_slider = 1.0
@@ -157,6 +164,8 @@ class Controller:
         self.messages.on_error = self._pause_if_wanted
         #: The faults, set by the assembly; None = no faults.
         self.faults: CycleFaults | None = None
+        #: Reads an RTDE output by name for programs, set by the assembly.
+        self.read_output: Callable[[str], Any] | None = None
 
     # ---- state --------------------------------------------------------------------------------
 

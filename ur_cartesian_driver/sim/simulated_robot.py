@@ -428,6 +428,14 @@ class SimulatedRobot:
         """Confirm all popups."""
         self.call(lambda controller: controller.close_popups())
 
+    def answer(self, *answers: object) -> None:
+        """
+        Type into the pendant's next windows that request a value, open or still to come.
+
+        :param answers: what the person types: `yes` or `no` for a boolean, a number, or a text.
+        """
+        self.call(lambda controller: controller.pendant.answers.extend(map(str, answers)))
+
     def lateness(self) -> Lateness | None:
         """Return the lateness of the cycles; None for any clock other than the real clock."""
         clock = self._clock

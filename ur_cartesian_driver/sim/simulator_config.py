@@ -106,6 +106,9 @@ class SimulatorConfig:
     contacts: Sequence[ContactBody | str] = ()
     #: Digital inputs that are on from the start, such as 'standard 3'.
     inputs: Sequence[str] = ()
+    #: What the person at the pendant types when programs request values, in this order; a program
+    #: that requests more waits.
+    answers: Sequence[object] = ()
     contact_bodies: tuple[ContactBody, ...] = field(init=False, default=())
     #: Cycles after which a new thread of a program begins.
     thread_delay: int = 0
@@ -131,6 +134,8 @@ class SimulatorConfig:
         object.__setattr__(self, 'contact_bodies', _contact_bodies(self.contacts))
         for channel in self.inputs:
             DigitalPort().switch_on(channel)
+        if isinstance(self.answers, str):
+            raise ValueError(f'answers is {self.answers!r}; give a list of answers.')
         if self.power not in ('running', 'off'):
             raise ValueError(f"power is {self.power!r}; use 'running' or 'off'.")
         if self.when_late not in ('skip', 'wait'):

@@ -198,6 +198,16 @@ def pow_(base: Value, exponent: Value) -> float:
     return math.pow(base, exponent)
 
 
+def d2r(d: Value) -> float:
+    """Return an angle in degrees as radians."""
+    return math.radians(_number(d))
+
+
+def r2d(r: Value) -> float:
+    """Return an angle in radians as degrees."""
+    return math.degrees(_number(r))
+
+
 def ceil(f: Value) -> int:
     """Return the smallest int that is not below a number."""
     return _int_range(math.ceil(_number(f)))
@@ -325,13 +335,12 @@ def core_builtins(seed: int = 0) -> dict[str, Callable[..., Any]]:
         return generator.random()
 
     named = (
-        acos, asin, atan2, binary_list_to_integer, ceil, floor, get_list_length,
-        integer_to_binary_list, inv, length, log, make_list, norm, normalize, size, sqrt, str_at,
-        str_cat, str_empty, str_find, str_len, str_sub, struct, to_num, to_str, transpose,
+        acos, asin, atan2, binary_list_to_integer, ceil, d2r, floor, get_list_length,
+        integer_to_binary_list, inv, length, log, make_list, norm, normalize, r2d, size, sqrt,
+        str_at, str_cat, str_empty, str_find, str_len, str_sub, struct, to_num, to_str, transpose,
     )  # fmt: skip
     float_functions = {
-        'atan': math.atan, 'cos': math.cos, 'd2r': math.radians, 'r2d': math.degrees,
-        'sin': math.sin, 'tan': math.tan,
+        'atan': math.atan, 'cos': math.cos, 'sin': math.sin, 'tan': math.tan,
     }  # fmt: skip
     table: dict[str, Callable[..., Any]] = {function.__name__: function for function in named}
     table.update((name, _function_of_float(compute)) for name, compute in float_functions.items())

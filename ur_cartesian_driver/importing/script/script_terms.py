@@ -69,6 +69,7 @@ TERMS = term_table(
         'moves',
         'the robot keeps its own',
         *('motion_version_set', 'motion_version_get', 'reset_revolution_counter'),
+        *('jerk_gain_scaling_set', 'jerk_gain_scaling_get'),
     ),
     honoured(PARAMETERS, 'a', 'v', 't', 'r', 'mode'),
     honoured('TCP and payload', 'set_tcp', 'get_tcp_offset'),
@@ -169,7 +170,9 @@ TERMS = term_table(
         *('force', 'get_tcp_force', 'get_joint_torques', 'get_joint_temp', 'get_controller_temp'),
         *('get_tool_current', 'get_tool_accelerometer_reading', 'get_freedrive_status'),
         *('get_actual_joint_positions_history', 'tool_contact', 'get_mass_matrix'),
-        'get_coriolis_and_centrifugal_torques',
+        *('get_coriolis_and_centrifugal_torques', 'get_actual_joint_accelerations'),
+        *('get_tool_temp', 'get_gravity', 'get_base_acceleration', 'get_rtde_value'),
+        'force_mode_get_damping',
     ),
     refused('forces and hands', _BY_FORCE, 'force_mode', 'screw_driving'),
     refused(
@@ -217,6 +220,8 @@ TERMS = term_table(
         *('modbus_set_output_register', 'modbus_set_output_signal', 'modbus_send_custom_command'),
         *('modbus_set_digital_input_action', 'modbus_set_runstate_dependent_choice'),
         *('modbus_set_signal_update_frequency', 'eip_reader_factory', 'eip_writer_factory'),
+        *('modbus_set_signal_watchdog', 'modbus_get_time_since_signal_invalid'),
+        *('modbus_request_update_signal_value', 'modbus_reset_connection'),
     ),
     left_out('persons', 'a goal tells nothing to persons', 'popup', 'textmsg', 'varmsg'),
     refused(
@@ -241,6 +246,8 @@ TERMS = term_table(
         *('set_safety_mode_transition_hardness', 'set_speed_slider_fraction'),
         *('high_holding_torque_enable', 'high_holding_torque_disable'),
         *('position_deviation_warning', 'pause_on_error_code', 'set_gravity'),
+        *('set_base_acceleration', 'set_baselight_off', 'set_baselight_iec'),
+        'set_baselight_solid',
     ),
     left_out(
         'installation and safety',

@@ -6,7 +6,9 @@ The functions that programs can call, with one class for each subject.
 To add a function, add a public method to the class of its subject. Programs can call every public
 method of the classes in :data:`BUILTIN_GROUPS` by the method's name. The parameters of a method
 have the names and defaults of the script manual, because programs can pass arguments by name. A
-function that takes time is a generator that yields once per controller cycle.
+function that takes time is a generator that yields once per controller cycle. One that only checks
+its arguments is marked with `without_effect`. `scripts/make_script_functions.py` makes the page
+doc/script_functions.md from the methods, their first lines and these marks.
 `test/sim/programs` has at least one program for each function.
 """
 
@@ -18,6 +20,7 @@ from ur_cartesian_driver.sim.builtins.dynamics_builtins import DynamicsBuiltins
 from ur_cartesian_driver.sim.builtins.installation_builtins import (
     EuromapBuiltins,
     InstallationBuiltins,
+    StoredSettingsBuiltins,
 )
 from ur_cartesian_driver.sim.builtins.io_builtins import (
     AnalogBuiltins,
@@ -28,13 +31,10 @@ from ur_cartesian_driver.sim.builtins.io_builtins import (
 from ur_cartesian_driver.sim.builtins.kinematics_builtins import KinematicsBuiltins
 from ur_cartesian_driver.sim.builtins.modbus_builtins import ModbusBuiltins
 from ur_cartesian_driver.sim.builtins.motion_builtins import ModeBuiltins, MotionBuiltins
+from ur_cartesian_driver.sim.builtins.pendant_builtins import PendantBuiltins
 from ur_cartesian_driver.sim.builtins.pose_builtins import PoseBuiltins
 from ur_cartesian_driver.sim.builtins.process_builtins import PathOffsetBuiltins, ProcessBuiltins
-from ur_cartesian_driver.sim.builtins.robot_builtins import (
-    PendantBuiltins,
-    RobotBuiltins,
-    TimeBuiltins,
-)
+from ur_cartesian_driver.sim.builtins.robot_builtins import RobotBuiltins, TimeBuiltins
 from ur_cartesian_driver.sim.builtins.rpc_builtins import RpcBuiltins
 from ur_cartesian_driver.sim.builtins.socket_builtins import SocketBuiltins
 from ur_cartesian_driver.sim.controller import Controller
@@ -61,6 +61,7 @@ BUILTIN_GROUPS: tuple[type[BuiltinGroup], ...] = (
     RobotBuiltins,
     RpcBuiltins,
     SocketBuiltins,
+    StoredSettingsBuiltins,
     TimeBuiltins,
 )
 

@@ -1,12 +1,28 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The base class of all groups of script functions."""
+"""The base class of all groups of script functions, and the mark of those without an effect."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 from ur_cartesian_driver.sim.controller import Controller
+
+F = TypeVar('F', bound=Callable[..., Any])
+
+_WITHOUT_EFFECT: set[Callable[..., Any]] = set()
+
+
+def without_effect(function: F) -> F:
+    """Mark a script function that only checks its arguments: what it sets is not simulated."""
+    _WITHOUT_EFFECT.add(function)
+    return function
+
+
+def has_effect(function: Callable[..., Any]) -> bool:
+    """Return whether a script function does more than to check its arguments."""
+    return getattr(function, '__func__', function) not in _WITHOUT_EFFECT
 
 
 class BuiltinGroup:

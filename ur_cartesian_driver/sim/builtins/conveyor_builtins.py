@@ -20,8 +20,9 @@ from ur_cartesian_driver.sim.builtins.arguments import (
     positive,
     script_pose,
     six,
+    text,
 )
-from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
+from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup, without_effect
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import ScriptPose, Value
@@ -56,6 +57,7 @@ class ConveyorBuiltins(BuiltinGroup):
     def _encoder(self, encoder_index: Value) -> _Encoder:
         return self._belts.encoders[index(encoder_index, 'encoder_index', ENCODERS)]
 
+    @without_effect
     def encoder_enable_pulse_decode(
         self, encoder_index: Value, decoder_type: Value, A: Value, B: Value = 0
     ) -> None:
@@ -69,9 +71,12 @@ class ConveyorBuiltins(BuiltinGroup):
         """Set the counting range of an encoder whose tick count is set by programs."""
         self._encoder(encoder_index).range = RANGES[index(range_id, 'range_id', len(RANGES))]
 
-    def encoder_get_tick_count(self, encoder_index: Value) -> float:
-        """Return the tick count of an encoder."""
-        return self._encoder(encoder_index).count
+    def encoder_get_tick_count(self, encoder_index: Value, opt: Value = '') -> float:
+        """Return the tick count of an encoder; `raw` = as a whole number."""
+        count = self._encoder(encoder_index).count
+        if text(opt, 'opt') not in ('', 'raw'):
+            raise RuntimeException(f'opt is {opt!r}; it must be "" or "raw"')
+        return int(count) if opt else count
 
     def encoder_set_tick_count(self, encoder_index: Value, count: Value) -> None:
         """Set the tick count of an encoder."""
@@ -93,6 +98,7 @@ class ConveyorBuiltins(BuiltinGroup):
         delta = number(delta_tick_count, 'delta_tick_count')
         return delta - turn * round(delta / turn)
 
+    @without_effect
     def conveyor_pulse_decode(self, type: Value, A: Value, B: Value = 0) -> None:
         """Check the arguments for the first encoder, like `encoder_enable_pulse_decode`."""
         self.encoder_enable_pulse_decode(0, type, A, B)
@@ -131,6 +137,8 @@ class ConveyorBuiltins(BuiltinGroup):
     def stop_conveyor_tracking(self, a: Value = 20, aRot: Value = 'a') -> None:
         """Stop tracking; moves are relative to the base again."""
         positive(a, 'a')
+        if aRot != 'a':
+            positive(aRot, 'aRot')
         self._belts.tracked = None
 
     def get_target_tcp_pose_along_path(self) -> ScriptPose:

@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from ur_cartesian_driver.sim.builtins.arguments import index, one_of, text
-from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
+from ur_cartesian_driver.sim.builtins.arguments import index, one_of, text, three, within
+from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup, without_effect
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import truth, type_name, Value
@@ -23,9 +23,15 @@ INPUT_ACTIONS = ('default', 'freedrive')
 EUROMAP_PINS = 33
 
 
+#: Program states to which an output can be tied; from 6 on they follow the power of the arm.
+RUN_STATES = (0, 1, 2, 3, 4, 5, 6, 7)
+EUROMAP_RUN_STATES = RUN_STATES[:4]
+
+
 def _input_action(count: int) -> Callable[[Any, Value, Value], None]:
     """Return the script function that assigns an action to one of ``count`` inputs."""
 
+    @without_effect
     def choose(_: Any, port: Value, action: Value) -> None:
         index(port, 'port', count)
         if text(action, 'action') not in INPUT_ACTIONS:
@@ -34,12 +40,13 @@ def _input_action(count: int) -> Callable[[Any, Value, Value], None]:
     return choose
 
 
-def _runstate(count: int) -> Callable[[Any, Value, Value], None]:
-    """Return the script function that ties one of ``count`` outputs to the program state."""
+def _runstate(count: int, states: int = 8) -> Callable[[Any, Value, Value], None]:
+    """Return the script function that ties one of ``count`` outputs to one of the states."""
 
+    @without_effect
     def choose(_: Any, outputId: Value, state: Value) -> None:
         index(outputId, 'outputId', count)
-        one_of(state, 'state', (0, 1, 2, 3))
+        one_of(state, 'state', RUN_STATES[:states])
 
     return choose
 
@@ -47,6 +54,7 @@ def _runstate(count: int) -> Callable[[Any, Value, Value], None]:
 def _runstate_list(count: int) -> Callable[[Any, Value], None]:
     """Return the older script function, given a list of the outputs to be high in a program."""
 
+    @without_effect
     def choose(_: Any, outputs: Value) -> None:
         if type(outputs) is not list:
             raise RuntimeException(
@@ -68,41 +76,89 @@ class InstallationBuiltins(BuiltinGroup):
 
     set_runstate_standard_digital_output_to_value = _runstate(8)
     set_runstate_configurable_digital_output_to_value = _runstate(8)
-    set_runstate_tool_digital_output_to_value = _runstate(2)
+    set_runstate_tool_digital_output_to_value = _runstate(2, states=6)
     set_runstate_gp_boolean_output_to_value = _runstate(128)
     set_runstate_standard_analog_output_to_value = _runstate(2)
     set_runstate_outputs = _runstate_list(10)
     set_runstate_standard_digital_outputs = _runstate_list(8)
 
+    @without_effect
     def set_input_actions_to_default(self) -> None:
         """Remove the actions of all inputs."""
 
+    @without_effect
     def set_tool_analog_input_domain(self, port: Value, domain: Value) -> None:
         """Choose the domain of a tool input: 0 = current, 1 = voltage."""
         index(port, 'port', 2)
         index(domain, 'domain', 2)
 
+    @without_effect
     def set_analog_inputrange(self, port: Value, range: Value) -> None:
         """Choose the range of an input, given by its old number: standard 0-1, tool 2-3."""
         index(port, 'port', 4)
         index(range, 'range', 5)
 
+    @without_effect
     def set_tool_output_mode(self, mode: Value) -> None:
         """Choose the use of the tool's output pins: 0 = digital outputs, 1 = power from both."""
         index(mode, 'mode', 2)
 
+    @without_effect
     def set_tool_digital_output_mode(self, n: Value, mode: Value) -> None:
         """Choose the mode of a tool output: 1 = sinking, 2 = sourcing, 3 = both."""
         index(n, 'n', 2)
         one_of(mode, 'mode', (1, 2, 3))
 
+    @without_effect
     def set_safety_mode_transition_hardness(self, type: Value) -> None:
         """Choose the transition between safety modes: 0 = hard, 1 = soft."""
         index(type, 'type', 2)
 
+    @without_effect
+    def set_baselight_off(self) -> None:
+        """Switch the light at the base off."""
+
+    @without_effect
+    def set_baselight_iec(self) -> None:
+        """Let the light at the base show stops, freedrive and the operational mode."""
+
+    @without_effect
+    def set_baselight_solid(self, r: Value, g: Value, b: Value) -> None:
+        """Choose the colour of the light at the base, each part 0..255."""
+        for value, name in ((r, 'r'), (g, 'g'), (b, 'b')):
+            index(value, name, 256)
+
+
+class StoredSettingsBuiltins(BuiltinGroup):
+    """
+    Settings that programs can read back, and that outlive them; the motions stay the same.
+
+    They move as in motion version 1: all recordings behind them are of software before 5.22.
+    """
+
     def motion_version_set(self, version: Value) -> None:
         """Choose the version of the motion generator; both versions move alike here."""
-        one_of(version, 'version', (1, 2))
+        self._controller.stored.motion_version = one_of(version, 'version', (1, 2))
+
+    def motion_version_get(self) -> int:
+        """Return the version of the motion generator."""
+        return self._controller.stored.motion_version
+
+    def jerk_gain_scaling_set(self, scaling: Value) -> None:
+        """Set the factor (0.01..1) on the jerk of smooth moves; they move alike here."""
+        self._controller.stored.jerk_gain_scaling = within(scaling, 'scaling', 0.01, 1)
+
+    def jerk_gain_scaling_get(self) -> float:
+        """Return the factor on the jerk of smooth moves."""
+        return self._controller.stored.jerk_gain_scaling
+
+    def set_base_acceleration(self, a: Value) -> None:
+        """Store the acceleration of the robot's base [m/s^2]; the arm does not feel it."""
+        self._controller.stored.base_acceleration = three(a, 'a')
+
+    def get_base_acceleration(self) -> list[float]:
+        """Return the acceleration of the robot's base that was stored [m/s^2]."""
+        return list(self._controller.stored.base_acceleration)
 
 
 class EuromapBuiltins(BuiltinGroup):
@@ -126,9 +182,10 @@ class EuromapBuiltins(BuiltinGroup):
         """Set an output."""
         self._outputs[index(port_number, 'port_number', EUROMAP_PINS)] = truth(signal_value)
 
+    @without_effect
     def set_euromap_runstate_dependent_choice(
         self, port_number: Value, runstate_choice: Value
     ) -> None:
         """Tie an output to the program state."""
         index(port_number, 'port_number', EUROMAP_PINS)
-        one_of(runstate_choice, 'runstate_choice', (0, 1, 2, 3))
+        one_of(runstate_choice, 'runstate_choice', EUROMAP_RUN_STATES)

@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from ur_cartesian_driver.sim.builtins.arguments import index, int32, number, whole
-from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
+from ur_cartesian_driver.sim.builtins.arguments import index, int32, number, whole, within
+from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup, without_effect
 from ur_cartesian_driver.sim.state.controller_io import ControllerIo
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import truth, Value
@@ -74,8 +74,9 @@ def _truth(value: Value, _: str) -> bool:
     return truth(value)
 
 
-def _uint16(value: Value, name: str) -> int:
-    return index(value, name, 2**16)
+def _word(value: Value, name: str) -> int:
+    """Return the 16 bits of a word, which programs write with or without a sign."""
+    return round(within(int32(value, name), name, -(2**15), 2**16 - 1)) & 0xFFFF
 
 
 class DigitalBuiltins(_IoGroup):
@@ -134,6 +135,7 @@ class AnalogBuiltins(_IoGroup):
             raise RuntimeException(f'voltage is {volts}; it must be 0, 12 or 24')
         self._io.tool_voltage = volts
 
+    @without_effect
     def set_tool_communication(
         self,
         enabled: Value,
@@ -150,9 +152,15 @@ class PortBuiltins(_IoGroup):
     """Ports, shared with Modbus clients on a real robot; here, memory that outlives programs."""
 
     read_port_bit = _read(lambda io: io.port_bits)
-    read_port_register = _read(lambda io: io.port_registers)
+
+    def read_port_register(self, address: Value) -> int:
+        """Return a word with its sign, -32768..32767."""
+        registers = self._io.port_registers
+        word = registers[index(address, 'address', len(registers))]
+        return word - 2**16 if word >= 2**15 else word
+
     write_port_bit = _write(lambda io: io.port_bits, _truth)
-    write_port_register = _write(lambda io: io.port_registers, _uint16)
+    write_port_register = _write(lambda io: io.port_registers, _word)
 
 
 class RegisterBuiltins(_IoGroup):

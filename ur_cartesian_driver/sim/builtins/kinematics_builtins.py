@@ -90,14 +90,14 @@ class KinematicsBuiltins(BuiltinGroup):
         joints = self._controller.motion.q if q == 'current_joint_positions' else six(q, 'q')
         return script_pose(self._controller.arm.forward(joints) @ self._tcp(tcp))
 
-    def is_within_safety_limits(self, pose: Value, qNear: Value = None) -> bool:
+    def is_within_safety_limits(self, position: Value, qNear: Value = None) -> bool:
         """Return whether a pose can be reached; for joint positions, whether they are in range."""
-        if is_pose(pose):
-            return self._solve(pose, qNear, 'active_tcp') is not None
+        if is_pose(position):
+            return self._solve(position, qNear, 'active_tcp') is not None
         limits = self._controller.arm.model.position_limits
         return all(
             low <= angle <= high
-            for angle, (low, high) in zip(six(pose, 'position'), limits, strict=True)
+            for angle, (low, high) in zip(six(position, 'position'), limits, strict=True)
         )
 
     def get_actual_tcp_pose(self) -> ScriptPose:

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ur_cartesian_driver.sim.builtins.arguments import index, not_negative, one_of, text, whole
-from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
+from ur_cartesian_driver.sim.builtins.arguments import index, one_of, text, whole, within
+from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup, without_effect
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import truth, type_name, Value
@@ -114,10 +114,36 @@ class ModbusBuiltins(BuiltinGroup):
         values = self._signal(signal_name).values
         return values[:] if len(values) > 1 else values[0]
 
-    def modbus_get_error(self, signal_name: Value) -> int:
-        """Return 0 (no error), because every device seems to answer."""
+    def modbus_get_error(self, signal_name: Value, error_source: Value = 0) -> int:
+        """
+        Return 0 (no error), because every device seems to answer.
+
+        :param error_source: 0 = device and connection, 1 = device, 2 = connection.
+        """
         self._signal(signal_name)
+        one_of(error_source, 'error_source', (0, 1, 2))
         return 0
+
+    def modbus_get_time_since_signal_invalid(self, signal_name: Value) -> float:
+        """Return 0 [s], because every device seems to answer."""
+        self._signal(signal_name)
+        return 0.0
+
+    @without_effect
+    def modbus_request_update_signal_value(self, signal_name: Value) -> None:
+        """Check the name of a signal that would be read at once."""
+        self._signal(signal_name)
+
+    @without_effect
+    def modbus_reset_connection(self, connection_id: Value, is_blocking: Value = True) -> None:
+        """Check the address of the device; no connection can be broken."""
+        text(connection_id, 'connection_id')
+
+    @without_effect
+    def modbus_set_signal_watchdog(self, signal_name: Value, new_timeout_in_sec: Value) -> None:
+        """Check the time [s], 0..300, for which errors of the device would be tolerated."""
+        self._signal(signal_name)
+        within(new_timeout_in_sec, 'new_timeout_in_sec', 0, 300)
 
     def modbus_set_output_register(
         self, signal_name: Value, register_value: Value, is_secondary_program: Value = False
@@ -139,6 +165,7 @@ class ModbusBuiltins(BuiltinGroup):
         if signal.is_output:
             signal.values[: len(values)] = values
 
+    @without_effect
     def modbus_send_custom_command(
         self, IP: Value, slave_number: Value, function_code: Value, data: Value
     ) -> None:
@@ -149,24 +176,27 @@ class ModbusBuiltins(BuiltinGroup):
         if type(data) is not list:
             raise RuntimeException(f'Type error: data must be a list, not a {type_name(data)}')
 
+    @without_effect
     def modbus_set_digital_input_action(self, signal_name: Value, action: Value) -> None:
         """Assign an action to an input."""
         self._signal(signal_name)
         text(action, 'action')
 
+    @without_effect
     def modbus_set_runstate_dependent_choice(
         self, signal_name: Value, runstate_choice: Value
     ) -> None:
         """Tie an output to the program state."""
         self._signal(signal_name)
-        one_of(runstate_choice, 'runstate_choice', (0, 1, 2, 3))
+        one_of(runstate_choice, 'runstate_choice', (0, 1, 2, 3, 4, 5))
 
+    @without_effect
     def modbus_set_signal_update_frequency(
         self, signal_name: Value, update_frequency: Value
     ) -> None:
-        """Check the rate [Hz] at which a real device would be polled."""
+        """Check the rate [Hz], 0..500, at which a real device would be polled; -1 or 0 = never."""
         self._signal(signal_name)
-        not_negative(update_frequency, 'update_frequency')
+        within(update_frequency, 'update_frequency', -1, 500)
 
 
 def _count(value: Value, name: str) -> int:

@@ -17,7 +17,7 @@ from ur_cartesian_driver.sim.builtins.arguments import (
     six,
     within,
 )
-from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
+from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup, without_effect
 from ur_cartesian_driver.sim.builtins.kinematics_builtins import joints_of, pose_of
 from ur_cartesian_driver.sim.controller import MAX_HISTORY
 from ur_cartesian_driver.sim.motion import MotionGenerator, Move
@@ -28,7 +28,7 @@ from ur_cartesian_driver.sim.motion.motion_generator import (
 )
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState, Steps
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
-from ur_cartesian_driver.urscript.script_values import Value
+from ur_cartesian_driver.urscript.script_values import Struct, Value
 
 
 class MotionBuiltins(BuiltinGroup):
@@ -118,7 +118,7 @@ class MotionBuiltins(BuiltinGroup):
     def optimovej(self, goal: Value, a: Value = 0.3, v: Value = 0.3, r: Value = 0) -> Steps:
         """Move in joint space with limited jerk; `a` and `v` are fractions of the joint limits."""
         a_, v_, radius = _fraction(a, 'a'), _fraction(v, 'v'), not_negative(r, 'r')
-        target = self._joints(goal, 'optimovej')
+        target = self._joints(_without_frame(goal), 'optimovej')
         yield from self._run(
             lambda: self._motion.optimovej(target, a_, v_, radius), self._pose(list(target))
         )
@@ -126,7 +126,7 @@ class MotionBuiltins(BuiltinGroup):
     def optimovel(self, goal: Value, a: Value = 0.3, v: Value = 0.3, r: Value = 0) -> Steps:
         """Move the tool straight with limited jerk; `a`, `v` are fractions of the joint limits."""
         a_, v_, radius = _fraction(a, 'a'), _fraction(v, 'v'), not_negative(r, 'r')
-        target = self._pose(goal, 'goal')
+        target = self._pose(_without_frame(goal), 'goal')
         yield from self._run(lambda: self._motion.optimovel(target, a_, v_, radius), target)
 
     def servoj(
@@ -185,6 +185,7 @@ class MotionBuiltins(BuiltinGroup):
         angular_acceleration = acceleration if aRot == 'a' else positive(aRot, 'aRot')
         yield from self._stop(lambda: self._motion.stopl(acceleration, angular_acceleration))
 
+    @without_effect
     def direct_torque(
         self,
         torque: Value,
@@ -209,6 +210,10 @@ class ModeBuiltins(BuiltinGroup):
         """Enter freedrive, in which a person can move the arm by hand."""
         if freeAxes is not None:
             six(freeAxes, 'freeAxes')
+        self._controller.freedrive = FreedriveState.FREEDRIVE
+
+    def freedrive_mode_no_incorrect_payload_check(self) -> None:
+        """Enter freedrive; the payload is not checked here in any case."""
         self._controller.freedrive = FreedriveState.FREEDRIVE
 
     def end_freedrive_mode(self) -> None:
@@ -244,8 +249,12 @@ class ModeBuiltins(BuiltinGroup):
         self._controller.contact.force_mode = None
 
     def force_mode_set_damping(self, damping: Value) -> None:
-        """Accept a damping of 0..1, without effect: the simulated force law has no damping."""
-        within(damping, 'damping', 0, 1)
+        """Store a damping of 0..1; the simulated force law has none."""
+        self._controller.stored.force_damping = within(damping, 'damping', 0, 1)
+
+    def force_mode_get_damping(self) -> float:
+        """Return the damping of force mode, 0..1."""
+        return self._controller.stored.force_damping
 
     def force_mode_set_gain_scaling(self, scaling: Value) -> None:
         """Set the factor (0..2) on the speed of a compliant axis for a given force error."""
@@ -263,6 +272,14 @@ def _limits(a: Value, v: Value, t: Value) -> tuple[float, float, float]:
     if time > 0.0:
         return number(a, 'a'), number(v, 'v'), time
     return positive(a, 'a'), positive(v, 'v'), 0.0
+
+
+def _without_frame(goal: Value) -> Value:
+    if isinstance(goal, str | Struct):
+        raise RuntimeException(
+            'goal names a frame, and frames are not simulated; give joint positions or a pose'
+        )
+    return goal
 
 
 def _fraction(value: Value, name: str) -> float:

@@ -58,9 +58,9 @@ class PoseBuiltins(BuiltinGroup):
         rotation = multiply(to.quaternion, conjugate(start.quaternion))
         return script_pose(Pose(subtract(to.position, start.position), rotation))
 
-    def pose_dist(self, pose_from: Value, pose_to: Value) -> float:
+    def pose_dist(self, p_from: Value, p_to: Value) -> float:
         """Return the norm of the six numbers of `pose_sub`."""
-        return dist(self.pose_sub(pose_to, pose_from), (0.0,) * 6)
+        return dist(self.pose_sub(p_to, p_from), (0.0,) * 6)
 
     def point_dist(self, p_from: Value, p_to: Value) -> float:
         """Return the distance between the positions of two poses [m]."""
@@ -79,9 +79,9 @@ class PoseBuiltins(BuiltinGroup):
             return [0.0, -asin(max(-1.0, min(1.0, r[6]))), atan2(-r[1], r[4])]
         return [atan2(r[7], r[8]), -asin(r[6]), atan2(r[3], r[0])]
 
-    def rpy2rotvec(self, rpy: Value) -> list[float]:
+    def rpy2rotvec(self, rpy_vector: Value) -> list[float]:
         """Return the rotation vector [rad] of R = Rz(yaw) Ry(pitch) Rx(roll)."""
-        roll, pitch, yaw = three(rpy, 'rpy')
+        roll, pitch, yaw = three(rpy_vector, 'rpy_vector')
         rotation = multiply(_about(2, yaw), multiply(_about(1, pitch), _about(0, roll)))
         return list(rotation_vector_from_quaternion(rotation))
 

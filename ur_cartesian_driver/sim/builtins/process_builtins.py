@@ -20,7 +20,7 @@ from ur_cartesian_driver.sim.builtins.arguments import (
     whole,
     within,
 )
-from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
+from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup, without_effect
 from ur_cartesian_driver.sim.motion.controller_offset import ControllerPathOffset, FRAMES
 from ur_cartesian_driver.sim.motion.motion_ownership import Steps
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
@@ -74,14 +74,17 @@ def _frame(type: Value) -> int:
 class ProcessBuiltins(BuiltinGroup):
     """Arguments for screws and torques are only checked; `pause_on_error_code` takes effect."""
 
+    @without_effect
     def screw_driving(self, f: Value, v_limit: Value) -> None:
         """Check the force along the tool's z axis [N] and the speed limit [m/s]."""
         number(f, 'f')
         not_negative(v_limit, 'v_limit')
 
+    @without_effect
     def end_screw_driving(self) -> None:
         """End screw driving; harmless if it has not begun."""
 
+    @without_effect
     def tool_wrench_limit_set(
         self,
         frame_offset: Value,
@@ -104,15 +107,19 @@ class ProcessBuiltins(BuiltinGroup):
             if value is not None:
                 not_negative(value, name)
 
+    @without_effect
     def tool_wrench_limit_disable(self) -> None:
         """Remove the limits of `tool_wrench_limit_set`."""
 
+    @without_effect
     def high_holding_torque_enable(self) -> None:
         """Hold an arm at rest with high torque, as by default."""
 
+    @without_effect
     def high_holding_torque_disable(self) -> None:
         """Hold an arm at rest with normal torque until the program ends."""
 
+    @without_effect
     def position_deviation_warning(self, enabled: Value, threshold: Value = 0.8) -> None:
         """Accept a threshold within 0..1; deviations never cause a warning here."""
         within(threshold, 'threshold', 0, 1)

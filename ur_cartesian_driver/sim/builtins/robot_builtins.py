@@ -1,16 +1,18 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Script functions for time, the robot's state, and the pendant."""
+"""Script functions for time and the robot's state."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from math import hypot, isinf, pi
+from typing import Any
 
 from ur_cartesian_driver.sim.builtins.arguments import (
     index,
     not_negative,
     number,
+    one_of,
     six,
     text,
     three,
@@ -19,10 +21,20 @@ from ur_cartesian_driver.sim.builtins.arguments import (
 from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.motion.motion_ownership import Steps
-from ur_cartesian_driver.sim.state.controller_state import Payload, Popup
+from ur_cartesian_driver.sim.state.controller_state import Payload
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
-from ur_cartesian_driver.urscript.script_values import Struct, to_text, truth, Value
+from ur_cartesian_driver.urscript.script_values import (
+    INT_MAX,
+    INT_MIN,
+    make_list,
+    Struct,
+    truth,
+    Value,
+)
+
+#: The clock of the system (`time(2)`) when the controller's clock is 0: 2026-01-01 00:00 GMT [s].
+SYSTEM_TIME = 1_767_225_600
 
 
 class TimeBuiltins(BuiltinGroup):
@@ -44,8 +56,14 @@ class TimeBuiltins(BuiltinGroup):
             yield
 
     def time(self, mode: Value = 0) -> Struct:
-        """Return the time of the controller's clock in seconds and nanoseconds."""
-        nanoseconds = round(self._controller.time * 1e9)
+        """
+        Return a time in seconds and nanoseconds.
+
+        :param mode: 0 = the controller's clock; 2 = the clock of the system, which runs alike here
+            and begins on 2026-01-01, so that a run can be repeated.
+        """
+        start = SYSTEM_TIME if one_of(mode, 'mode', (0, 2)) == 2 else 0
+        nanoseconds = round(self._controller.time * 1e9) + start * 10**9
         return Struct({'sec': nanoseconds // 10**9, 'nanosec': nanoseconds % 10**9})
 
     def interpreter_mode(self, clearQueueOnEnter: Value = True, clearOnEnd: Value = True) -> Steps:
@@ -71,34 +89,6 @@ class TimeBuiltins(BuiltinGroup):
             not_negative(min_frequency, 'min_frequency'),
             text(action, 'action'),
         )
-
-
-class PendantBuiltins(BuiltinGroup):
-    """Messages and popups."""
-
-    def textmsg(self, s1: Value, s2: Value = '') -> None:
-        """Write a text to the log and send it to all clients of the primary interface."""
-        self._controller.messages.text(to_text(s1) + to_text(s2))
-
-    def popup(
-        self,
-        s: Value,
-        title: Value = 'Popup',
-        warning: Value = False,
-        error: Value = False,
-        blocking: Value = False,
-    ) -> Steps:
-        """Show a window; if it is blocking, wait until the window is closed."""
-        popup = Popup(
-            text=to_text(s),
-            title=to_text(title),
-            warning=truth(warning),
-            error=truth(error),
-            blocking=truth(blocking),
-        )
-        self._controller.show_popup(popup)
-        while popup.blocking and popup.open:
-            yield
 
 
 def _list_of(
@@ -127,6 +117,10 @@ class RobotBuiltins(BuiltinGroup):
     # Zero, because the simulated arm has no dynamics.
     get_joint_torques = _list_of(lambda _: (0.0,) * 6)
 
+    def get_actual_joint_accelerations(self) -> list[float]:
+        """Return the measured joint accelerations [rad/s^2]."""
+        return list(self._controller.actual.qdd)
+
     def get_actual_joint_positions_history(self, steps: Value = 0) -> list[float]:
         """Return the actual joint positions [rad] of the cycle that is `steps` cycles ago."""
         return list(self._controller.joint_history(whole(steps, 'steps')))
@@ -138,6 +132,10 @@ class RobotBuiltins(BuiltinGroup):
     def get_joint_temp(self, j: Value) -> float:
         """Return room temperature [°C]."""
         index(j, 'j', 6)
+        return 25.0
+
+    def get_tool_temp(self) -> float:
+        """Return room temperature [°C]."""
         return 25.0
 
     def get_controller_temp(self) -> float:
@@ -169,8 +167,9 @@ class RobotBuiltins(BuiltinGroup):
     enable_external_ft_sensor = ft_rtde_input_enable  # the old name
 
     def set_payload(self, m: Value, cog: Value = None) -> None:
-        """Set mass [kg] and centre of gravity [m]; the inertia becomes zero."""
-        centre = (0.0, 0.0, 0.0) if cog is None else three(cog, 'cog')
+        """Set mass [kg] and centre of gravity [m] (default: the TCP); no inertia remains."""
+        tcp = self._controller.motion.T_flange_tcp.position
+        centre = tcp if cog is None else three(cog, 'cog')
         self._controller.payload = Payload(mass=not_negative(m, 'm'), cog=centre)
 
     def set_payload_mass(self, m: Value) -> None:
@@ -208,6 +207,27 @@ class RobotBuiltins(BuiltinGroup):
         """Set the acceleration [m/s^2] opposite to gravity, in base axes."""
         self._controller.gravity = three(d, 'd')
 
+    def get_gravity(self) -> list[float]:
+        """Return the acceleration [m/s^2] opposite to gravity, in base axes."""
+        return list(self._controller.gravity)
+
+    def get_rtde_value(self, name: Value) -> Value:
+        """
+        Return the present value of an RTDE output by its name; a vector as a list.
+
+        An integer that does not fit into 32 bits becomes a float.
+        """
+        read, wanted = self._controller.read_output, text(name, 'name')
+        if read is None:
+            raise RuntimeException('This controller has no RTDE outputs.')
+        try:
+            value = read(wanted)
+        except KeyError:
+            raise RuntimeException(f'There is no RTDE output {wanted!r}.') from None
+        if isinstance(value, tuple):
+            return make_list([_script_number(item) for item in value])
+        return _script_number(value)
+
     def set_pos(self, q: Value) -> None:
         """Put the arm at joint positions at once, as only a simulated arm can."""
         self._controller.motion.teleport(six(q, 'q'))
@@ -241,3 +261,10 @@ class RobotBuiltins(BuiltinGroup):
     def powerdown(self) -> None:
         """Switch the arm off."""
         self._controller.power_off()
+
+
+def _script_number(value: Any) -> Value:
+    """Return a number of RTDE as a value of a program."""
+    if isinstance(value, bool | float):
+        return value
+    return int(value) if INT_MIN <= value <= INT_MAX else float(value)

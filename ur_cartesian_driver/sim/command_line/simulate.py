@@ -51,6 +51,7 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
         faults=arguments.faults,
         contacts=arguments.contacts,
         inputs=arguments.inputs,
+        answers=arguments.answers,
         imperfections=imperfections(arguments),
         geometry=calibration(arguments, robot_model(arguments.model)),
         programs={_program_name(file): file.read_text() for file in files},

@@ -88,6 +88,12 @@ def _add_surroundings(command: argparse.ArgumentParser) -> None:
         help="a digital input that is on: 'standard 3', 'configurable 0' or 'tool 1'; may be "
         'given several times',
     )
+    add(
+        '--answer',
+        dest='answers',
+        help='what the person at the pendant types when a program requests a value, such as yes '
+        'or 3; may be given several times, in the order of the requests',
+    )
 
 
 def _add_start(command: argparse.ArgumentParser) -> None:

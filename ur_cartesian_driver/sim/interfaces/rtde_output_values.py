@@ -20,6 +20,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY
 from ur_cartesian_driver.motion.geometry.vectors import add, add6, scale, Vector3, Vector6, ZERO6
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode
+from ur_cartesian_driver.protocol.rtde.rtde_fields import fields_of, OUTPUT_TYPES
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.motion.kinematics.point_motion import (
     flange_point,
@@ -232,3 +233,13 @@ def output_getter(name: str, zero: Any) -> Getter:
         return found
     value = FIXED.get(name, zero)
     return lambda _controller: value
+
+
+def read_output(controller: Controller, name: str) -> Any:
+    """
+    Return the present value of an output.
+
+    :raises KeyError: the software of this robot has no such output.
+    """
+    length = fields_of(OUTPUT_TYPES, controller.config.version)[name].length
+    return output_getter(name, 0 if length == 1 else (0.0,) * length)(controller)

@@ -119,6 +119,19 @@ class ActualMotion:
             return self._undisturbed.qd
         return add6(self._undisturbed.qd, self._joint_change(deviation))
 
+    @property
+    def qdd(self) -> Vector6:
+        """
+        Joint accelerations [rad/s^2].
+
+        On an imperfect arm they are the change of the measured speeds in the last cycle, with
+        their noise. How a robot computes them is not published.
+        """
+        arm = self.imperfect_arm
+        qdd = self._motion.qdd if arm is None else arm.qdd
+        error = self.acceleration_error
+        return add6(qdd, self._joint_change(error)) if any(error) else qdd
+
     def _solve(self, deviation: Vector6) -> Vector6:
         motion = self._motion
         T_base_flange = self.T_base_tcp @ motion.T_flange_tcp.inverse()

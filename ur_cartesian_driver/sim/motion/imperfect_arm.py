@@ -17,7 +17,14 @@ from typing import Protocol
 
 from ur_cartesian_driver.kinematics.robot_models import RobotModel
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.geometry.vectors import add_scaled6, Vector6, vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.vectors import (
+    add_scaled6,
+    scale6,
+    subtract6,
+    Vector6,
+    vector6,
+    ZERO6,
+)
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
 #: A joint with a smaller lag [rad] and smaller speeds [rad/s] is considered settled.
@@ -124,12 +131,15 @@ class ImperfectArm:
         ]
         self._cycle = 0
         self._qd: Vector6 | None = None
+        #: The joint speeds of the cycle before.
+        self._qd_before = ZERO6
         self._pose: tuple[Vector6, Pose, Pose] | None = None
         self.q = ZERO6
         self.step()
 
     def step(self) -> None:
         """Follow the target for a cycle, and measure."""
+        self._qd_before = self.qd
         motion, imperfections = self._motion, self._imperfections
         for joint, q, qd, qdd in zip(self._joints, motion.q, motion.qd, motion.qdd, strict=True):
             if q != joint.target or not joint.is_settled:
@@ -160,6 +170,11 @@ class ImperfectArm:
                 ]
             )
         return self._qd
+
+    @property
+    def qdd(self) -> Vector6:
+        """Joint accelerations [rad/s^2]: the change of the measured speeds in the last cycle."""
+        return scale6(subtract6(self.qd, self._qd_before), 1.0 / self._motion.cycle)
 
     def currents(self) -> Vector6:
         """Return the measured joint currents [A] of an arm that is switched on."""

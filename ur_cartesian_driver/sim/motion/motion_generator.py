@@ -151,6 +151,11 @@ class MotionGenerator:
         return self._active.moving
 
     @property
+    def has_motion(self) -> bool:
+        """Whether a motion is running; false from the end of a motion on, in the same cycle."""
+        return self._active.motion is not None
+
+    @property
     def on_path(self) -> bool:
         """Whether a path move is running."""
         return isinstance(self._active.motion, PathMotion)

@@ -28,6 +28,11 @@ Steps = Generator[None, None, None]
 HARD_STOP = 15.0
 
 
+#: Number of waypoints with overlapping blends that a thread can skip in one cycle: a loop of such
+#: moves has to take time. Assumed.
+MAX_SKIPPED = 100
+
+
 class FreedriveState(Enum):
     """Whether a person can guide the arm by hand."""
 
@@ -47,6 +52,8 @@ class MotionOwnership:
         self._abortable = 0
         self._aborting = False
         self._abandoned = False
+        #: Moves that returned at once in this cycle.
+        self._instant_moves = 0
 
     def take(self, thread: Hashable) -> None:
         """
@@ -78,8 +85,8 @@ class MotionOwnership:
         self._abortable += abortable
         finished = False
         try:
-            if move.returned and not self._motion.moving:
-                yield  # a move to the present position takes a cycle, too: programs may repeat it
+            if move.returned and self._has_to_wait():
+                yield
             while not move.returned:
                 if self._aborting and abortable:
                     self._aborting = False
@@ -91,6 +98,23 @@ class MotionOwnership:
             self._abortable -= abortable
             self._abandoned = self._abandoned or not finished
 
+    def _has_to_wait(self) -> bool:
+        """
+        Return whether a call that could return at once has to take a cycle.
+
+        A move to the present position takes one, because programs repeat it. The first such move
+        after a motion that has ended in this cycle takes none, so that moves follow each other
+        without an idle cycle. A set-point without a duration takes none: a loop of these is an
+        error on a robot, too.
+        """
+        motion = self._motion
+        if not motion.moving:
+            return True
+        if motion.has_motion and not motion.on_path:
+            return False
+        self._instant_moves += 1
+        return self._instant_moves > (MAX_SKIPPED if motion.on_path else 1)
+
     def release(self, thread: Hashable) -> None:
         """Take the motion from a thread that has ended."""
         if self._owner == thread:
@@ -98,6 +122,7 @@ class MotionOwnership:
 
     def end_of_frame(self) -> None:
         """Brake if no thread has continued a motion whose thread was killed."""
+        self._instant_moves = 0
         if self._calls == 0 and self._abandoned:
             self.brake()
 

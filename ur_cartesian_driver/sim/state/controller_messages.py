@@ -25,7 +25,7 @@ _MAX_LOG_LINES = 10_000
 #: Longest text in a message [bytes]: a frame must stay below 4092.
 _MAX_TEXT_LENGTH = 4000
 
-_POPUP = 2
+_POPUP, _REQUEST = 2, 9
 
 
 class ControllerMessages:
@@ -39,6 +39,7 @@ class ControllerMessages:
         """
         self._now = now
         self.pending: deque[PrimaryMessage] = deque(maxlen=_MAX_LOG_LINES)
+        self._requests = 0
         #: Called with code and argument of each error.
         self.on_error: Callable[[int, int], None] | None = None
         #: Texts of programs, and errors; one per line.
@@ -108,6 +109,26 @@ class ControllerMessages:
                 + bytes([len(title)])
                 + title
                 + popup.text.encode()[: _MAX_TEXT_LENGTH - 255],
+            )
+        )
+
+    def request(self, kind: int, text: str) -> None:
+        """
+        Report that a window requests a value.
+
+        The manuals for clients that we have read do not contain the body; here it begins like that
+        of a popup: u32 number of the request, u8 type of the value, text.
+
+        :param kind: the type of the value; 0 = boolean, 1 = integer, 2 = float, 3 = string.
+        """
+        self._requests += 1
+        self.pending.append(
+            RawMessage(
+                message_type=_REQUEST,
+                timestamp=self._stamp(),
+                content=self._requests.to_bytes(4, 'big')
+                + bytes([kind])
+                + text.encode()[: _MAX_TEXT_LENGTH - 255],
             )
         )
 

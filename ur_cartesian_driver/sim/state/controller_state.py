@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6
@@ -33,11 +34,26 @@ class Popup:
 
 @dataclass(slots=True, kw_only=True)
 class Pendant:
-    """Settings of the pendant, shared by all dashboard clients."""
+    """The pendant: settings shared by all dashboard clients, and the person in front of it."""
 
     user_role: str = 'PROGRAMMER'
     #: NONE: no client controls the operational mode.
     operational_mode: str = 'NONE'
+    #: What the person types into the next windows that request a value.
+    answers: deque[str] = field(default_factory=deque)
+
+
+@dataclass(slots=True, kw_only=True)
+class StoredSettings:
+    """Settings that programs make and read back; they outlive programs, and change no motion."""
+
+    motion_version: int = 1
+    #: 0.01 to 1.
+    jerk_gain_scaling: float = 1.0
+    #: 0 to 1.
+    force_damping: float = 0.005
+    #: Acceleration of the robot's base [m/s^2].
+    base_acceleration: Vector3 = (0.0, 0.0, 0.0)
 
 
 @dataclass(slots=True, kw_only=True)
