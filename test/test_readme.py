@@ -236,7 +236,7 @@ def test_snippet_without_ros_moves_the_arm(ur_sim, capsys):
         f"robot_ip='127.0.0.1', rtde_port={ports.rtde}, primary_port={ports.primary}, "
         'reverse_port=0, script_sender_port=0, trajectory_port=0, script_command_port=0, '
         # Robot and driver share this interpreter, which can be busy for longer than 0.2 s.
-        'robot_receive_timeout=2.0, max_state_age=0.0'
+        'robot_receive_timeout=10.0, max_state_age=0.0'
     )
     body = snippet('outcome.code.name')
     assert "robot_ip='127.0.0.1'" in body

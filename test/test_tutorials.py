@@ -73,7 +73,7 @@ def test_the_first_path_is_planned_and_executed_as_shown(ur_sim, tmp_path):
     program = saved_files(SEAM)['first.py']
     assert address in program
     # Robot and test share this interpreter, which can be busy for longer than 0.2 s.
-    there += ', robot_receive_timeout=2.0, max_state_age=0.0'
+    there += ', robot_receive_timeout=10.0, max_state_age=0.0'
     (tmp_path / 'first.py').write_text(program.replace(address, there), encoding='utf-8')
     assert_shows(shown_for(SEAM, 'python', 'first.py'), run_python('first.py', folder=tmp_path))
 

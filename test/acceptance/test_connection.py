@@ -226,7 +226,7 @@ def test_a_robot_loop_that_dies_does_not_bring_back_a_program_that_was_stopped(
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
     os.kill(driver._loop.host.pid, signal.SIGKILL)
     wait_for(lambda: driver.status.state is ConnectionState.DISCONNECTED)
-    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED, 10.0)
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
     sleep(0.5)
     assert ur_sim.state().runtime_state.name == 'STOPPED'
     driver.resend_robot_program()
