@@ -439,8 +439,8 @@ SERVO_AT_A_POINT = _mode(
 
 ROUNDED_CORNERS = _mode(
     'Rounded corners',
-    'SPLINE around rounded corners, with the outputs of the square with blends. What becomes of '
-    'them is as there.',
+    'SPLINE around rounded corners, with the outputs of the square with blends, which behave as '
+    'there.',
     {
         'in a corner': 'in the first corner',
         'before the trigger pose': 'between the corners, before the output at the second one',

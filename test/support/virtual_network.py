@@ -55,7 +55,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
     # ---- what asyncio is asked for ---------------------------------------------------------
 
-    def run_in_executor(self, executor, func, *args):  # type: ignore[override]
+    def run_in_executor(self, executor, func, *args):  # type: ignore[override]  # typed by a TypeVarTuple
         """Call the function at once: a thread knows nothing of the virtual time."""
         future = self.create_future()
         try:

@@ -46,7 +46,10 @@ class _Axes:
 
 def read_calibration(path: Path, model: RobotModel) -> DhTable:
     """
-    Return the DH table of a calibration file written by ``ur_calibration`` of the UR ROS driver.
+    Return the DH table of a calibration file.
+
+    Such files are written by ``ur-cartesian calibration`` and by ``ur_calibration`` of the UR ROS
+    driver.
 
     In the file, ``kinematics`` has the entries shoulder, upper_arm, forearm, wrist_1, wrist_2 and
     wrist_3. Each is the pose of a joint in the preceding link: x y z [m], roll pitch yaw [rad].

@@ -59,8 +59,8 @@ def test_random_goals_keep_every_limit(part):
         assert seen.joint_acceleration <= 1.02, case
         assert seen.shortest_piece >= 0.02 - 1e-6, case
         assert seen.pieces_per_second <= 50.0, case
-    # About a fifth is out of reach; three standard deviations more are chance.
-    assert refused.total() <= 0.2 * count + 1.2 * sqrt(count)
+    # About a fifth is out of reach, more by chance if few are drawn; 30 of a hundred at most.
+    assert refused.total() <= 0.2 * count + sqrt(count)
 
 
 def square(cell, side=0.06, **fields):

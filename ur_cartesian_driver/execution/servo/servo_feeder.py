@@ -191,8 +191,8 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
 
     def interpret(self, event: Event, state: GoalState) -> Meaning | None:
         """Return the meaning of the servo's phase after a packet."""
-        if isinstance(event, TrajectoryEnded):
-            return NO_MEANING if self._points is None else None  # that of an earlier goal
+        if self._points is None and isinstance(event, TrajectoryEnded):
+            return NO_MEANING  # the result of an earlier goal
         if not isinstance(event, ServoReceived):
             return None
         if self.stream.phase is ServoPhase.ARRIVED and state is GoalState.MOVING:

@@ -123,7 +123,7 @@ class SpeedRequests:
         self.has_wire_time = _TIMED_ON_WIRE[self._kinds] & takes_times(options)
         #: Remarks on changes due to the limits, by row.
         self.remarks: dict[int, str] = {}
-        #: Names of the limits that make a segment slower than requested, by row.
+        #: The limits that make a segment slower than requested, by row.
         self.limited: dict[int, SpeedLimit] = {}
         self._wanted = np.full(len(geometries), nan)
         self._source = np.zeros(len(geometries), dtype=np.intp)

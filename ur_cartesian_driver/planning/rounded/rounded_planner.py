@@ -36,15 +36,12 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.request.rounded_rules import corner_bounds
-from ur_cartesian_driver.planning.rounded.programmed_path import (
-    programmed_sections,
-)
+from ur_cartesian_driver.planning.rounded.programmed_path import programmed_sections
 from ur_cartesian_driver.planning.rounded.rounded_path import RoundedPath
 from ur_cartesian_driver.planning.rounded.section_law import SectionLaw, ToolLimits
 from ur_cartesian_driver.planning.rounded.tool_knots import (
     CLOSE_ENOUGH,
     MIN_PIECE_TIME,
-    SLOWER,
     tool_knots,
     tool_points,
     TRIES,
@@ -70,7 +67,8 @@ _WIDTH_TIME = 0.25
 _SLOW_WIDTH = 0.001
 #: A tool that travels less [m] turns on the spot, if it turns farther than this [rad].
 _NO_TRAVEL, _NO_TURN = 1e-6, 1e-6
-#: Samples inside each piece that measure its accelerations, and how far these may be above.
+#: Samples inside each piece that measure its accelerations: a quintic that starts and ends like
+#: the law is farthest from it near these quarters.
 _SAMPLES_INSIDE = 3
 
 
@@ -149,7 +147,7 @@ def plan_rounded_path(
             return motion
         if attempt < TRIES:
             for law, begin in zip(laws, motion.begins.tolist(), strict=True):
-                law.slow_around(coarse - begin, SLOWER)
+                law.slow_around(coarse - begin)
     point = int(motion.path.points[np.searchsorted(motion.path.times, coarse[0, 0])])
     raise TooFast(
         point_field(point),
@@ -199,6 +197,7 @@ def _fit(
     options: PlanningOptions,
     tolerance: float,
 ) -> RoundedMotion:
+    # This slows the laws where pieces are too coarse, so durations are read afterwards.
     knots = [tool_knots(law, _TOOL_PART * tolerance) for law in laws]
     tool = [tool_points(law, t) for law, t in zip(laws, knots, strict=True)]
     durations = np.array([law.duration for law in laws])

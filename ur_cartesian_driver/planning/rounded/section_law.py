@@ -50,17 +50,18 @@ _RAMP_PART = 0.35
 #: Fraction of the acceleration limits at which the law aims, because averaging adds a little.
 _AIM = 0.975
 #: How often limits are tightened; the power of the excess by which they are, a smaller one where
-#: the excess is far from 1, because jerk grows with a higher power of the speed; an extra factor;
-#: and the excess that is close enough.
+#: the excess is far from 1, because jerk grows with a higher power of the speed; and an extra
+#: factor.
 _ROUNDS = 8
 _FAR, _LESS, _MORE, _EXTRA = 2.0, 0.6, 1.5, 1.01
-CLOSE = 1.0
 #: Speeds may be this much higher than their limits, as a factor, between places.
 _SPEED_MARGIN = 1.005
 #: Samples while the window of the average passes a place at which limits change.
 _AROUND = 13
 #: Time between anchors [s].
 _ANCHOR_TIME = 2.0
+#: Factor by which limits of acceleration are tightened where the law has to be slower.
+_SLOWER = 1.5
 #: Times before and after a sample between which its jerk is measured [s].
 _JERK_STEP = 0.002
 _TINY = 1e-12
@@ -193,7 +194,8 @@ class SectionLaw:
         self._tightened = np.ones(m)
         self.law = self._fitted()
         #: Places, about :data:`_ANCHOR_TIME` apart, at which a grid of pieces begins anew.
-        self.anchors = self.law.at(np.arange(_ANCHOR_TIME, self.duration - 1.0, _ANCHOR_TIME)).s
+        last = self.duration - 0.5 * _ANCHOR_TIME
+        self.anchors = self.law.at(np.arange(_ANCHOR_TIME, last, _ANCHOR_TIME)).s
 
     @property
     def duration(self) -> float:
@@ -216,19 +218,18 @@ class SectionLaw:
         rows: Indices = segments - self.section.segments[0]
         return rows
 
-    def slow_around(self, times: Floats, factor: float) -> None:
+    def slow_around(self, times: Floats) -> None:
         """
         Replace the law by one that is slower in some periods.
 
         :param times: (k, 2) begin and end of each period since the beginning of the section [s].
-        :param factor: factor by which the limits of acceleration are tightened there.
         """
         before = self.law.times
         inside = np.zeros(len(self.samples.s), dtype=np.bool_)
         for begin, end in times.tolist():
             inside |= (before >= begin - 2.0 * self.window) & (before <= end + self.window)
         if inside.any():
-            self._tightened[inside] *= factor
+            self._tightened[inside] *= _SLOWER
             self.law = self._fitted()
 
     def _caps(self) -> dict[str, Floats]:
@@ -279,11 +280,11 @@ class SectionLaw:
             limits = replace(limits, speed=lowered_over(slowed, first.times, reach))
             law = TimeLaw(s, fastest_law(s, limits), self.window)
             excess = self.excess(law)
-            if excess.max() <= CLOSE:
+            if excess.max() <= 1.0:
                 break
             wide = -lowered_over(-excess, law.times, self.window)
             more = np.where(wide > _FAR, wide**_LESS, wide**_MORE)
-            self._tightened *= np.where(wide > CLOSE, more * _EXTRA, 1.0)
+            self._tightened *= np.where(wide > 1.0, more * _EXTRA, 1.0)
         return law
 
     def _measured_times(self, law: TimeLaw) -> Floats:

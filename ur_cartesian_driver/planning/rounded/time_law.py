@@ -111,7 +111,7 @@ class _Bounds:
             reached = (after[:, None] + step[:, None] * self.c) / rate
             largest = np.where(rate > 0.0, reached, inf).min(axis=1, initial=inf)
             for r, m, n in zip(self.r, self.m, self.n, strict=True):
-                # (1 - step m) y - step sqrt(r^2 - n^2 y^2) <= after, for any y unless 1 > step m
+                # (1 - step m) y - step sqrt(r^2 - n^2 y^2) <= after; where step m >= 1, any y fits
                 a, b = 1.0 - step * m, step * n
                 square = a * a + b * b
                 root = np.sqrt(square * (step * r) ** 2 - (b * after) ** 2)
@@ -162,8 +162,8 @@ def _lowered(y: Floats, reachable: Callable[[Indices, Floats], Floats]) -> Float
 
     All ramps are followed at the same time, each from its lower end and a row at a time.
 
-    :param reachable: returns the largest y in rows (r,) from which, or to which, a step leads from
-        the y (r,) in the rows after them.
+    :param reachable: takes rows (r,) and the y (r,) in the rows after them; returns the largest y
+        in these rows for which the step between the two is possible.
     """
     y = y.copy()
 

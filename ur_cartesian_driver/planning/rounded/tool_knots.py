@@ -27,8 +27,6 @@ MIN_PIECE_TIME = 0.02
 CLOSE_ENOUGH = 1.017
 #: Greatest number of times that the law is slowed around pieces that are too coarse.
 TRIES = 6
-#: Factor by which the limits of acceleration are tightened there.
-SLOWER = 1.5
 #: Number of shortest pieces that are joined into one at first; the result is split as necessary.
 _JOINED = 8
 #: Number of samples inside a piece at which it is compared with the law, and at which only its
@@ -53,7 +51,7 @@ def tool_knots(law: SectionLaw, tolerance: float) -> Floats:
         coarse = shortest[_accelerations(law, times, shortest) > CLOSE_ENOUGH]
         if not len(coarse) or attempt == TRIES:
             break
-        law.slow_around(np.stack([times[coarse], times[coarse + 1]], axis=1), SLOWER)
+        law.slow_around(np.stack([times[coarse], times[coarse + 1]], axis=1))
     return times
 
 
@@ -125,7 +123,8 @@ def _compared(
         ]
     )
     accelerations = _ratios(made.accelerations, limits)
-    return tuple(each.reshape(-1, _COMPARED).max(axis=1) for each in (deviations, accelerations))
+    shape = len(rows), _COMPARED
+    return deviations.reshape(shape).max(axis=1), accelerations.reshape(shape).max(axis=1)
 
 
 def _accelerations(law: SectionLaw, times: Floats, rows: Indices) -> Floats:

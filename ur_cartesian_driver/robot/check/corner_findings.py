@@ -47,8 +47,8 @@ def steps(check: str) -> Callable[[MotionSamples], Finding]:
     """Return the analysis that counts the cycles in which the program made no step."""
 
     def analyse(samples: MotionSamples) -> Finding:
-        # With the slider below 100 %, the first calls take more than a cycle by design, because
-        # the program learns the slider from the way of the arm. The last ones only slow it down.
+        # Left out are the first piece, in which the program learns the slider (below 100 % its
+        # calls take more than a cycle by design), and the last one, which only brakes.
         own = _following(samples)
         own[own] = (samples.pieces_begun[own] > 1) & (samples.pieces_begun[own] < PIECES)
         progress = np.diff(samples.spline_time[own])
