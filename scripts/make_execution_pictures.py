@@ -132,7 +132,7 @@ async def a_replanner(cell: Any) -> Any:
 
 async def a_press(cell: Any) -> list[tuple[float, ...]]:
     """Grind a part that is lower than the path and has a step; return time, heights, force."""
-    from ur_cartesian_driver.sim.interfaces.rtde_output_values import COMPUTED
+    from ur_cartesian_driver.sim.rtde_output_values import COMPUTED
     from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 
     controller, rows = cell.robot.controller, []

@@ -34,7 +34,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     Waypoint,
 )
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.sim.interfaces import rtde_output_values
+from ur_cartesian_driver.sim import rtde_output_values
 from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]

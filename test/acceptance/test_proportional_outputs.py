@@ -19,7 +19,7 @@ from ur_cartesian_driver.motion.goal.goal import Goal, ProportionalOutput, Segme
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.sim.interfaces.rtde_output_values import COMPUTED
+from ur_cartesian_driver.sim.rtde_output_values import COMPUTED
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

@@ -19,8 +19,8 @@ from ur_cartesian_driver.sim.faults.fault_values import (
 )
 from ur_cartesian_driver.sim.faults.impaired_sockets import ImpairedSockets
 from ur_cartesian_driver.sim.faults.impairment import DelayLine, ImpairedConnection, Impairment
-from ur_cartesian_driver.sim.interfaces.rtde_output_values import output_getter
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
+from ur_cartesian_driver.sim.rtde_output_values import output_getter
 
 UP = 'movel(pose_add(get_target_tcp_pose(), p[0, 0, 0.2, 0, 0, 0]), a=1, v=0.1)'
 DOWN = UP.replace('0.2', '-0.2')

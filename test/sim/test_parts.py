@@ -13,7 +13,6 @@ import pytest
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode, SafetyMode
 from ur_cartesian_driver.sim.clock import RealClock
 from ur_cartesian_driver.sim.interfaces.primary_commands import execute_command
-from ur_cartesian_driver.sim.interfaces.rtde_output_values import output_getter
 from ur_cartesian_driver.sim.programs.rtde_watchdog import Watchdogs
 from ur_cartesian_driver.sim.programs.script_upload import (
     UploadDecoder,
@@ -21,6 +20,7 @@ from ur_cartesian_driver.sim.programs.script_upload import (
     UploadedProgram,
     UploadTooLong,
 )
+from ur_cartesian_driver.sim.rtde_output_values import output_getter
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 from ur_cartesian_driver.sim.state.power_and_safety import (
     ArmPower,

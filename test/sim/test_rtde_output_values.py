@@ -13,21 +13,16 @@ import pytest
 
 from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType
 from ur_cartesian_driver.sim.interfaces.primary_stream import PrimaryStream
-from ur_cartesian_driver.sim.interfaces.rtde_output_values import output_getter
 from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
+from ur_cartesian_driver.sim.rtde_output_values import output_getter
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 #: All names with their types, from the manufacturer's client library.
 NAMES = json.loads((Path(__file__).parent / 'golden' / 'rtde_outputs.json').read_text())
 
 
-def zero(name):
-    length = DataType[NAMES[name]].length
-    return 0 if length == 1 else (0,) * length
-
-
 def read(bench, name):
-    value = output_getter(name, zero(name))(bench.controller)
+    value = output_getter(name, DataType[NAMES[name]].zero)(bench.controller)
     return np.array(value) if isinstance(value, tuple) else value
 
 

@@ -95,15 +95,14 @@ SIGNATURES = """
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 
-pytestmark = pytest.mark.skipif(
-    not (CHECKOUT / 'scripts' / 'make_script_functions.py').exists(),
-    reason='tests of a package, not a checkout',
-)
+SCRIPT = CHECKOUT / 'scripts' / 'make_script_functions.py'
 
 
 @pytest.fixture
 def script(monkeypatch):
-    monkeypatch.syspath_prepend(CHECKOUT / 'scripts')
+    if not SCRIPT.is_file():
+        pytest.skip('only a checkout has this file')
+    monkeypatch.syspath_prepend(SCRIPT.parent)
     import make_script_functions
 
     return make_script_functions

@@ -55,7 +55,8 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
     # ---- what asyncio is asked for ---------------------------------------------------------
 
-    def run_in_executor(self, executor, func, *args):  # type: ignore[override]  # typed by a TypeVarTuple
+    # The loop's own has a type for each argument of the function.
+    def run_in_executor(self, executor, func, *args):  # type: ignore[override]
         """Call the function at once: a thread knows nothing of the virtual time."""
         future = self.create_future()
         try:

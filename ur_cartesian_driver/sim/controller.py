@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Callable, Hashable
 from math import inf
 from pathlib import PurePosixPath
-from typing import Any, Protocol
+from typing import Protocol
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.geometry.pose import Pose
@@ -164,8 +164,6 @@ class Controller:
         self.messages.on_error = self._pause_if_wanted
         #: The faults, set by the assembly; None = no faults.
         self.faults: CycleFaults | None = None
-        #: Reads an RTDE output by name for programs, set by the assembly.
-        self.read_output: Callable[[str], Any] | None = None
 
     # ---- state --------------------------------------------------------------------------------
 

@@ -1,16 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Puts a simulated controller together: cycle, functions of programs, RTDE outputs, faults."""
+"""Puts a simulated controller together: its cycle, the functions of programs, its faults."""
 
 from __future__ import annotations
 
-from functools import partial
 from typing import NamedTuple
 
 from ur_cartesian_driver.sim.builtins import controller_builtins
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.faults.injector import FaultInjector
-from ur_cartesian_driver.sim.interfaces.rtde_output_values import read_output
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets
 
@@ -30,5 +28,4 @@ def assemble(config: SimulatorConfig, sockets: ScriptSockets | None = None) -> A
     """
     controller = Controller(config, controller_builtins, sockets)
     controller.faults = faults = FaultInjector(controller)
-    controller.read_output = partial(read_output, controller)
     return Assembly(controller, faults)

@@ -11,9 +11,9 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.protocol.rtde.rtde_client import DataReceived, RtdeClientCodec
 from ur_cartesian_driver.sim import SimulatorConfig
 from ur_cartesian_driver.sim.controller_assembly import assemble
-from ur_cartesian_driver.sim.interfaces.rtde_output_values import output_getter
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
 from ur_cartesian_driver.sim.motion.imperfect_arm import typical_imperfections
+from ur_cartesian_driver.sim.rtde_output_values import output_getter
 
 #: The models of the recordings, and speeds [rad/s] with the largest error at them [rad].
 RECORDED_ERRORS = [

@@ -22,7 +22,9 @@ from ur_cartesian_driver.importing.script.running_script import RunningScript
 from ur_cartesian_driver.importing.script.script_layout import parsed
 from ur_cartesian_driver.importing.script.script_terms import TERMS
 from ur_cartesian_driver.importing.text_file import file_lines, file_text
-from ur_cartesian_driver.sim import assemble, SimulatorConfig
+from ur_cartesian_driver.sim import SimulatorConfig
+from ur_cartesian_driver.sim.builtins import controller_builtins
+from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.urscript import CompileError, ScriptInterpreter
 from ur_cartesian_driver.urscript.running.script_interpreter import BUDGET_EXCEEDED
 
@@ -43,8 +45,9 @@ def collect_urscript(file: Path, options: ImportOptions, into: PathCollector) ->
     # The parser counts only LF as the end of a line; other line ends would shift its line numbers.
     program = parsed('\n'.join(file_lines(file_text(file))))
     arm = options.arm
-    config = SimulatorConfig(model=arm.model.name, geometry=arm.geometry)
-    controller = assemble(config, NoPeer()).controller
+    controller = Controller(
+        SimulatorConfig(model=arm.model.name, geometry=arm.geometry), controller_builtins, NoPeer()
+    )
     run = RunningScript()
     events = CollectedEvents(run, ArmPlace(controller, options))
     try:

@@ -116,7 +116,7 @@ class RobotState:
     message follow from names, types and :class:`Rtde`. Optional outputs come after the others,
     and the fields that the driver computes come last. A field of DriverStatus.msg reports the
     field of the same name, except that ``speed_scaling`` there is ``effective_speed``. The
-    simulator computes RTDE outputs, also new ones, in ``sim/interfaces/rtde_output_values.py``.
+    simulator computes RTDE outputs, also new ones, in ``sim/rtde_output_values.py``.
     """
 
     #: The controller's clock [s].

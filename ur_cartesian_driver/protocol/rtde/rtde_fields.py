@@ -38,6 +38,12 @@ class DataType(Enum):
         """Return the count of numbers in a value; 1 = not a vector."""
         return len(self.value)
 
+    @property
+    def zero(self) -> float | tuple[float, ...]:
+        """Return the value that is zero everywhere: a number, or a vector of them."""
+        number = 0.0 if self.value[0] == 'd' else 0
+        return number if self.length == 1 else (number,) * self.length
+
 
 def _registers(direction: str) -> dict[str, DataType]:
     """Return the general purpose registers of one direction."""

@@ -137,7 +137,7 @@ class Recipe:
 
     def zeros(self) -> RtdeValues:
         """Return zero for each field."""
-        return tuple(0 if t.length == 1 else (0,) * t.length for t in self.types)
+        return tuple(t.zero for t in self.types)
 
     def index(self, name: str) -> int:
         """Return the index of a field in the values; ValueError if the recipe lacks it."""

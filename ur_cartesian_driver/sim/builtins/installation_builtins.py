@@ -131,9 +131,10 @@ class InstallationBuiltins(BuiltinGroup):
 
 class StoredSettingsBuiltins(BuiltinGroup):
     """
-    Settings that programs can read back, and that outlive them; the motions stay the same.
+    Settings that programs can read back, and that outlive them.
 
-    They move as in motion version 1: all recordings behind them are of software before 5.22.
+    Motions do not depend on them: they are those of motion version 1, because all recordings are
+    of software before 5.22.
     """
 
     def motion_version_set(self, version: Value) -> None:

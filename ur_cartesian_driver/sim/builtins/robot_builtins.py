@@ -21,6 +21,7 @@ from ur_cartesian_driver.sim.builtins.arguments import (
 from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.motion.motion_ownership import Steps
+from ur_cartesian_driver.sim.rtde_output_values import read_output
 from ur_cartesian_driver.sim.state.controller_state import Payload
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
@@ -217,11 +218,9 @@ class RobotBuiltins(BuiltinGroup):
 
         An integer that does not fit into 32 bits becomes a float.
         """
-        read, wanted = self._controller.read_output, text(name, 'name')
-        if read is None:
-            raise RuntimeException('This controller has no RTDE outputs.')
+        wanted = text(name, 'name')
         try:
-            value = read(wanted)
+            value = read_output(self._controller, wanted)
         except KeyError:
             raise RuntimeException(f'There is no RTDE output {wanted!r}.') from None
         if isinstance(value, tuple):

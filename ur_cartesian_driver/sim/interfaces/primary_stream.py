@@ -31,7 +31,7 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
     ToolModeInfo,
 )
 from ur_cartesian_driver.sim.controller import Controller
-from ur_cartesian_driver.sim.interfaces.rtde_output_values import COMPUTED, FIXED
+from ur_cartesian_driver.sim.rtde_output_values import COMPUTED, FIXED
 
 #: Field of a sub-package -> RTDE output with the same meaning.
 JOINT_OUTPUTS: Mapping[str, str] = MappingProxyType(

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from ur_cartesian_driver.protocol.client_interfaces.realtime import packet_size, RealtimeData
 from ur_cartesian_driver.sim.controller import Controller
-from ur_cartesian_driver.sim.interfaces.rtde_output_values import output_getter
+from ur_cartesian_driver.sim.rtde_output_values import output_getter
 
 #: Field of the packet -> RTDE output with the same meaning.
 OUTPUTS: Mapping[str, str] = MappingProxyType(

@@ -18,9 +18,9 @@ from ur_cartesian_driver.protocol.rtde.rtde_server import (
 )
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.interfaces.rtde_input_effects import apply_inputs
-from ur_cartesian_driver.sim.interfaces.rtde_output_values import output_getter
 from ur_cartesian_driver.sim.interfaces.tcp_server import ClientSession
 from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
+from ur_cartesian_driver.sim.rtde_output_values import output_getter
 
 
 class _OutputSchedule:

@@ -152,7 +152,7 @@ class MotionGenerator:
 
     @property
     def has_motion(self) -> bool:
-        """Whether a motion is running; false from the end of a motion on, in the same cycle."""
+        """Whether a motion is running; false already in the cycle in which it has ended."""
         return self._active.motion is not None
 
     @property

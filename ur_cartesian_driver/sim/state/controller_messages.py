@@ -39,7 +39,6 @@ class ControllerMessages:
         """
         self._now = now
         self.pending: deque[PrimaryMessage] = deque(maxlen=_MAX_LOG_LINES)
-        self._requests = 0
         #: Called with code and argument of each error.
         self.on_error: Callable[[int, int], None] | None = None
         #: Texts of programs, and errors; one per line.
@@ -116,19 +115,16 @@ class ControllerMessages:
         """
         Report that a window requests a value.
 
-        The manuals for clients that we have read do not contain the body; here it begins like that
-        of a popup: u32 number of the request, u8 type of the value, text.
+        The body is not published. Assumed, like the beginning of a popup's body: u32 request (0),
+        u8 type of the value, text.
 
         :param kind: the type of the value; 0 = boolean, 1 = integer, 2 = float, 3 = string.
         """
-        self._requests += 1
         self.pending.append(
             RawMessage(
                 message_type=_REQUEST,
                 timestamp=self._stamp(),
-                content=self._requests.to_bytes(4, 'big')
-                + bytes([kind])
-                + text.encode()[: _MAX_TEXT_LENGTH - 255],
+                content=bytes(4) + bytes([kind]) + _cut(text).encode(),
             )
         )
 

@@ -241,5 +241,9 @@ def read_output(controller: Controller, name: str) -> Any:
 
     :raises KeyError: the software of this robot has no such output.
     """
-    length = fields_of(OUTPUT_TYPES, controller.config.version)[name].length
-    return output_getter(name, 0 if length == 1 else (0.0,) * length)(controller)
+    return _getter_of(controller.config.version, name)(controller)
+
+
+@lru_cache
+def _getter_of(version: tuple[int, ...], name: str) -> Getter:
+    return output_getter(name, fields_of(OUTPUT_TYPES, version)[name].zero)
