@@ -15,7 +15,6 @@ from ur_cartesian_driver.execution.servo.offset_setpoints import (
     OffsetSetpoints,
     STEP,
 )
-from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.goal.goal import StaleOffset
@@ -52,11 +51,14 @@ def band(duration, *, limits=LIMITS, speed=SPEED, acceleration=ACCELERATION, **c
     )
 
 
-class Still(SetpointSource):
+class Still:
     """An arm that stands for some time."""
 
     def __init__(self, duration):
         self._left = duration
+
+    def skip(self, rest):
+        """It always rests."""
 
     def next(self, dt):
         self._left -= dt

@@ -43,8 +43,14 @@ from ur_cartesian_driver.motion.state.rtde_state import (
     SafetyStatus,
 )
 from ur_cartesian_driver.motion.state.servo_report import ServoFeedback
+from ur_cartesian_driver.protocol.program.registers import (
+    InputDouble,
+    register_name,
+    SERVO_INPUTS,
+)
 
 STEP, REST = 0.002, (0.0,) * 6
+STATE_TIME = SERVO_INPUTS.index(register_name(InputDouble.STATE_TIME))
 LENGTH, DURATION = 0.1, 0.2
 NOZZLE = Pose((0.0, 0.0, 0.1), (0.0, 0.0, 0.0, 1.0))
 #: What any goal may take to its end once its robot is gone for good [s].
@@ -124,8 +130,8 @@ class Cell:
         before = self.joint
         if mode == 2:
             self.joint = self.row[4]
-            self.lag = max(0.0, self.lag + self.row[-2] - self.read - STEP)
-            self.read = self.row[-2]
+            self.lag = max(0.0, self.lag + self.row[STATE_TIME] - self.read - STEP)
+            self.read = self.row[STATE_TIME]
         tcp = NOZZLE if any(isinstance(c, SetTemporaryTcp) for c in self.commands) else IDENTITY
         self.event(ServoReceived(feedback=registers(mode, sequence, self.lag, timestamp=self.now)))
         if self.goal.state is until:

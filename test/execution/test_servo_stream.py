@@ -23,7 +23,7 @@ from ur_cartesian_driver.execution.servo.servo_stream import (
     ServoStream,
     TRANSITIONS,
 )
-from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource, SplineSetpoints
+from ur_cartesian_driver.execution.servo.setpoint_source import SplineSetpoints
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.primitive import Spline
 from ur_cartesian_driver.motion.state.servo_report import ServoActivity, ServoFeedback
@@ -38,7 +38,7 @@ HOME, OUT = (0.0,) * 6, (0.3,) * 6
 REST = (0.0,) * 6
 
 
-class Ramp(SetpointSource):
+class Ramp:
     """Set-points whose every joint is the time that was asked for [s]."""
 
     def __init__(self, end=np.inf):
@@ -276,14 +276,14 @@ def test_setpoints_are_held_at_a_stop_and_leave_its_rest_out():
         ],
     )
     stream, robot = ServoStream(SplineSetpoints(spline), SETTINGS), Robot()
-    stream.hold_time = 0.4
+    stream.next_hold = 0.4
     assert run(stream, robot, seconds=2.0) is None
     assert robot.done[-1] == pytest.approx(np.array(there), abs=1e-12)
     assert stream.source_time == pytest.approx(0.4)
-    held = stream.stopped_time
+    held = stream.held_time
     assert held > 1.0
     stream.go_on(0.3, inf)
-    assert stream.stopped_time == pytest.approx(held - 0.3)
+    assert stream.held_time == pytest.approx(held - 0.3)
     times = []
     assert run(
         stream,

@@ -18,7 +18,6 @@ import numpy as np
 from servo_cell import CYCLE, GUIDE, GuideCell, OpenLoopStream
 
 from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoSettings, ServoStream
-from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -47,7 +46,7 @@ def up_and_down(home):
     return np.array(rows)
 
 
-class UpAndDown(SetpointSource):
+class UpAndDown:
     """Set-points of a number of periods, or without end."""
 
     def __init__(self, rows, periods=np.inf):

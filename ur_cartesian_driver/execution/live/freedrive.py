@@ -10,7 +10,6 @@ from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
 from ur_cartesian_driver.execution.goal.outcome_codes import GoalSignal, Meaning
 from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoSettings, ServoStream
-from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
 from ur_cartesian_driver.motion.events import Event, ServoReceived
 from ur_cartesian_driver.motion.geometry.vectors import Joints, ZERO6
 from ur_cartesian_driver.motion.state.servo_report import ServoFeedback
@@ -86,7 +85,7 @@ class FreedriveStream(ServoStream):
         return (ServoMode.TEACH if freedrive else mode, *rest)
 
 
-class _ZeroSetpoints(SetpointSource):
+class _ZeroSetpoints:
     """Fills the joint registers, which the robot program does not read in freedrive."""
 
     done = False

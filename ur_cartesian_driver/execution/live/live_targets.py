@@ -20,7 +20,6 @@ from ur_cartesian_driver.execution.live.online_trajectory import (
     OnlineTrajectoryGenerator,
 )
 from ur_cartesian_driver.execution.offsets.freshness import Freshness, RareWarnings
-from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 
@@ -46,7 +45,7 @@ class LiveSettings:
                 raise ValueError(f'{name} is {getattr(self, name)}; it must be positive')
 
 
-class LiveTargets(SetpointSource, Steerable, Ageing, Reporting):
+class LiveTargets(Steerable, Ageing, Reporting):
     """The source of the set-points of a session."""
 
     def __init__(self, generator: OnlineTrajectoryGenerator, settings: LiveSettings) -> None:

@@ -21,7 +21,7 @@ import numpy as np
 from ur_cartesian_driver.execution.goal.feeder import Displaced
 from ur_cartesian_driver.execution.offsets.offset_requests import OffsetRequests
 from ur_cartesian_driver.execution.servo.servo_stream import MIN_STEP
-from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
+from ur_cartesian_driver.execution.servo.setpoint_source import RestingSource
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse_incremental import track_pose
 from ur_cartesian_driver.motion.geometry.arrays import Floats
@@ -93,7 +93,7 @@ class BoundedOffset:
 class OffsetSetpoints(Displaced):
     """The set-points of another source, displaced."""
 
-    def __init__(self, setpoints: SetpointSource, band: OffsetBand, arm: Arm) -> None:
+    def __init__(self, setpoints: RestingSource, band: OffsetBand, arm: Arm) -> None:
         """
         Begin on the path, with no offset to move to.
 

@@ -89,8 +89,8 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         #: Sends what the robot program does along the path; None = nothing.
         self._points = PointFeeder(monitor) if monitor.job.has_events else None
         self._holds = deque(monitor.job.holds)
-        self._stopped_time = 0.0
-        self.stream.hold_time = self._next_hold()
+        self._held_time = 0.0
+        self.stream.next_hold = self._next_hold()
 
     # ---- before the motion --------------------------------------------------------------------
 
@@ -182,12 +182,14 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
 
     def _end_hold(self) -> None:
         """Go on once the robot program is done at a point; the time there is no delay."""
+        if not self.monitor.job.holds:
+            return
         stream = self.stream
         if self._holds and self.monitor.motions_begun >= self._holds[0].motions:
             hold = self._holds.popleft()
             stream.go_on(hold.end - hold.begin, self._next_hold())
-        self.monitor.start_delay += stream.stopped_time - self._stopped_time
-        self._stopped_time = stream.stopped_time
+        self.monitor.start_delay += stream.held_time - self._held_time
+        self._held_time = stream.held_time
 
     def interpret(self, event: Event, state: GoalState) -> Meaning | None:
         """Return the meaning of the servo's phase after a packet."""
@@ -236,9 +238,10 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         """
         Return whether the robot program has lately read a set-point.
 
-        That alone does not show that it still does something along the path.
+        With points, an arm that stands is a fault even while set-points are read, unless the
+        motion is stalled.
         """
-        is_alone = self._points is None or self.stream.is_held
+        is_alone = self._points is None or self.stream.is_stalled
         return is_alone and now - self._last_answer < ANSWER_TIMEOUT
 
     def has_arrived(self, packet: RobotState) -> bool:

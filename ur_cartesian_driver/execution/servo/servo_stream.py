@@ -39,7 +39,7 @@ from math import ceil, inf
 from typing import NamedTuple
 
 from ur_cartesian_driver.execution.servo.servo_clock import ServoClock
-from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
+from ur_cartesian_driver.execution.servo.setpoint_source import RestingSource, SetpointSource
 from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.motion.state.servo_report import (
     ServoActivity,
@@ -210,11 +210,11 @@ class ServoStream:
         self.source_time = self.motion_time = 0.0
         #: Rate of the motion's time relative to the stream's time, 0 to 1.
         self._motion_rate = 1.0
-        #: Whether the motion is held at its place on the path; its total delay by being held [s].
-        self.is_held, self.held_time = False, 0.0
+        #: Whether the motion is stalled on its path; its total delay by stalls [s].
+        self.is_stalled, self.stalled_time = False, 0.0
         #: The time of the source at which set-points are repeated until :meth:`go_on` [s]; by how
         #: much this delays the motion in total, beyond rests of the source [s].
-        self.hold_time, self.stopped_time = inf, 0.0
+        self.next_hold, self.held_time = inf, 0.0
         #: Time of the motion [s]: that of the source without the rests that were left out.
         self._moved_time = 0.0
         self._recovers = False
@@ -276,17 +276,18 @@ class ServoStream:
         # The source may have been reset since, and the first write may precede its next set-point.
         self._joints = self._source.next(0.0)
 
-    def go_on(self, rest: float, hold_time: float) -> None:
+    def go_on(self, rest: float, next_hold: float) -> None:
         """
         Go on after a hold.
 
         :param rest: how long the source would rest here [s]; this time has passed in the hold.
-        :param hold_time: the time of the source at the next hold [s]; inf = none.
+        :param next_hold: the time of the source at the next hold [s]; inf = none.
         """
+        assert isinstance(self._source, RestingSource)
         self._source.skip(rest)
         self.source_time += rest
-        self.stopped_time -= rest
-        self.hold_time = hold_time
+        self.held_time -= rest
+        self.next_hold = next_hold
 
     def stop(self) -> tuple[float, ...] | None:
         """Leave the servo; return the inputs to write at once, None = nothing."""
@@ -384,7 +385,7 @@ class ServoStream:
             self._clock.advance(passed, speed, self.in_flight)
         if self.phase is not ServoPhase.SERVOING:
             return
-        if self.is_held:
+        if self.is_stalled:
             self._recovers = True
             self._motion_rate = max(0.0, self._motion_rate - STALL_DECELERATION * passed)
         else:
@@ -396,10 +397,10 @@ class ServoStream:
         moves, time = self.phase is ServoPhase.SERVOING, steps * self._clock.step
         passed = self._motion_rate * time if moves else 0.0
         if self._recovers:
-            self.held_time += time - passed
-        if self.source_time + passed >= self.hold_time:
-            reached = max(0.0, self.hold_time - self.source_time)
-            self.stopped_time += passed - reached
+            self.stalled_time += time - passed
+        if self.source_time + passed >= self.next_hold:
+            reached = max(0.0, self.next_hold - self.source_time)
+            self.held_time += passed - reached
             passed = reached
         self._sent += steps
         self._joints = self._source.next(passed)
@@ -409,7 +410,7 @@ class ServoStream:
         setpoint = _Setpoint(self._sequence, self._state_time, self.source_time)
         self._unread.append(setpoint)
         self._unfinished.append(setpoint)
-        if moves and self._source.done and self.hold_time == inf:
+        if moves and self._source.done and self.next_hold == inf:
             self._apply(ServoEvent.AT_END)
 
     def _apply(self, change: ServoEvent) -> None:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -27,13 +27,17 @@ class SetpointSource(Protocol):
         :param dt: nominal time since the last call [s]; 0 = hold.
         """
 
-    def skip(self, rest: float) -> None:
-        """Leave out the next ``rest`` seconds, in which the path rests; most have no rests."""
-        return
-
     @property
     def done(self) -> bool:
         """Whether the positions returned last are the end, where the arm rests."""
+
+
+@runtime_checkable
+class RestingSource(SetpointSource, Protocol):
+    """A source whose path may rest at points."""
+
+    def skip(self, rest: float) -> None:
+        """Leave out the next ``rest`` seconds, in which the path rests."""
 
 
 class SplineSetpoints:

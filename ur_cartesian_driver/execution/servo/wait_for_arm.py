@@ -14,7 +14,7 @@ from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 
 class WaitForArm(Stallable, Ageing, Reporting):
     """
-    Holds the set-points while the arm is off its path, for a limited time.
+    Stalls the motion while the arm is off its path, for a limited time.
 
     Only time in which the robot's program plays is measured: in a pause the arm cannot come back.
     """
@@ -25,26 +25,26 @@ class WaitForArm(Stallable, Ageing, Reporting):
         self._timeout = monitor.job.stall_timeout
         self._since = self._timestamp = 0.0
         self._count, self._longest = 0, 0.0
-        #: The delay by holding that is already part of the monitor's ``start_delay`` [s].
-        self._held_time = 0.0
+        #: The delay by stalls that is already part of the monitor's ``start_delay`` [s].
+        self._stalled_time = 0.0
         self._unsaid: list[GoalCommand] = []
 
     def wait_out(self, fault: Fault | None, packet: RobotState) -> Fault | None:
-        """Hold the motion and hide the fault during a violation, up to the stall timeout."""
+        """Stall the motion and hide the fault during a violation, up to the stall timeout."""
         stream = self._stream
-        was_held = stream.is_held
-        stream.is_held = fault is not None and fault[0] is GoalSignal.VIOLATION
-        if not was_held:
+        was_stalled = stream.is_stalled
+        stream.is_stalled = fault is not None and fault[0] is GoalSignal.VIOLATION
+        if not was_stalled:
             self._since = packet.timestamp
         elif packet.runtime_state is not RuntimeState.PLAYING:
             self._since += packet.timestamp - self._timestamp
         self._timestamp = packet.timestamp
-        # The time of the goal stands still while the motion is held.
-        self._monitor.start_delay += stream.held_time - self._held_time
-        self._held_time = stream.held_time
-        if fault is None or not stream.is_held:
+        # The time of the goal stands still while the motion is stalled.
+        self._monitor.start_delay += stream.stalled_time - self._stalled_time
+        self._stalled_time = stream.stalled_time
+        if fault is None or not stream.is_stalled:
             return fault
-        if not was_held:
+        if not was_stalled:
             self._count += 1
             text = f'the motion waits for the arm: {fault[1]}'
             self._unsaid.append(LogWarning(text=text))
@@ -66,5 +66,5 @@ class WaitForArm(Stallable, Ageing, Reporting):
             return ()
         return (
             f'the motion waited {how_often(self._count)} for an arm that was off its path, for '
-            f'{self._longest:.2f} s at most; the goal took {self._held_time:.2f} s more',
+            f'{self._longest:.2f} s at most; the goal took {self._stalled_time:.2f} s more',
         )
