@@ -132,8 +132,8 @@ async def a_replanner(cell: Any) -> Any:
 
 async def a_press(cell: Any) -> list[tuple[float, ...]]:
     """Grind a part that is lower than the path and has a step; return time, heights, force."""
-    from ur_cartesian_driver.sim.rtde_output_values import COMPUTED
     from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
+    from ur_cartesian_driver.sim.rtde_output_values import COMPUTED
 
     controller, rows = cell.robot.controller, []
     x, y, z = cell.memory.read().actual_tcp_pose.position
