@@ -7,7 +7,6 @@ Tool, speed and outputs are those that RTDE reports to a client of its own; wher
 switch follows from the points of the goal. Nothing is taken from the plan.
 """
 
-import asyncio
 from dataclasses import replace
 import os
 
@@ -366,7 +365,7 @@ def test_the_node_that_is_silent_leaves_the_valve_closed():
         cell.owner.silent = True
         await cell.until(lambda: not run.is_on(VALVE), 2.0)
         await cell.until(cell.at_rest, 2.0)
-        await asyncio.sleep(1.0)
+        await cell.sleep(1.0)
         assert not any(run.is_on(pin) for pin in (VALVE, LAMP, LIGHT))
 
     run_cell(scenario)

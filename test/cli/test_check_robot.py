@@ -326,7 +326,7 @@ CORNER = {experiment.check: experiment for experiment in EXPERIMENTS}
 def corner(ur_sim, experiment):
     """Carry out an experiment; return its findings by name."""
     samples = asyncio.run(run_experiment(address(ur_sim), experiment))
-    analyses = (experiment.analyse, *experiment.more)
+    analyses = experiment.analyses
     return {finding.check: finding for finding in (each(samples) for each in analyses)}
 
 
@@ -361,7 +361,7 @@ def test_a_socket_that_dies_in_a_pause_is_found(ur_sim):
         ur_sim.inject('half_open sockets')
         return await running
 
-    finding = experiment.analyse(asyncio.run(dying()))
+    finding = experiment.analyses[0](asyncio.run(dying()))
     assert finding.verdict is Verdict.NOTE
     assert PAUSE_IN <= finding.data['pieces'] < PIECES
     assert 'goes on after a pause: not confirmed' in finding.text
@@ -370,8 +370,8 @@ def test_a_socket_that_dies_in_a_pause_is_found(ur_sim):
 
 @pytest.mark.ur_sim(frequency=125.0)
 def test_a_robot_that_cannot_be_paused_answers_nothing(ur_sim):
-    finding = CORNER['corner_pause'].analyse(
-        asyncio.run(run_experiment(address(ur_sim), replace(CORNER['corner_10'], more=())))
+    finding = CORNER['corner_pause'].analyses[0](
+        asyncio.run(run_experiment(address(ur_sim), CORNER['corner_10']))
     )
     assert finding.verdict is Verdict.NOTE
     assert finding.text == 'The program was not paused in the corner.'

@@ -10,6 +10,7 @@ import pytest
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.robot.check import experiments
 from ur_cartesian_driver.robot.check.corner_experiment import corner_pieces, PIECE, PIECES, TURN
+from ur_cartesian_driver.robot.check.corner_findings import steps
 from ur_cartesian_driver.robot.check.experiments import (
     EXPERIMENTS,
     JOINT_ACCELERATION,
@@ -28,12 +29,8 @@ from ur_cartesian_driver.robot.check.finding import Verdict
 from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 
 CYCLE = 0.002
-ANALYSES = {experiment.check: experiment.analyse for experiment in EXPERIMENTS}
-ANALYSES_MORE = {
-    experiment.check.replace('corner', 'steps'): analyse
-    for experiment in EXPERIMENTS
-    for analyse in experiment.more
-}
+ANALYSES = {experiment.check: experiment.analyses[0] for experiment in EXPERIMENTS}
+ANALYSES['steps_100'] = steps('steps_100')
 
 
 def trapezoid(distance, speed, acceleration, stretched=1.0):
@@ -219,12 +216,12 @@ def test_cycles_without_a_step_are_counted_behind_the_first_piece_and_without_ga
     time = CYCLE * np.arange(900.0)
     made = 1.0 + CYCLE * np.arange(900.0)
     made[3:6] = made[3]  # the program learns the slider
-    finding = ANALYSES_MORE['steps_100'](cornered(time, made))
+    finding = ANALYSES['steps_100'](cornered(time, made))
     assert finding.data['confirmed']
     gap = np.delete(time, 500), np.delete(made, 500)
-    assert ANALYSES_MORE['steps_100'](cornered(*gap)).data['missed'] == 0
+    assert ANALYSES['steps_100'](cornered(*gap)).data['missed'] == 0
     made[600:603] = made[600]
-    finding = ANALYSES_MORE['steps_100'](cornered(time, made))
+    finding = ANALYSES['steps_100'](cornered(time, made))
     assert finding.data['missed'] == 2
     assert finding.verdict is Verdict.NOTE
 
@@ -235,7 +232,7 @@ def test_a_robot_without_the_registers_confirms_nothing(check):
     made = replace(
         cornered(CYCLE * np.arange(900.0), nothing), runtime_state=nothing, pieces_begun=nothing
     )
-    finding = {**ANALYSES, **ANALYSES_MORE}[check](made)
+    finding = ANALYSES[check](made)
     assert finding.verdict is Verdict.NOTE
     assert 'confirmed' not in finding.data
 

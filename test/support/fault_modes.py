@@ -60,6 +60,12 @@ FAULTS = (
     'the pose is measured 6 mm off',
     'the node is silent',
 )
+#: Those that may differ where something is done at points or along the path.
+WITH_POINTS = tuple(
+    name
+    for name in FAULTS
+    if name not in ("another client's program replaces ours", 'the controller crashes')
+)
 #: Further faults of RTDE, for a mode with set-points.
 FAULTS_OF_RTDE = (
     'safeguard stop',
@@ -391,11 +397,7 @@ OUTPUTS = _mode(
             'before the time': {'waits': False, 'steps': ('move the slider up',)}
         }
     },
-    faults=tuple(
-        name
-        for name in FAULTS
-        if name not in ("another client's program replaces ours", 'the controller crashes')
-    ),
+    faults=WITH_POINTS,
     pendant=('protective stop', 'an operator pauses the program'),
 )
 
@@ -413,11 +415,7 @@ AT_A_POINT = _mode(
         fault: {'': {'result_within': 5.0, 'rest_within': 3.0}}
         for fault in ("the program's answers are lost", 'the trajectory socket is half-open')
     },
-    faults=tuple(
-        name
-        for name in FAULTS
-        if name not in ("another client's program replaces ours", 'the controller crashes')
-    ),
+    faults=WITH_POINTS,
     pendant=('protective stop', 'an operator pauses the program'),
 )
 
@@ -448,11 +446,7 @@ ROUNDED_CORNERS = _mode(
     },
     3.0,
     {},
-    faults=tuple(
-        name
-        for name in FAULTS
-        if name not in ("another client's program replaces ours", 'the controller crashes')
-    ),
+    faults=WITH_POINTS,
     pendant=('protective stop', 'an operator pauses the program'),
 )
 

@@ -27,12 +27,15 @@ class Print:
     speeds: list = field(default_factory=list)
     #: The index of the place at which an output switches, and its value.
     switches: list = field(default_factory=list)
-    moves: int = 0
     _speed: float = 0.0
 
     @property
     def text(self):
         return '\n'.join(self.lines) + '\n'
+
+    @property
+    def moves(self):
+        return sum(line.startswith(('G1 ', 'G2 ', 'G3 ')) for line in self.lines)
 
     @property
     def curve(self):
@@ -63,9 +66,7 @@ class Print:
         for u in np.linspace(0.0, 1.0, count)[1:]:
             angle, radius = first + sense * sweep * u, begin + u * (end - begin)
             turned = centre[0] + radius * cos(angle), centre[1] + radius * sin(angle), old[2]
-            self.places.append(turned)
-            self.speeds.append(self._speed)
-        self.moves += 1
+            self._add(turned)
 
     def switch(self, code, value):
         self.say(code)
@@ -80,14 +81,18 @@ class Print:
     def _add(self, place):
         self.places.append(place)
         self.speeds.append(self._speed)
-        self.moves += 1
+
+
+def _begun(*header):
+    """Return the dice of a print, and the print with its first lines."""
+    made = Print()
+    made.say(*header)
+    return np.random.default_rng(SEED), made
 
 
 def vase():
     """Return a vase in one rising spiral of lines of 0.1 to 0.5 mm; the fan is output 0."""
-    rng = np.random.default_rng(SEED)
-    made = Print()
-    made.say(
+    rng, made = _begun(
         '; an imitation of a vase in spiral mode, as PrusaSlicer 2.7 writes it',
         *('G21', 'G90', 'M83', ';LAYER_CHANGE', ';TYPE:External perimeter'),
     )
@@ -110,9 +115,7 @@ def vase():
 
 def part():
     """Return layers of two perimeters with arcs, and infill in lines; a valve is output 0."""
-    rng = np.random.default_rng(SEED)
-    made = Print()
-    made.say(
+    rng, made = _begun(
         '; an imitation of a part with arcs, as OrcaSlicer 2.1 writes it with a paste extruder',
         *('G21', 'G90', 'M83'),
     )
@@ -159,9 +162,7 @@ def _infill(made, width, height, spacing):
 
 def bead():
     """Return beads of sealant around rows of holes, with G64 P in the file; glue is output 0."""
-    rng = np.random.default_rng(SEED)
-    made = Print()
-    made.say(
+    rng, made = _begun(
         '( an imitation of a gluing job, as FreeCAD writes it for LinuxCNC )',
         *('G17 G21 G90', 'G64 P0.2'),
     )

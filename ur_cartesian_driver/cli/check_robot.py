@@ -118,7 +118,7 @@ def _experiment(
         text = f'Not finished: {str(error).rstrip(".")}.'
         return [Finding(check=experiment.check, verdict=Verdict.PROBLEM, text=text)]
     recordings[experiment.check] = samples
-    return [analyse(samples) for analyse in (experiment.analyse, *experiment.more)]
+    return [analyse(samples) for analyse in experiment.analyses]
 
 
 def ask(motion: str) -> bool:

@@ -41,7 +41,7 @@ from ur_cartesian_driver.robot.check.rtde_recorder import RtdeRecorder
 from ur_cartesian_driver.robot.rtde.probe import read_state
 from ur_cartesian_driver.robot.services.rtde_input_writer import speed_slider_write, write_inputs
 from ur_cartesian_driver.robot.services.service_calls import SetSpeedSliderCall
-from ur_cartesian_driver.robot.transport import plain_address
+from ur_cartesian_driver.robot.transport import TcpConnection, TcpListener
 
 _PIECES_BEGUN = f'output_int_register_{int(OutputInteger.POINTS_BEGUN)}'
 _SPLINE_TIME = f'output_double_register_{SPLINE_TIME}'
@@ -140,34 +140,31 @@ async def _follow_corner(
 ) -> None:
     """Run the program that follows a corner, and be the other end of its socket."""
     first, rest = corner_messages(vector6(recorder.newest['target_q']))
-    connected: list[asyncio.StreamWriter] = []
 
-    async def send(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if plain_address(writer.get_extra_info('peername')[0]) != plain_address(
-            recorder.peer_address
-        ):
-            writer.close()  # only the robot is served
-            return
-        connected.append(writer)
-        writer.write(first if experiment.pauses else first + rest)
+    def send(robot: TcpConnection) -> None:
+        robot.send(first if experiment.pauses else first + rest)
 
-    host = recorder.local_address
-    server = await asyncio.start_server(send, host, 0)
+    listener = TcpListener(
+        'corner',
+        on_open=send,
+        on_data=lambda _: None,
+        on_closed=lambda _: None,
+        on_refused=lambda _: None,
+    )
+    host = recorder.connection.local_address
+    await listener.open(host, 0, frozenset({recorder.connection.peer_address}))
     try:
-        port = str(server.sockets[0].getsockname()[1])
-        script = experiment.script.replace(HOST, host).replace(PORT, port)
+        script = experiment.script.replace(HOST, host).replace(PORT, str(listener.port))
         await _start(recorder, probe, program(experiment.check, script))
         if experiment.pauses:
             await _pause(recorder, probe)
-            for writer in connected:
-                writer.write(rest)
+            if listener.connection is not None:
+                listener.connection.send(rest)
             probe.send(encode_command(PrimaryCommand.RESUME_PROGRAM))
         await _finish(recorder)
         await asyncio.sleep(MARGIN)
     finally:
-        for writer in connected:
-            writer.close()
-        server.close()
+        listener.close()
 
 
 async def _pause(recorder: RtdeRecorder, probe: PrimaryProbe) -> None:

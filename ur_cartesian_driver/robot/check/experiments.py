@@ -15,7 +15,7 @@ from math import degrees, radians
 
 import numpy as np
 
-from ur_cartesian_driver.robot.check.corner_experiment import corner_script, TURN
+from ur_cartesian_driver.robot.check.corner_experiment import corner_script, SPEED, TURN
 from ur_cartesian_driver.robot.check.corner_findings import corner_pause, followed, steps
 from ur_cartesian_driver.robot.check.finding import Finding, note, ok
 from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
@@ -48,11 +48,10 @@ class Experiment:
     :param check: name in the report and in doc/robot_program.md.
     :param motion: sentence about what moves, how far and how fast, for a person who has to agree.
     :param script: URScript body of the program that moves the arm.
-    :param analyse: derives the finding from the samples of the motion.
+    :param analyses: derive the findings from the samples of the motion.
     :param slider: fraction of the speed slider during the motion; None = unchanged.
     :param stop_after: time from the start of the motion to the stop command, by the controller's
         clock [s]; None = no stop command.
-    :param more: derive further findings from the same samples.
     :param is_corner: whether pieces of a corner are sent to the program, see
         :mod:`~ur_cartesian_driver.robot.check.corner_experiment`.
     :param pauses: whether the program is paused in the corner.
@@ -63,10 +62,9 @@ class Experiment:
     check: str
     motion: str
     script: str
-    analyse: Callable[[MotionSamples], Finding]
+    analyses: tuple[Callable[[MotionSamples], Finding], ...]
     slider: float | None = None
     stop_after: float | None = None
-    more: tuple[Callable[[MotionSamples], Finding], ...] = ()
     is_corner: bool = False
     pauses: bool = False
     feature: str = ''
@@ -246,18 +244,23 @@ path_offset_disable(2)
 sleep({OFFSET_REST:g})"""
 _SLOW = f'a={TOOL_ACCELERATION:g}, v={TOOL_SPEED:g}'
 _WRIST = f'Wrist 3 turns by {degrees(WRIST_TURN):.0f} degrees and back, at up to'
-_CORNER = (
-    f'Wrist 3, then wrist 2 turn by {degrees(TURN):.0f} degrees with a rounded corner between '
-    f'them, at up to {degrees(JOINT_SPEED):.0f} degrees/s'
-)
 _RETRACT = 'mm against its z axis, away from the work'
+
+
+def _corner(slider: float) -> str:
+    return (
+        f'The speed slider goes to {slider:.0%} and back to where it is. Wrist 3 turns by '
+        f'{degrees(TURN):.0f} degrees, then wrist 2, with a rounded corner between them, at up to '
+        f'{degrees(SPEED * slider):.1f} degrees/s; then both turn back.'
+    )
+
 
 EXPERIMENTS = (
     Experiment(
         check='joint_move',
         motion=f'{_WRIST} {degrees(JOINT_SPEED):.0f} degrees/s.',
         script=_THERE_AND_BACK,
-        analyse=_joint_move,
+        analyses=(_joint_move,),
     ),
     Experiment(
         check='turn',
@@ -270,7 +273,7 @@ EXPERIMENTS = (
             f'movel(pose_trans(start, p[0, 0, 0, 0, 0, {TOOL_TURN:.6f}]), {_SLOW})\n'
             f'movel(start, {_SLOW})'
         ),
-        analyse=_turn,
+        analyses=(_turn,),
     ),
     Experiment(
         check='timed_line',
@@ -279,7 +282,7 @@ EXPERIMENTS = (
             f'at {1e3 * TOOL_SPEED:g} mm/s.'
         ),
         script=_tool_line(-TIMED_DISTANCE, f't={TIMED_TIME:g}'),
-        analyse=_timed_line,
+        analyses=(_timed_line,),
     ),
     Experiment(
         check='slider',
@@ -288,7 +291,7 @@ EXPERIMENTS = (
             f'{degrees(JOINT_SPEED * SLIDER):.0f} degrees/s.'
         ),
         script=_THERE_AND_BACK,
-        analyse=_slider,
+        analyses=(_slider,),
         slider=SLIDER,
     ),
     Experiment(
@@ -299,7 +302,7 @@ EXPERIMENTS = (
             'back at the same speed.'
         ),
         script=_tool_line(-STOP_DISTANCE, _SLOW),
-        analyse=_program_stop,
+        analyses=(_program_stop,),
         stop_after=0.6,
     ),
     Experiment(
@@ -309,17 +312,18 @@ EXPERIMENTS = (
             f'{1e3 * OFFSET_SPEED:g} mm/s, and back at {1e3 * TOOL_SPEED:g} mm/s.'
         ),
         script=_BESIDE,
-        analyse=_path_offset,
+        analyses=(_path_offset,),
         feature='path_offset',
     ),
     *(
         Experiment(
             check=f'corner_{100.0 * slider:.0f}',
-            motion=f'The speed slider goes to {slider:.0%} and back to where it is. {_CORNER} '
-            'times that, and back.',
+            motion=_corner(slider),
             script=corner_script(),
-            analyse=followed(f'corner_{100.0 * slider:.0f}', slider),
-            more=(steps(f'steps_{100.0 * slider:.0f}'),),
+            analyses=(
+                followed(f'corner_{100.0 * slider:.0f}', slider),
+                steps(f'steps_{100.0 * slider:.0f}'),
+            ),
             slider=slider,
             is_corner=True,
         )
@@ -327,12 +331,9 @@ EXPERIMENTS = (
     ),
     Experiment(
         check='corner_pause',
-        motion=(
-            'The speed slider goes to 10% and back to where it is. '
-            f'{_CORNER} times that, and back; the program is paused in the corner, and goes on.'
-        ),
+        motion=f'{_corner(0.1)} The program is paused in the corner, and goes on.',
         script=corner_script(),
-        analyse=corner_pause,
+        analyses=(corner_pause,),
         slider=0.1,
         is_corner=True,
         pauses=True,

@@ -32,7 +32,7 @@ class RtdeRecorder:
         self.arrivals: list[float] = []
         self._requested = tuple(names)
         self._address = host, port
-        self._connection = RtdeConnection(
+        self.connection = RtdeConnection(
             RtdeClientCodec(
                 outputs=self._requested,
                 optional_outputs=[name for name in names if name != 'timestamp'],
@@ -46,21 +46,11 @@ class RtdeRecorder:
 
         :raises OSError: nothing answers, or what answers is not a robot.
         """
-        return await self._connection.open(*self._address)
+        return await self.connection.open(*self._address)
 
     def close(self) -> None:
         """End recording."""
-        self._connection.close()
-
-    @property
-    def local_address(self) -> str:
-        """The address of this computer on the connection to the robot."""
-        return self._connection.local_address
-
-    @property
-    def peer_address(self) -> str:
-        """The IP address of the robot."""
-        return self._connection.peer_address
+        self.connection.close()
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -85,7 +75,7 @@ class RtdeRecorder:
 
         :raises OSError: the connection ended before that.
         """
-        ended = asyncio.create_task(self._connection.ended())
+        ended = asyncio.create_task(self.connection.ended())
         end = asyncio.get_running_loop().time() + time
         try:
             while not (self.rows and is_reached(self.newest)):
