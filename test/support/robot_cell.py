@@ -237,9 +237,8 @@ class RobotCell:
         return f'def external_control():\n{text.decode()}\nend\n'
 
     async def load_pendant_program(self):
-        """Load the program that the External Control node fetches."""
-        text = await self.fetch_program()
-        assert not self.robot.controller.programs.load(PENDANT_PROGRAM, text)
+        """Load a program whose External Control node fetches that of the driver."""
+        assert not self.robot.controller.load_program(PENDANT_PROGRAM)
 
     async def close(self):
         self.owner.hang_up()

@@ -130,7 +130,7 @@ _PROGRAM_ACTIONS: Mapping[
     {
         'play': (
             lambda c: _play(c, RuntimeState.STOPPED),
-            lambda c: c.programs.state is RuntimeState.PLAYING,
+            lambda c: not c.programs.starting,  # a short program may have ended
         ),
         'resume': (
             lambda c: _play(c, RuntimeState.PAUSED),
@@ -164,9 +164,9 @@ def _act(
 def _load(field: str) -> Handler:
     def load(controller: Controller, body: Body) -> Fields:
         name = _text(body, field)
-        for file, text in controller.config.programs.items():
+        for file in controller.config.saved_programs:
             if PurePosixPath(file).stem == name:
-                if error := controller.programs.load(file, text):
+                if error := controller.load_program(file):
                     raise Refused(HTTPStatus.INTERNAL_SERVER_ERROR, 'Error', details=error)
                 return {'message': 'Program loaded'}
         raise Refused(HTTPStatus.INTERNAL_SERVER_ERROR, 'Error', details=f'No program {name!r}')
