@@ -10,11 +10,13 @@ driver listens too, so that all have the ports of a real robot.
 from contextlib import contextmanager, ExitStack, suppress
 import os
 import re
+from runpy import run_path
 import socket
 import subprocess
 from time import monotonic, sleep
 import urllib.request
 
+from pages import CHECKOUT
 import pytest
 from random_cases import cases, random_of, SEED
 from waiting import wait_for
@@ -35,14 +37,15 @@ ROBOTS = {
     'e-Series': ('127.9.0.2', 'ur5e', '5.21'),
     'PolyScope X': ('127.9.0.3', 'ur5e', '10.12'),
 }
+EXAMPLE = CHECKOUT / 'examples' / 'tool_change.urp'
 ENVIRONMENT = {**os.environ, 'PYTHONUNBUFFERED': '1'}
 
 
 @contextmanager
-def simulator(host, model, polyscope, *options):
+def simulator(host, model, polyscope, *options, program='external_control.urp'):
     """Run a simulated robot without power, and External Control loaded; yield the process."""
     words = ['--host', host, '--model', model, '--polyscope', polyscope, '--power-off']
-    words += ['--program', 'external_control.urp', '--external-control-host', host, *options]
+    words += ['--program', str(program), '--external-control-host', host, *options]
     with process('sim', *words, environment=ENVIRONMENT, stdout=subprocess.PIPE) as running:
         assert running.stdout is not None
         assert running.stdout.readline().startswith(f'simulated {model} on {host}')
@@ -140,6 +143,21 @@ def test_a_driver_that_comes_later_needs_another_play(generation):
                 'Starting program',
             ]
             run_goal(driver, 0.02)
+
+
+@pytest.mark.skipif(not EXAMPLE.is_file(), reason='only a checkout has the examples')
+def test_the_arm_comes_round_to_the_example_of_a_tool_change():
+    host = '127.9.0.41'
+    tool_change = run_path(str(EXAMPLE.with_suffix('.py')))['tool_change']
+    with simulator(host, 'ur5e', '5.21', program=EXAMPLE), driver_of(host, 'ur5e') as driver:
+        assert driver.recover().ok
+        for _ in range(2):
+            driver.wait_ready(30.0)
+            path = tool_change(driver.state.actual_tcp_pose)
+            driver.execute(path, timeout=60.0).raise_for_error()
+            answer = driver.hand_back_control()
+            assert answer.ok, answer.text
+        driver.wait_ready(30.0)
 
 
 def test_two_arms_have_a_port_each():
