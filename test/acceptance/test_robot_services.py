@@ -53,6 +53,14 @@ def test_settings_are_done_when_the_robot_reports_them(driver, ur_sim):
     assert ur_sim.state().T_flange_tcp.angle_to(NOZZLE) < 1e-5
     assert driver.set_payload(1.5, (0.0, 0.0, 0.05)).ok
     assert ur_sim.call(lambda c: c.payload.mass) == 1.5
+    inertia = (0.01, 0.02, 0.03, -0.001, 0.002, 0.003)
+    assert driver.set_payload(2.5, (0.01, 0.0, 0.05), inertia=inertia, transition_time=0.2).ok
+    payload = ur_sim.call(lambda c: c.payload)
+    assert (payload.mass, *payload.cog) == (2.5, 0.01, 0.0, 0.05)
+    assert payload.inertia == pytest.approx(inertia)
+    wait_for(lambda: driver.signals.payload_inertia == pytest.approx(inertia))
+    assert driver.set_gravity((6.94, 0.0, 6.94)).ok
+    assert ur_sim.call(lambda c: c.gravity) == pytest.approx((6.94, 0.0, 6.94))
     assert driver.set_speed_slider(0.37).ok
     assert ur_sim.state().speed_slider == pytest.approx(0.37)
     assert driver.zero_ftsensor().ok
@@ -101,6 +109,7 @@ def test_settings_wait_for_the_end_of_a_goal(driver, home):
     for answer in (
         driver.set_tcp(NOZZLE),
         driver.set_payload(1.0),
+        driver.set_gravity((0.0, 0.0, 9.82)),
         driver.dashboard('load installation', 'default.installation'),
     ):
         assert not answer.ok

@@ -5,7 +5,7 @@
 from math import nan
 import re
 
-from geometry_msgs.msg import Point, Pose, Quaternion
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 import pytest
 from std_srvs.srv import Trigger
 
@@ -21,6 +21,7 @@ from ur_cartesian_driver.srv import (
     RawRequest,
     Recover,
     RunScript,
+    SetGravity,
     SetIO,
     SetPayload,
     SetSpeedSliderFraction,
@@ -65,6 +66,7 @@ class ServiceClient:
                 RawRequest,
                 Recover,
                 RunScript,
+                SetGravity,
                 SetIO,
                 SetPayload,
                 SetSpeedSliderFraction,
@@ -89,6 +91,7 @@ def test_every_service_does_what_it_says(cell):
     ).success
     assert sim.state().T_flange_tcp.position == pytest.approx((0.0, 0.0, 0.1))
     assert call('set_payload', SetPayload.Request(mass=0.7)).success
+    assert call('set_gravity', SetGravity.Request(gravity=Vector3(z=9.8))).success
     assert call(
         'set_io', SetIO.Request(output=SetIO.Request.STANDARD_DIGITAL, pin=1, value=1.0)
     ).success
@@ -152,6 +155,8 @@ def test_recover_says_what_it_did_or_what_a_person_must_do(single_cell, capsys):
         ('set_tcp', SetTCP.Request(tcp=Pose(orientation=Quaternion(w=0.0))), 'unit quaternion'),
         ('set_payload', SetPayload.Request(mass=-1.0), '0 to 100 kg'),
         ('set_payload', SetPayload.Request(mass=nan), '0 to 100 kg'),
+        ('set_payload', SetPayload.Request(mass=1.0, inertia=[0.1]), 'has 1 numbers, not 6'),
+        ('set_gravity', SetGravity.Request(), 'more than 0 and at most 20 m/s'),
         (
             'set_speed_slider',
             SetSpeedSliderFraction.Request(speed_slider_fraction=50.0),

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from concurrent.futures import Future
 
 from ur_cartesian_driver.motion.geometry.pose import Pose
@@ -20,6 +21,7 @@ from ur_cartesian_driver.robot.services.service_calls import (
     SCRIPT_TIMEOUT,
     ServiceAnswer,
     ServiceCall,
+    SetGravityCall,
     SetOutputCall,
     SetPayloadCall,
     SetSpeedSliderCall,
@@ -52,9 +54,29 @@ class RobotServices(ABC):
         """Set the active TCP."""
         return self.call(SetTcpCall(T_flange_tcp=T_flange_tcp)).result()
 
-    def set_payload(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> ServiceAnswer:
-        """Set mass [kg] and centre of gravity [m] (in the flange frame) of the load."""
-        return self.call(SetPayloadCall(mass=mass, cog=cog)).result()
+    def set_payload(
+        self,
+        mass: float,
+        cog: Vector3 = (0.0, 0.0, 0.0),
+        *,
+        inertia: Sequence[float] = (),
+        transition_time: float = 0.0,
+    ) -> ServiceAnswer:
+        """
+        Set mass [kg] and centre of gravity [m] (in the flange frame) of the load.
+
+        :param inertia: xx, yy, zz, xy, xz, yz about that point, along the axes of the flange
+            [kg m^2]; empty = a point mass.
+        :param transition_time: how long the controller takes to go over to this load [s].
+        """
+        call = SetPayloadCall(
+            mass=mass, cog=cog, inertia=tuple(inertia), transition_time=transition_time
+        )
+        return self.call(call).result()
+
+    def set_gravity(self, gravity: Vector3) -> ServiceAnswer:
+        """Set the acceleration that opposes gravity, in base axes [m/s^2]."""
+        return self.call(SetGravityCall(gravity=gravity)).result()
 
     def zero_ftsensor(self) -> ServiceAnswer:
         """Zero the force-torque sensor at the force and torque that it measures now."""

@@ -15,11 +15,11 @@ Lines of the program that start with ``#!`` are instructions for this module:
     insert the script prelude unchanged.
 ``#! calls``
     insert the code that calls the functions of the prelude by their numbers.
-``#! if FEATURE`` ... ``#! end``
-    keep these lines only if the controller's software has the feature, because a controller
-    refuses a program that names an unknown function. Two features do not depend on the software:
-    lines for ``freedrive`` are kept if the settings allow freedrive, and lines for ``prelude`` if
-    the prelude defines functions.
+``#! if FEATURE`` ... ``#! end``, ``#! if not FEATURE`` ... ``#! end``
+    keep these lines only if the controller's software has the feature, or has not, because a
+    controller refuses a program that names an unknown function. Two features do not depend on
+    the software: lines for ``freedrive`` are kept if the settings allow freedrive, and lines for
+    ``prelude`` if the prelude defines functions.
 
 The program is sent without empty lines, and without comments except the markers of the External
 Control node. Programs on the pendant share a name space with the robot program, so each variable,
@@ -289,6 +289,8 @@ def _lines(name: str, settings: ProgramSettings) -> Iterator[str]:
                 keep = settings.allow_freedrive
             case ['#!', 'if', feature] if feature in FEATURES:
                 keep = has_feature(feature, settings.version)
+            case ['#!', 'if', 'not', feature] if feature in FEATURES:
+                keep = not has_feature(feature, settings.version)
             case ['#!', 'end']:
                 keep = True
             case ['#!', *rest]:

@@ -31,10 +31,12 @@ from ur_cartesian_driver.robot.services.service_calls import (
     SendProgramCall,
     ServiceAnswer,
     ServiceCall,
+    SetGravityCall,
     SetOutputCall,
     SetPayloadCall,
     SetSpeedSliderCall,
     SetTcpCall,
+    SettingCall,
     ZeroFtSensorCall,
 )
 from ur_cartesian_driver.ros.message_fields import pose_from_message
@@ -48,6 +50,9 @@ from ur_cartesian_driver.srv import (
     SetIO,
     SetSpeedSliderFraction,
     SetTCP,
+)
+from ur_cartesian_driver.srv import (
+    SetGravity as SetGravityService,
 )
 from ur_cartesian_driver.srv import (
     SetPayload as SetPayloadService,
@@ -92,7 +97,17 @@ def _tcp(request: Any) -> ServiceCall:
 
 def _payload(request: Any) -> ServiceCall:
     cog = request.center_of_gravity
-    return SetPayloadCall(mass=request.mass, cog=(cog.x, cog.y, cog.z))
+    return SetPayloadCall(
+        mass=request.mass,
+        cog=(cog.x, cog.y, cog.z),
+        inertia=tuple(request.inertia),
+        transition_time=request.transition_time,
+    )
+
+
+def _gravity(request: Any) -> ServiceCall:
+    gravity = request.gravity
+    return SetGravityCall(gravity=(gravity.x, gravity.y, gravity.z))
 
 
 def _output(request: Any) -> ServiceCall:
@@ -118,6 +133,7 @@ REQUEST_SERVICES: Mapping[str, tuple[Any, Callable[[Any], ServiceCall]]] = {
     ),
     'set_tcp': (SetTCP, _tcp),
     'set_payload': (SetPayloadService, _payload),
+    'set_gravity': (SetGravityService, _gravity),
     'set_io': (SetIO, _output),
     'set_speed_slider': (
         SetSpeedSliderFraction,
@@ -165,8 +181,8 @@ class CommandServices:
             return completed_answer(str(error))
 
     def _call(self, call: ServiceCall, _: Any = None) -> Future[ServiceAnswer]:
-        # A goal that is being planned depends on the TCP and payload that it found.
-        if isinstance(call, SetTcpCall | SetPayloadCall) and not self._is_idle():
+        # A goal that is being planned depends on the settings that it found.
+        if isinstance(call, SettingCall) and not self._is_idle():
             return completed_answer(
                 'A goal that is being planned or executed depends on the present value; wait for '
                 'its end or cancel it, then try again.'
