@@ -102,6 +102,7 @@ def test_settings_wait_for_the_end_of_a_goal(driver, home):
         driver.set_tcp(NOZZLE),
         driver.set_payload(1.0),
         driver.dashboard('load installation', 'default.installation'),
+        driver.dashboard('set operational mode', 'MANUAL'),
     ):
         assert not answer.ok
         assert answer.text.startswith('A goal is running')

@@ -166,6 +166,8 @@ DONE = (200, {'message': None})
         ('close popup', '', ('DELETE', '/popup/v1', None), {}, ''),
         ('close safety popup', '', ('DELETE', '/popup/v1/safety', None), {}, ''),
         ('addToLog', 'a line', ('POST', '/system/v1/log', {'message': 'a line'}), {}, ''),
+        ('generate flight report', 'system', ('POST', '/supportfiles/v1', None), {}, ''),
+        ('shutdown', '', ('PUT', '/system/v1/shutdown', None), {}, ''),
     ],
 )
 def test_each_command_is_one_request(command, argument, request_, answer, value):

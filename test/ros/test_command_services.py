@@ -16,15 +16,19 @@ from ur_cartesian_driver.motion.state.rtde_state import RobotMode
 from ur_cartesian_driver.ros.services.command_services import REQUEST_SERVICES
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.srv import (
+    GenerateFlightReport,
+    GenerateSupportFile,
     Load,
     Popup,
     RawRequest,
     Recover,
     RunScript,
     SetIO,
+    SetOperationalMode,
     SetPayload,
     SetSpeedSliderFraction,
     SetTCP,
+    SetUserRole,
 )
 
 pytestmark = pytest.mark.slow
@@ -60,15 +64,19 @@ class ServiceClient:
             kind
             for kind in (
                 Trigger,
+                GenerateFlightReport,
+                GenerateSupportFile,
                 Load,
                 Popup,
                 RawRequest,
                 Recover,
                 RunScript,
                 SetIO,
+                SetOperationalMode,
                 SetPayload,
                 SetSpeedSliderFraction,
                 SetTCP,
+                SetUserRole,
             )
             if isinstance(request, kind.Request)
         )
@@ -114,6 +122,32 @@ def test_every_service_does_what_it_says(cell):
     assert call('recover', Recover.Request()).message == 'The robot is ready for goals.'
     assert call('hand_back_control').success
     assert call('resend_robot_program').success
+
+
+def test_modes_roles_and_reports_of_the_pendant(single_cell):
+    call = ServiceClient(single_cell)
+    assert call('dashboard/get_safety_status').message == 'NORMAL'
+    assert call('dashboard/get_operational_mode').message == 'NONE'
+    for mode in SetOperationalMode.Request.AUTOMATIC, SetOperationalMode.Request.MANUAL:
+        request = SetOperationalMode.Request(operational_mode=mode)
+        assert call('dashboard/set_operational_mode', request).success
+        assert call('dashboard/get_operational_mode').message == mode
+    assert call('dashboard/is_in_remote_control').message == 'false'
+    assert call('dashboard/clear_operational_mode').success
+    assert call('dashboard/get_operational_mode').message == 'NONE'
+    refused = call(
+        'dashboard/set_operational_mode', SetOperationalMode.Request(operational_mode='dancing')
+    )
+    assert not refused.success
+    assert call('dashboard/generate_flight_report', GenerateFlightReport.Request()).success
+    report = call('dashboard/generate_support_file', GenerateSupportFile.Request(dir_path='.'))
+    assert report.message.endswith('.zip')
+    for answer in (
+        call('dashboard/get_user_role'),
+        call('dashboard/set_user_role', SetUserRole.Request(user_role='OPERATOR')),
+    ):
+        assert not answer.success
+        assert 'no command' in answer.message
 
 
 def test_a_service_that_takes_its_time_holds_up_nobody(cell):

@@ -153,6 +153,22 @@ def test_popups_log_and_identity():
     assert user.ask('POST', '/system/v1/log', {'message': 'a line'})[0] == 200
 
 
+def test_manual_mode_ends_remote_control():
+    user = ApiUser()
+    user.controller.set_operational_mode('MANUAL')
+    assert user.value('/system/v1/operationalmode') == {'mode': 'MANUAL'}
+    assert user.value('/system/v1/controlmode') == {'mode': 'LOCAL'}
+    assert user.act('POWER_OFF') == 403
+
+
+def test_a_flight_report_and_a_shutdown_are_answered():
+    user = ApiUser()
+    status, answer = user.ask('POST', '/supportfiles/v1')
+    assert (status, answer['message']) == (200, 'Flight report generated successfully.')
+    assert user.ask('PUT', '/system/v1/shutdown') == (202, {'message': None})
+    assert user.controller.power.mode is RobotMode.POWER_OFF
+
+
 @pytest.mark.parametrize(
     ('polyscope', 'method', 'path', 'known'),
     [

@@ -127,6 +127,11 @@ API_COMMANDS: Mapping[str, tuple[ApiCommand, ...]] = MappingProxyType(
                 method='POST', path='/system/v1/log', body={'message': '{}'}, since=(10, 14)
             ),
         ),
+        # There is one kind of report: the type, the argument on the dashboard, is not sent.
+        'generate flight report': (
+            ApiCommand(method='POST', path='/supportfiles/v1', since=(10, 14)),
+        ),
+        'shutdown': (ApiCommand(method='PUT', path='/system/v1/shutdown', since=(10, 14)),),
     }
 )
 #: The request for ``play`` if the program is paused: the dashboard has one command for both cases.

@@ -375,6 +375,16 @@ class Controller:
 
     # ---- commands of clients and programs -----------------------------------------------------
 
+    def set_operational_mode(self, mode: str) -> None:
+        """
+        Set the operational mode: ``MANUAL``, ``AUTOMATIC``, or ``NONE`` if no client controls it.
+
+        Manual mode ends remote control, and only a person at the pendant can switch it on again.
+        """
+        self.pendant.operational_mode = mode
+        if mode == 'MANUAL':
+            self.remote_control = False
+
     def set_slider(self, fraction: float) -> None:
         """Set the speed slider, cut to 0..1."""
         self.speed_slider = min(1.0, max(0.0, fraction))

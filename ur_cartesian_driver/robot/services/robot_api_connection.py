@@ -11,6 +11,7 @@ a restart of the robot would fail.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Mapping
 
 import urllib3
 
@@ -24,13 +25,16 @@ from ur_cartesian_driver.protocol.robot_api import (
     RESUME,
 )
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
+from ur_cartesian_driver.robot.services.dashboard_connection import REPORT_TIMEOUTS
 from ur_cartesian_driver.robot.transport import CONNECT_TIMEOUT, error_reason
 
 #: How long the robot may take to answer [s].
 ANSWER_TIMEOUT = 10.0
-#: The same for SLOW_COMMANDS, which the robot answers after their effect [s].
-SLOW_ANSWER_TIMEOUT = 30.0
-SLOW_COMMANDS = frozenset({'power on', 'brake release', 'restart safety'})
+#: The same for commands that the robot answers after a slow effect [s].
+SLOW_ANSWER_TIMEOUTS: Mapping[str, float] = {
+    **dict.fromkeys(('power on', 'brake release', 'restart safety'), 30.0),
+    **REPORT_TIMEOUTS,
+}
 #: Longest answer that is read [bytes].
 MAX_ANSWER_SIZE = 65536
 #: Largest number of redirects: paths have moved between versions, and old paths redirect to new.
@@ -73,7 +77,7 @@ class RobotApiConnection:
             self._exchange,
             api_command,
             encode_body(api_command, argument),
-            SLOW_ANSWER_TIMEOUT if command in SLOW_COMMANDS else ANSWER_TIMEOUT,
+            SLOW_ANSWER_TIMEOUTS.get(command, ANSWER_TIMEOUT),
         )
         reply = parse_answer(request, api_command, status, body)
         if command == 'load' and reply.ok and self._version >= NAMES_LOADED_PROGRAM:

@@ -6,7 +6,7 @@ Carries out the service calls of a driver's owner.
 A call uses the dashboard, a single command to the robot program, the primary interface, or RTDE
 inputs. It succeeds once the robot reports the effect, if the robot can report it. A call ends
 within :data:`CALL_TIMEOUT`, a recovery within :data:`RECOVERY_TIMEOUT`, a script within
-:data:`CALL_TIMEOUT` plus its timeout.
+:data:`CALL_TIMEOUT` plus its timeout, and so does a report (:data:`REPORT_TIMEOUTS`).
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.services import rtde_input_writer
+from ur_cartesian_driver.robot.services.dashboard_connection import REPORT_TIMEOUTS
 from ur_cartesian_driver.robot.services.dashboard_service import (
     DashboardPorts,
     DashboardService,
@@ -82,7 +83,15 @@ QUERY_COMMANDS = frozenset(
 )
 
 #: Dashboard commands that disturb a running goal.
-INTERFERING_COMMANDS = frozenset({'load', 'load installation', 'restart safety'})
+INTERFERING_COMMANDS = frozenset(
+    {
+        'load',
+        'load installation',
+        'restart safety',
+        'set operational mode',
+        'clear operational mode',
+    }
+)
 
 
 class ServiceDispatcher:
@@ -114,6 +123,8 @@ class ServiceDispatcher:
         bound = RECOVERY_TIMEOUT if isinstance(call, RecoverCall) else CALL_TIMEOUT
         if isinstance(call, RunScriptCall):
             bound += call.timeout
+        elif isinstance(call, DashboardCall):
+            bound += REPORT_TIMEOUTS.get(call.command, 0.0)
         try:
             async with asyncio.timeout(bound):
                 return self._refusal(call) or await self._execute(call)

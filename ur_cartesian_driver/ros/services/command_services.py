@@ -40,14 +40,18 @@ from ur_cartesian_driver.robot.services.service_calls import (
 from ur_cartesian_driver.ros.message_fields import pose_from_message
 from ur_cartesian_driver.ros.services.deferred_service import completed_answer, DeferredService
 from ur_cartesian_driver.srv import (
+    GenerateFlightReport,
+    GenerateSupportFile,
     Load,
     Popup,
     RawRequest,
     Recover,
     RunScript,
     SetIO,
+    SetOperationalMode,
     SetSpeedSliderFraction,
     SetTCP,
+    SetUserRole,
 )
 from ur_cartesian_driver.srv import (
     SetPayload as SetPayloadService,
@@ -73,6 +77,10 @@ TRIGGER_SERVICES: Mapping[str, ServiceCall] = {
             'stop': 'stop',
             'get_robot_mode': 'robotmode',
             'get_safety_mode': 'safetymode',
+            'get_safety_status': 'safetystatus',
+            'get_operational_mode': 'get operational mode',
+            'clear_operational_mode': 'clear operational mode',
+            'get_user_role': 'getUserRole',
             'get_loaded_program': 'get loaded program',
             'program_state': 'programState',
             'program_running': 'running',
@@ -134,6 +142,26 @@ REQUEST_SERVICES: Mapping[str, tuple[Any, Callable[[Any], ServiceCall]]] = {
     'dashboard/popup': (
         Popup,
         lambda request: DashboardCall(command='popup', argument=request.message),
+    ),
+    'dashboard/set_operational_mode': (
+        SetOperationalMode,
+        lambda request: DashboardCall(
+            command='set operational mode', argument=request.operational_mode
+        ),
+    ),
+    'dashboard/set_user_role': (
+        SetUserRole,
+        lambda request: DashboardCall(command='setUserRole', argument=request.user_role),
+    ),
+    'dashboard/generate_flight_report': (
+        GenerateFlightReport,
+        lambda request: DashboardCall(
+            command='generate flight report', argument=request.report_type
+        ),
+    ),
+    'dashboard/generate_support_file': (
+        GenerateSupportFile,
+        lambda request: DashboardCall(command='generate support file', argument=request.dir_path),
     ),
     'dashboard/raw_request': (RawRequest, lambda request: DashboardLineCall(line=request.query)),
 }

@@ -218,6 +218,22 @@ def _log(controller: Controller, body: Body) -> Fields:
     return {'message': 'Log entry added'}
 
 
+def _operational_mode(controller: Controller, _: Body) -> Fields:
+    mode = controller.pendant.operational_mode
+    return {'mode': 'AUTOMATIC' if mode == 'NONE' else mode}
+
+
+def _shut_down(controller: Controller, _: Body) -> Fields:
+    """Switch off only the arm: without a controller, nothing could be tested afterwards."""
+    controller.power_off()
+    return {'message': None}
+
+
+def _write_flight_report(controller: Controller, _: Body) -> Fields:
+    """Only answer; no file is written."""
+    return {'message': 'Flight report generated successfully.', 'details': None}
+
+
 def _openapi(controller: Controller, _: Body) -> Fields:
     """Return the version of the API, from which clients conclude which requests exist."""
     version = controller.config.version[:2]
@@ -250,9 +266,11 @@ _ROUTES: Mapping[tuple[str, str], tuple[tuple[int, int], Handler]] = MappingProx
             (10, 12),
             lambda controller, _: {'mode': 'REMOTE' if controller.remote_control else 'LOCAL'},
         ),
-        ('GET', '/system/v1/operationalmode'): ((10, 12), lambda *_: {'mode': 'AUTOMATIC'}),
+        ('GET', '/system/v1/operationalmode'): ((10, 12), _operational_mode),
         ('GET', '/system/v1/information'): ((10, 14), _information),
         ('POST', '/system/v1/log'): ((10, 14), _log),
+        ('PUT', '/system/v1/shutdown'): ((10, 14), _shut_down),
+        ('POST', '/supportfiles/v1'): ((10, 14), _write_flight_report),
         ('GET', '/versions/v1'): ((10, 14), _versions),
         ('POST', '/popup/v1'): ((10, 14), _open_popup),
         ('DELETE', '/popup/v1'): ((10, 14), _close_popup),
@@ -351,7 +369,8 @@ class RobotApiSession(ClientSession):
             self._waiting = answer
             self._waits_until = self._controller.time + _ACTION_TIMEOUT
             return b''
-        return _response(HTTPStatus.OK, answer)
+        accepted = route == '/system/v1/shutdown'
+        return _response(HTTPStatus.ACCEPTED if accepted else HTTPStatus.OK, answer)
 
     def _not_found(self, path: str) -> bytes:
         """Return the answer to an unknown path; a known path with a last slash is redirected."""
