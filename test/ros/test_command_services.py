@@ -16,6 +16,7 @@ from ur_cartesian_driver.motion.state.rtde_state import RobotMode
 from ur_cartesian_driver.ros.services.command_services import REQUEST_SERVICES
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.srv import (
+    DownloadProgram,
     GenerateFlightReport,
     GenerateSupportFile,
     Load,
@@ -29,6 +30,7 @@ from ur_cartesian_driver.srv import (
     SetSpeedSliderFraction,
     SetTCP,
     SetUserRole,
+    UploadProgram,
 )
 
 pytestmark = pytest.mark.slow
@@ -64,6 +66,7 @@ class ServiceClient:
             kind
             for kind in (
                 Trigger,
+                DownloadProgram,
                 GenerateFlightReport,
                 GenerateSupportFile,
                 Load,
@@ -77,6 +80,7 @@ class ServiceClient:
                 SetSpeedSliderFraction,
                 SetTCP,
                 SetUserRole,
+                UploadProgram,
             )
             if isinstance(request, kind.Request)
         )
@@ -148,6 +152,30 @@ def test_modes_roles_and_reports_of_the_pendant(single_cell):
     ):
         assert not answer.success
         assert 'no command' in answer.message
+
+
+def test_programs_of_polyscope_x(no_thread_left, make_cell):
+    config = SimulatorConfig(
+        rtde_port=0,
+        primary_port=0,
+        frequency=125.0,
+        polyscope='10.12',
+        programs={'one.urpx': 'def one():\n  sleep(1)\nend\n'},
+    )
+    with SimulatedRobot(config) as robot:
+        cell = make_cell(robot, robot_api_port=robot.ports.robot_api)
+        cell.wait_ready()
+        call = ServiceClient(cell)
+        assert call('dashboard/get_programs').message == 'one'
+        program = call(
+            'dashboard/download_program', DownloadProgram.Request(program_name='one')
+        ).message
+        two = UploadProgram.Request(program=program.replace('"one"', '"two"'))
+        assert not call('dashboard/update_program', two).success
+        assert call('dashboard/upload_program', two).message == 'two'
+        assert call('dashboard/update_program', two).success
+        assert call('dashboard/get_programs').message == 'one\ntwo'
+        assert not call('dashboard/upload_program', two).success
 
 
 def test_a_service_that_takes_its_time_holds_up_nobody(cell):

@@ -29,12 +29,15 @@ from ur_cartesian_driver.robot.services.dashboard_service import (
     EFFECT_TIMEOUT,
 )
 from ur_cartesian_driver.robot.services.polling import wait_for_state
+from ur_cartesian_driver.robot.services.program_files import ProgramFiles
 from ur_cartesian_driver.robot.services.recovery import RecoveryRunner
 from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,
+    DownloadProgramCall,
     failed,
     HandBackCall,
+    ListProgramsCall,
     RecoverCall,
     RunScriptCall,
     SendProgramCall,
@@ -45,6 +48,7 @@ from ur_cartesian_driver.robot.services.service_calls import (
     SetSpeedSliderCall,
     SetTcpCall,
     succeeded,
+    UploadProgramCall,
     ZeroFtSensorCall,
 )
 
@@ -102,6 +106,7 @@ class ServiceDispatcher:
         self._settings = settings
         self._link = link
         self._dashboard = DashboardService(settings.robot_ip, ports, link)
+        self._program_files = ProgramFiles(settings.robot_ip, ports.robot_api, link)
         self._recovery = RecoveryRunner(
             link, self._dashboard, self._send_program, headless=settings.headless_mode
         )
@@ -142,6 +147,8 @@ class ServiceDispatcher:
                 return await self._dashboard.request(call)
             case DashboardLineCall():
                 return await self._dashboard.request_raw(call)
+            case ListProgramsCall() | UploadProgramCall() | DownloadProgramCall():
+                return await self._program_files.carry_out(call)
             case SetTcpCall() | SetPayloadCall():
                 return await self._set(call)
             case ZeroFtSensorCall():
@@ -169,7 +176,9 @@ class ServiceDispatcher:
     def _refusal(self, call: ServiceCall) -> ServiceAnswer | None:
         """Return the refusal of a call that is not allowed now; None = it is allowed."""
         status = self._link.status
-        if isinstance(call, DashboardCall) and call.command in QUERY_COMMANDS:
+        if isinstance(call, ListProgramsCall | DownloadProgramCall) or (
+            isinstance(call, DashboardCall) and call.command in QUERY_COMMANDS
+        ):
             return None
         if status.state is ConnectionState.REFUSED:
             return failed(status.message)

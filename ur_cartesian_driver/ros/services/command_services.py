@@ -24,7 +24,9 @@ from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,
+    DownloadProgramCall,
     HandBackCall,
+    ListProgramsCall,
     RecoverCall,
     RunScriptCall,
     SCRIPT_TIMEOUT,
@@ -35,11 +37,13 @@ from ur_cartesian_driver.robot.services.service_calls import (
     SetPayloadCall,
     SetSpeedSliderCall,
     SetTcpCall,
+    UploadProgramCall,
     ZeroFtSensorCall,
 )
 from ur_cartesian_driver.ros.message_fields import pose_from_message
 from ur_cartesian_driver.ros.services.deferred_service import completed_answer, DeferredService
 from ur_cartesian_driver.srv import (
+    DownloadProgram,
     GenerateFlightReport,
     GenerateSupportFile,
     Load,
@@ -52,6 +56,7 @@ from ur_cartesian_driver.srv import (
     SetSpeedSliderFraction,
     SetTCP,
     SetUserRole,
+    UploadProgram,
 )
 from ur_cartesian_driver.srv import (
     SetPayload as SetPayloadService,
@@ -62,6 +67,7 @@ TRIGGER_SERVICES: Mapping[str, ServiceCall] = {
     'resend_robot_program': SendProgramCall(),
     'hand_back_control': HandBackCall(),
     'zero_ftsensor': ZeroFtSensorCall(),
+    'dashboard/get_programs': ListProgramsCall(),
     **{
         f'dashboard/{name}': DashboardCall(command=command)
         for name, command in {
@@ -162,6 +168,18 @@ REQUEST_SERVICES: Mapping[str, tuple[Any, Callable[[Any], ServiceCall]]] = {
     'dashboard/generate_support_file': (
         GenerateSupportFile,
         lambda request: DashboardCall(command='generate support file', argument=request.dir_path),
+    ),
+    'dashboard/upload_program': (
+        UploadProgram,
+        lambda request: UploadProgramCall(program=request.program),
+    ),
+    'dashboard/update_program': (
+        UploadProgram,
+        lambda request: UploadProgramCall(program=request.program, replaces=True),
+    ),
+    'dashboard/download_program': (
+        DownloadProgram,
+        lambda request: DownloadProgramCall(program_name=request.program_name),
     ),
     'dashboard/raw_request': (RawRequest, lambda request: DashboardLineCall(line=request.query)),
 }
