@@ -57,6 +57,7 @@ EXTRAS = {
         'ezdxf>=1.3,<2',
         'hypothesis>=6.100,<7',
         'pytest>=8.2,<10',
+        'pytest-rerunfailures>=14,<17',
         'pytest-timeout>=2.3,<3',
         'pytest-xdist>=3.6,<4',
         'scipy>=1.13,<2',

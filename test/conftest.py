@@ -72,6 +72,11 @@ def pytest_configure(config):
 
         if is_for_computing(config.workerinput['workerid']):
             os.nice(LOW_PRIORITY)
+    plugins = config.pluginmanager
+    if all(map(plugins.hasplugin, ('rerunfailures', 'xdist'))) and not config.option.usepdb:
+        from standstill import Standstill
+
+        plugins.register(Standstill())
 
 
 def pytest_ignore_collect(collection_path, config):

@@ -36,6 +36,7 @@ ARM, OPTIONS = Arm(robot_model('ur5e')), PlanningOptions(max_tool_speed=1.0)
 MODES = (ExecutionMode.PRIMITIVES, ExecutionMode.SPLINE, ExecutionMode.SERVO)
 #: The torch, and the input that says that its arc burns.
 TORCH, ARC = 1, 3
+INERTIA = (0.01, 0.02, 0.03, -0.001, 0.002, 0.003)
 DIGITAL = InputWait(waypoint=0, input=InputKind.STANDARD_DIGITAL, pin=ARC, value=1.0, timeout=1.0)
 
 
@@ -182,7 +183,13 @@ def test_a_pause_does_not_count_as_waiting(execution):
 @pytest.mark.parametrize('execution', MODES, ids=lambda mode: mode.name)
 def test_the_payload_changes_where_the_arm_stands(execution):
     async def scenario(cell):
-        payload = PayloadChange(waypoint=0, mass=1.25, center_of_gravity=(0.0, 0.01, 0.06))
+        payload = PayloadChange(
+            waypoint=0,
+            mass=1.25,
+            center_of_gravity=(0.0, 0.01, 0.06),
+            inertia=INERTIA,
+            transition_time=0.1,
+        )
         before = cell.robot.controller.payload.mass
         motion, is_at = start(cell, execution, payload_changes=(payload,))
         await cell.until(lambda: torch(cell))
@@ -193,5 +200,6 @@ def test_the_payload_changes_where_the_arm_stands(execution):
         await cell.until(lambda: motion.outcome, 3.0)
         assert motion.outcome.succeeded, motion.outcome.text
         assert cell.robot.controller.payload.cog == pytest.approx((0.0, 0.01, 0.06))
+        assert cell.robot.controller.payload.inertia == pytest.approx(INERTIA)
 
     run_cell(scenario)

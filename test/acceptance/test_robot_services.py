@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Service calls of a robot: done, refused with a sentence, or explained."""
 
+import json
 import os
 import signal
 import socket
@@ -53,6 +54,14 @@ def test_settings_are_done_when_the_robot_reports_them(driver, ur_sim):
     assert ur_sim.state().T_flange_tcp.angle_to(NOZZLE) < 1e-5
     assert driver.set_payload(1.5, (0.0, 0.0, 0.05)).ok
     assert ur_sim.call(lambda c: c.payload.mass) == 1.5
+    inertia = (0.01, 0.02, 0.03, -0.001, 0.002, 0.003)
+    assert driver.set_payload(2.5, (0.01, 0.0, 0.05), inertia=inertia, transition_time=0.2).ok
+    payload = ur_sim.call(lambda c: c.payload)
+    assert (payload.mass, *payload.cog) == (2.5, 0.01, 0.0, 0.05)
+    assert payload.inertia == pytest.approx(inertia)
+    wait_for(lambda: driver.signals.payload_inertia == pytest.approx(inertia))
+    assert driver.set_gravity((6.94, 0.0, 6.94)).ok
+    assert ur_sim.call(lambda c: c.gravity) == pytest.approx((6.94, 0.0, 6.94))
     assert driver.set_speed_slider(0.37).ok
     assert ur_sim.state().speed_slider == pytest.approx(0.37)
     assert driver.zero_ftsensor().ok
@@ -101,7 +110,9 @@ def test_settings_wait_for_the_end_of_a_goal(driver, home):
     for answer in (
         driver.set_tcp(NOZZLE),
         driver.set_payload(1.0),
+        driver.set_gravity((0.0, 0.0, 9.82)),
         driver.dashboard('load installation', 'default.installation'),
+        driver.dashboard('set operational mode', 'MANUAL'),
     ):
         assert not answer.ok
         assert answer.text.startswith('A goal is running')
@@ -303,6 +314,25 @@ def test_the_robot_api_loads_plays_pauses_and_stops(make_driver, ur_sim):
     assert driver.dashboard('running').text == 'false'
 
 
+@pytest.mark.ur_sim(
+    frequency=125.0, polyscope='10.12.0', programs={'one.urpx': 'def one():\n  sleep(9)\nend\n'}
+)
+def test_a_program_of_polyscope_x_is_downloaded_changed_uploaded_and_played(make_driver, ur_sim):
+    driver = make_driver(headless_mode=False)
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    program = json.loads(driver.download_program('one').text)
+    program['program']['programInformation']['name'] = 'two'
+    assert driver.upload_program(json.dumps(program)).text == 'two'
+    assert driver.list_programs().text.splitlines() == ['one', 'two']
+    refused = driver.upload_program(json.dumps(program))
+    assert 'HTTP 400' in refused.text
+    assert driver.upload_program(json.dumps(program), replaces=True).ok
+    assert driver.dashboard('load', 'two').ok
+    assert driver.dashboard('play').ok
+    assert ur_sim.state().program == 'two.urpx'
+    assert driver.dashboard('get operational mode').text == 'AUTOMATIC'
+
+
 @pytest.mark.ur_sim(frequency=125.0, polyscope='10.8.0', unlock_delay=0.0)
 def test_polyscope_x_before_its_robot_api_refuses_and_the_rest_works(make_driver, ur_sim):
     driver = make_driver()
@@ -337,6 +367,7 @@ def test_every_call_to_a_robot_that_is_not_there_is_answered(make_driver, closed
     for answer in (
         driver.dashboard('power on'),
         driver.dashboard_line('running'),
+        driver.list_programs(),
         driver.set_tcp(NOZZLE),
         driver.set_payload(1.0),
         driver.zero_ftsensor(),

@@ -23,7 +23,10 @@ from ur_cartesian_driver.importing import (
 )
 from ur_cartesian_driver.importing.messages.message_terms import TERMS
 from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 
 HEADER = 'header:\n  stamp:\n    sec: 3\n    nanosec: 0\n  frame_id: map\n'
@@ -286,6 +289,33 @@ def test_a_joint_trajectory(tmp_path):
         assert found.goal.waypoints.postures[i].values == pytest.approx(q)
     assert found.goal.segments.types.tolist() == [SegmentType.JOINT] * 2
     assert found.goal.waypoints.times.tolist() == [1.0, 2.0]
+
+
+def straight_line_of_joints(count=40, length=0.2):
+    """Return a trajectory that echo prints, of a line along y, and the line's ends."""
+    arm = Arm(robot_model('ur5e'))
+    begin, q, points = arm.forward(HOME), vector6(HOME), []
+    for i in range(count + 1):
+        y = begin.position[1] + length * i / count
+        end = Pose((begin.position[0], y, begin.position[2]), begin.quaternion)
+        q = nearest(arm, end, q)
+        ramp = 2.0 * (i / count) ** 0.5  # times as of a motion that speeds up
+        time = {'sec': int(1.0 + ramp), 'nanosec': round(1e9 * (ramp % 1.0))}
+        points.append({'positions': list(q), 'time_from_start': time})
+    text = yaml.safe_dump({'joint_names': list(JOINT_NAMES), 'points': points})
+    return text, begin, end
+
+
+def test_a_straight_line_of_joints_becomes_a_line_of_the_tool(tmp_path):
+    text, begin, end = straight_line_of_joints()
+    found = imported(tmp_path, text, lines=True, simplify=1e-4, speed=0.1)
+    assert poses(found) == pytest.approx(np.array([begin.row(), end.row()]), abs=1e-6)
+    assert found.goal.segments.types.tolist() == [SegmentType.JOINT, SegmentType.LINEAR]
+    assert found.goal.segments.velocities.tolist() == [0.0, 0.1]
+    assert list(found.goal.waypoints.postures) == [0]
+    kept = imported(tmp_path, text, lines=True)
+    assert kept.goal.segments.types.tolist() == [SegmentType.JOINT] + [SegmentType.LINEAR] * 40
+    assert kept.goal.waypoints.times[[0, -1]].tolist() == [1.0, 3.0]
 
 
 def test_a_message_of_rclpy():

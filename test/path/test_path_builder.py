@@ -549,7 +549,7 @@ def test_what_happens_at_points_is_that_of_a_goal():
         goal.proportional_outputs,
     )
     assert (wait.waypoint, wait.pin, wait.value, wait.timeout) == (0, 3, 1.0, 2.0)
-    assert (payload.waypoint, payload.mass) == (0, 1.5)
+    assert (payload.waypoint, payload.mass, payload.inertia) == (0, 1.5, ())
     assert goal.script_calls == (
         ScriptCall(waypoint=0, function='grip', arguments=(1.0,)),
         ScriptCall(waypoint=0, function='hold', timeout=1.0),

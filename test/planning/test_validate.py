@@ -786,6 +786,21 @@ REFUSALS = [
         InvalidGoal,
         'payload_changes[0].center_of_gravity contains a number beyond 5 m; give it in metres',
     ),
+    *(
+        (
+            with_fields(
+                PLAIN, payload_changes=(PayloadChange(waypoint=1, mass=1.0, inertia=inertia),)
+            ),
+            InvalidGoal,
+            f'payload_changes[0].inertia has {problem}; give it about the centre of gravity',
+        )
+        for inertia, problem in (
+            ((0.1, 0.1, 0.1), '3 numbers, not 6 (xx, yy, zz, xy, xz, yz)'),
+            ((0.1, -0.1, 0.1, 0.0, 0.0, 0.0), 'yy = -0.1 kg m^2, outside 0 to 133'),
+            ((0.1, 0.1, 0.1, 0.0, -134.0, 0.0), 'xz = -134 kg m^2, outside -133 to 133'),
+            ((0.1, 0.1, 0.1, 0.0, 0.0, float('nan')), 'yz = nan kg m^2, outside -133 to 133'),
+        )
+    ),
     (
         replace(with_segment(PLAIN, 1, dwell=0.5), keep_open=True),
         NotAvailable,

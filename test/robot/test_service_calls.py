@@ -42,11 +42,25 @@ def test_a_tcp_can_be_sent_or_is_refused(position, quaternion):
         script_command.encode(script_command.SetTcpOffsetCommand(offset=pose.rotation_vector()))
 
 
-@given(any_number | st.floats(0.0, 100.0), three)
-def test_a_payload_can_be_sent_or_is_refused(mass, cog):
-    call = made(service_calls.SetPayloadCall, mass=mass, cog=cog)
+@given(
+    any_number | st.floats(0.0, 100.0),
+    three,
+    st.lists(any_number | st.floats(0.0, 133.0), max_size=7),
+    any_number | st.floats(0.0, 30.0),
+)
+def test_a_payload_can_be_sent_or_is_refused(mass, cog, inertia, time):
+    values = {'mass': mass, 'cog': cog, 'inertia': tuple(inertia), 'transition_time': time}
+    call = made(service_calls.SetPayloadCall, **values)
     if call is not None:
-        script_command.encode(script_command.SetPayloadCommand(mass=call.mass, cog=call.cog))
+        values['inertia'] = call.inertia or (0.0,) * 6
+        script_command.encode(script_command.SetTargetPayloadCommand(**values))
+
+
+@given(three)
+def test_a_gravity_can_be_sent_or_is_refused(gravity):
+    call = made(service_calls.SetGravityCall, gravity=gravity)
+    if call is not None:
+        script_command.encode(script_command.SetGravityCommand(gravity=call.gravity))
 
 
 @given(

@@ -214,6 +214,25 @@ def test_a_second_driver_of_the_same_name_is_told(no_thread_left, capfd):
         rclpy.shutdown(context=context)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize('joint', ['finger_joint', 'left_elbow_joint'])
+def test_another_publisher_of_the_same_joints_is_told(
+    no_thread_left, parameters_for, capfd, joint
+):
+    with ExitStack() as stack:
+        cell = Cell(stack, parameters_for, ('left',), ('ur5e',))
+        states = cell.client.create_publisher(JointState, '/left/joint_states', 10)
+        cell.wait_ready()
+        deadline = monotonic() + (5.0 if joint == 'finger_joint' else 20.0)
+        said = ''
+        while 'publishes joint_states' not in said and monotonic() < deadline:
+            states.publish(JointState(name=[joint], position=[0.0]))
+            cell.executor.spin_once(timeout_sec=0.05)
+            said += capfd.readouterr().err
+    told = '/client publishes joint_states with left_elbow_joint, too' in said
+    assert told == (joint == 'left_elbow_joint'), said
+
+
 def test_a_goal_file_is_used_for_an_arm_with_a_prefix():
     text = (
         '{trajectory: {header: {frame_id: base}, controlled_frame: tool0, points: [{posture: '

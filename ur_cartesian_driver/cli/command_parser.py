@@ -436,6 +436,11 @@ def _add_shape(command: CommandParser) -> None:
             metavar='LENGTH',
             help=text,
         )
+    command.add_argument(
+        '--lines',
+        action='store_true',
+        help='straight lines of the tool between the points of a joint trajectory',
+    )
 
 
 def _add_teach(command: CommandParser) -> None:

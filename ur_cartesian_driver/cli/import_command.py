@@ -67,6 +67,7 @@ def options_of(arguments: argparse.Namespace) -> ImportOptions:
         simplify=arguments.simplify,
         tolerance=max(arguments.tolerance, 1e-6),
         lift=arguments.lift,
+        lines=arguments.lines,
         outputs=dict(arguments.output_of),
         arm=Arm(model, calibration(arguments, model)),
         T_flange_tcp=_pose(arguments.tcp),

@@ -413,6 +413,7 @@ class Driver(RobotServices, InteractiveMotions):
             calibration_known=status.calibration_known,
             optimove_known=has_feature('optimove', status.software()),
             path_offset_known=has_feature('path_offset', status.software()),
+            target_payload_known=has_feature('target_payload', status.software()),
             acceleration_known=state.actual_tcp_acceleration is not None
             and state.target_tcp_acceleration is not None,
         )

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from concurrent.futures import Future
 
 from ur_cartesian_driver.motion.geometry.pose import Pose
@@ -14,16 +15,20 @@ from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,
+    DownloadProgramCall,
     HandBackCall,
+    ListProgramsCall,
     RecoverCall,
     RunScriptCall,
     SCRIPT_TIMEOUT,
     ServiceAnswer,
     ServiceCall,
+    SetGravityCall,
     SetOutputCall,
     SetPayloadCall,
     SetSpeedSliderCall,
     SetTcpCall,
+    UploadProgramCall,
     ZeroFtSensorCall,
 )
 
@@ -48,13 +53,50 @@ class RobotServices(ABC):
         """Send any line to the dashboard, and return its answer."""
         return self.call(DashboardLineCall(line=line)).result()
 
+    def list_programs(self) -> ServiceAnswer:
+        """Return the names of the robot's programs, one on each line; PolyScope X only."""
+        return self.call(ListProgramsCall()).result()
+
+    def upload_program(self, program: str, *, replaces: bool = False) -> ServiceAnswer:
+        """
+        Send a program to the robot, and return its name there; PolyScope X only.
+
+        :param program: the content of a ``.urpx`` file, which also names the program.
+        :param replaces: the program takes the place of one that the robot has.
+        """
+        return self.call(UploadProgramCall(program=program, replaces=replaces)).result()
+
+    def download_program(self, program_name: str) -> ServiceAnswer:
+        """Return a program of the robot, the content of a ``.urpx`` file; PolyScope X only."""
+        return self.call(DownloadProgramCall(program_name=program_name)).result()
+
     def set_tcp(self, T_flange_tcp: Pose) -> ServiceAnswer:
         """Set the active TCP."""
         return self.call(SetTcpCall(T_flange_tcp=T_flange_tcp)).result()
 
-    def set_payload(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> ServiceAnswer:
-        """Set mass [kg] and centre of gravity [m] (in the flange frame) of the load."""
-        return self.call(SetPayloadCall(mass=mass, cog=cog)).result()
+    def set_payload(
+        self,
+        mass: float,
+        cog: Vector3 = (0.0, 0.0, 0.0),
+        *,
+        inertia: Sequence[float] = (),
+        transition_time: float = 0.0,
+    ) -> ServiceAnswer:
+        """
+        Set mass [kg] and centre of gravity [m] (in the flange frame) of the load.
+
+        :param inertia: xx, yy, zz, xy, xz, yz about that point, along the axes of the flange
+            [kg m^2]; empty = a point mass.
+        :param transition_time: how long the controller takes to go over to this load [s].
+        """
+        call = SetPayloadCall(
+            mass=mass, cog=cog, inertia=tuple(inertia), transition_time=transition_time
+        )
+        return self.call(call).result()
+
+    def set_gravity(self, gravity: Vector3) -> ServiceAnswer:
+        """Set the acceleration that opposes gravity, in base axes [m/s^2]."""
+        return self.call(SetGravityCall(gravity=gravity)).result()
 
     def zero_ftsensor(self) -> ServiceAnswer:
         """Zero the force-torque sensor at the force and torque that it measures now."""

@@ -145,6 +145,9 @@ class ImportOptions:
     lift: float = 0.0
     #: Outputs by the code that switches them: S, or an M-code with its values.
     outputs: Mapping[str, CodeOutput] = field(default_factory=dict)
+    #: Whether the tool goes in straight lines between the points of a joint trajectory; if not,
+    #: the joints go from point to point.
+    lines: bool = False
     #: The arm for which a file's joint positions are meant.
     arm: Arm = field(default_factory=lambda: Arm(robot_model('ur5e')))
     #: The active TCP for which a file's joint positions are meant.

@@ -266,17 +266,33 @@ class PathWithEvents(PathOfMotions):
             )
         return path
 
-    def payload(self, mass: float, center_of_gravity: Sequence[float] = (0.0, 0.0, 0.0)) -> Self:
+    def payload(
+        self,
+        mass: float,
+        center_of_gravity: Sequence[float] = (0.0, 0.0, 0.0),
+        *,
+        inertia: Sequence[float] = (),
+        transition: float = 0.0,
+    ) -> Self:
         """
         Set the payload at the last point, where the arm stops.
 
         :param mass: mass of the payload [kg].
         :param center_of_gravity: its position in the flange frame [m].
+        :param inertia: xx, yy, zz, xy, xz, yz about that point, along the axes of the flange
+            [kg m^2]; empty = a point mass.
+        :param transition: how long the controller takes to go over to this payload [s].
         :raises InvalidGoal: as for :meth:`dwell`, or a number is out of its range.
         """
         where, point = self._stop('payload')
         cog = vector(where, center_of_gravity, MAX_OFFSET)
-        change = PayloadChange(waypoint=0, mass=float(mass), center_of_gravity=cog)
+        change = PayloadChange(
+            waypoint=0,
+            mass=float(mass),
+            center_of_gravity=cog,
+            inertia=tuple(float(each) for each in inertia),
+            transition_time=float(transition),
+        )
         return self._happening(where, point, change)
 
     # ---- inside --------------------------------------------------------------------------------

@@ -110,6 +110,8 @@ class PlanningOptions:
     optimove_known: Detected[bool] = True
     #: Whether the robot's software has path offsets of its own (PolyScope 5 from 5.6 on).
     path_offset_known: Detected[bool] = True
+    #: Whether the robot's software has payloads with inertia (PolyScope 5.10, PolyScope X).
+    target_payload_known: Detected[bool] = True
     #: Whether the robot reports TCP accelerations; if not, tolerances on them are refused.
     acceleration_known: Detected[bool] = True
     #: The wire dialect of the robot program.

@@ -15,11 +15,11 @@ Lines of the program that start with ``#!`` are instructions for this module:
     insert the script prelude unchanged.
 ``#! calls``
     insert the code that calls the functions of the prelude by their numbers.
-``#! if FEATURE`` ... ``#! end``
-    keep these lines only if the controller's software has the feature, because a controller
-    refuses a program that names an unknown function. Two features do not depend on the software:
-    lines for ``freedrive`` are kept if the settings allow freedrive, and lines for ``prelude`` if
-    the prelude defines functions.
+``#! if FEATURE`` ... ``#! end``, ``#! if not FEATURE`` ... ``#! end``
+    keep these lines only if the controller's software has the feature, or has not, because a
+    controller refuses a program that names an unknown function. Two features do not depend on
+    the software: lines for ``freedrive`` are kept if the settings allow freedrive, and lines for
+    ``prelude`` if the prelude defines functions.
 
 The program is sent without empty lines, and without comments except the markers of the External
 Control node. Programs on the pendant share a name space with the robot program, so each variable,
@@ -44,6 +44,7 @@ from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.framing import FIXED_POINT
 from ur_cartesian_driver.protocol.program import point_fields, registers, reverse, script_command
 from ur_cartesian_driver.protocol.program import trajectory_points as trajectory
+from ur_cartesian_driver.protocol.rtde.rtde_client import LOWER_REGISTERS
 
 PROGRAM_NAME = 'ur_cartesian_driver'
 
@@ -203,6 +204,8 @@ class ProgramSettings:
     servo_buffer_depth: int = 250
     #: Whether the buffered servo may switch to freedrive.
     allow_freedrive: bool = False
+    #: Whether the program uses the int and double registers from 0 on, not those from 24 on.
+    lower_registers: bool = False
     #: The user's functions that the program contains.
     prelude: Prelude = NO_PRELUDE
 
@@ -289,6 +292,8 @@ def _lines(name: str, settings: ProgramSettings) -> Iterator[str]:
                 keep = settings.allow_freedrive
             case ['#!', 'if', feature] if feature in FEATURES:
                 keep = has_feature(feature, settings.version)
+            case ['#!', 'if', 'not', feature] if feature in FEATURES:
+                keep = not has_feature(feature, settings.version)
             case ['#!', 'end']:
                 keep = True
             case ['#!', *rest]:
@@ -315,17 +320,36 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'COMMAND_FIELDS = {script_command.COMMAND_WORDS}'
     yield f'STREAM_LENGTH = {2**31 - 1}'
     yield f'TCP_RESOLUTION = {2.0 / FIXED_POINT:.6f}'
-    yield f'REGISTER_POINTS_BEGUN = {int(registers.POINTS_BEGUN)}'
-    yield f'REGISTER_SAFE_OUTPUTS_TOKEN = {int(registers.OutputInteger.SAFE_OUTPUTS_TOKEN)}'
-    yield f'REGISTER_PROGRAM_VERSION = {int(registers.OutputInteger.PROGRAM_VERSION)}'
-    yield f'REGISTER_PROGRAM_NUMBER = {int(registers.OutputInteger.PROGRAM_NUMBER)}'
-    yield f'REGISTER_PROGRAM_RUN = {int(registers.OutputInteger.PROGRAM_RUN)}'
+    yield from _register_constants(settings)
     yield f'PROGRAM_VERSION = {registers.PROGRAM_VERSION}'
     yield f'PROGRAM_NUMBER = {settings.number}'
     yield from _servo_constants(settings)
     yield from _message_constants()
     yield from _output_constants()
     yield from _event_constants()
+
+
+def _register_constants(settings: ProgramSettings) -> Iterator[str]:
+    """Yield the numbers of the RTDE registers that the program reads and writes."""
+    shift = -LOWER_REGISTERS if settings.lower_registers else 0
+    output = registers.OutputInteger
+    for register in (
+        output.POINTS_BEGUN,
+        output.SAFE_OUTPUTS_TOKEN,
+        output.PROGRAM_VERSION,
+        output.PROGRAM_NUMBER,
+        output.PROGRAM_RUN,
+    ):
+        yield f'REGISTER_{register.name} = {register + shift}'
+    for prefix, members in (
+        ('SERVO_IN', registers.InputInteger),
+        ('SERVO_IN', registers.InputDouble),
+        ('SERVO_OUT', registers.OutputInteger),
+        ('SERVO_OUT', registers.OutputDouble),
+        ('OFFSET_IN', registers.OffsetInput),
+        ('OFFSET_OUT', registers.OffsetOutput),
+    ):
+        yield from _enum(prefix, members, offset=shift)
 
 
 def _message_constants() -> Iterator[str]:
@@ -370,8 +394,6 @@ def _event_constants() -> Iterator[str]:
         yield f'PRESS_{name} = {value}'
     for name, value in OFFSET_CONSTANTS.items():
         yield f'OFFSET_{name} = {value:.10g}'
-    yield from _enum('OFFSET_IN', registers.OffsetInput)
-    yield from _enum('OFFSET_OUT', registers.OffsetOutput)
     yield f'TRAJECTORY_TAKES_OFFSETS = {int(reverse.TAKES_OFFSETS)}'
     yield from _enum('FOLLOW', point_fields.FollowKind)
     # Floats, because a matrix of floats is made from them: a row for each analog output.
@@ -402,10 +424,6 @@ def _servo_constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'SERVO_END_TOLERANCE = {SERVO_END_TOLERANCE}'
     yield f'SERVO_REST_SPEED = {SERVO_REST_SPEED}'
     yield f'SERVO_SETTLED = {SERVO_SETTLED:.10f}'
-    yield from _enum('SERVO_IN', registers.InputInteger)
-    yield from _enum('SERVO_IN', registers.InputDouble)
-    yield from _enum('SERVO_OUT', registers.OutputInteger)
-    yield from _enum('SERVO_OUT', registers.OutputDouble)
     yield from _enum('SERVO_MODE', registers.ServoMode)
     yield from _enum('SERVO_SYNC', registers.SyncState)
     yield from _enum('SERVO_ERROR', registers.ExternalError)

@@ -34,6 +34,7 @@ from ur_cartesian_driver.ros.parameters.node_parameters import as_overrides, dec
 from ur_cartesian_driver.ros.parameters.parameter_table import ParameterError, ParameterValue
 from ur_cartesian_driver.ros.services.append_service import AppendService
 from ur_cartesian_driver.ros.services.command_services import CommandServices
+from ur_cartesian_driver.ros.state.joint_states_check import JointStatesCheck
 from ur_cartesian_driver.ros.state.state_publisher import StatePublisher
 
 #: Longest period of the heartbeat, which reports that the node's executor is alive [s].
@@ -94,6 +95,7 @@ class CartesianDriverNode(Node):
 
     def _start(self) -> None:
         settings = declare_parameters(self)
+        self._joint_names = settings.joint_names
         logger = self.get_logger()  # type: ignore[no-untyped-call]  # rclpy's
         self._components.append(_LogBridge(logger))
         self.driver = Driver(settings.driver, settings.planning, auto_heartbeat=False)
@@ -125,9 +127,9 @@ class CartesianDriverNode(Node):
             callback_group=MutuallyExclusiveCallbackGroup(),
             clock=Clock(clock_type=ClockType.STEADY_TIME),
         )
-        self._name_check_timer = self.create_timer(
+        self._neighbour_timer = self.create_timer(
             DISCOVERY_TIME,
-            self._warn_if_name_is_taken,
+            self._warn_of_neighbours,
             clock=Clock(clock_type=ClockType.STEADY_TIME),
         )
 
@@ -135,9 +137,17 @@ class CartesianDriverNode(Node):
         """Return whether no goal or session depends on the present TCP and payload."""
         return self.action_server.idle and not self.action_server.arbiter.holder
 
-    def _warn_if_name_is_taken(self) -> None:
-        """Log once if another node has the same name: either could get the other's goals."""
-        self._name_check_timer.cancel()
+    def _warn_of_neighbours(self) -> None:
+        """
+        Log once if another node has the name of this one, or publishes states of its joints.
+
+        Two nodes of one name could get each other's goals.
+        """
+        self._neighbour_timer.cancel()
+        if self.count_publishers('joint_states') > 1:
+            self._joint_states_check = JointStatesCheck(
+                self, self._joint_names, self._publisher.has_published
+            )
         own_name = self.get_name(), self.get_namespace()
         if self.get_node_names_and_namespaces().count(own_name) > 1:
             self.get_logger().error(  # type: ignore[no-untyped-call]  # rclpy's

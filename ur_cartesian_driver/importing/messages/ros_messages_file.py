@@ -346,12 +346,13 @@ def _collect_joints(message: Any, options: ImportOptions, into: PathCollector) -
     if not timed and any(times):
         into.remarks.add(0, 'time_from_start', 'it does not rise from point to point')
     for line, q, pose, time in zip(lines, rows, poses.tolist(), times, strict=True):
+        as_line = options.lines and len(into) > 0
         into.add(
             line,
             pose[:3],
-            SegmentType.JOINT,
+            SegmentType.LINEAR if as_line else SegmentType.JOINT,
             quaternion=pose[3:],
-            posture=Posture(names=JOINT_NAMES, values=tuple(q)),
+            posture=None if as_line else Posture(names=JOINT_NAMES, values=tuple(q)),
             time=time if timed else None,
         )
 

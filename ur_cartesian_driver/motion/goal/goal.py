@@ -45,6 +45,7 @@ from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3, ZERO6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.field_table import ColumnOf, Form, Mark, Range, Sent
+from ur_cartesian_driver.motion.goal.inertia import MAX_TRANSITION_TIME
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 
@@ -343,6 +344,11 @@ class PayloadChange:
     mass: Annotated[float, Range(0.0, 100.0, 'kg')]
     #: In the flange frame [m].
     center_of_gravity: Annotated[Vector3, ALWAYS] = ZERO3
+    #: About the centre of gravity, along the axes of the flange [kg m^2]: xx, yy, zz, xy, xz, yz;
+    #: empty = a point mass.
+    inertia: tuple[float, ...] = ()
+    #: How long the controller takes to go over to this payload [s].
+    transition_time: Annotated[float, Range(0.0, MAX_TRANSITION_TIME, 's')] = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -212,10 +212,19 @@ class AwaitInput:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChangePayload:
-    """The robot program sets the payload: mass [kg], and centre of gravity in the flange [m]."""
+    """
+    The robot program sets the payload.
+
+    :param mass: [kg].
+    :param center_of_gravity: in the flange [m].
+    :param inertia: about that point, along the axes of the flange [kg m^2].
+    :param transition_time: how long the controller takes to go over to it [s].
+    """
 
     mass: float
     center_of_gravity: Vector3
+    inertia: Vector6 = ZERO6
+    transition_time: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from math import nan
 
-from ur_cartesian_driver.motion.geometry.vectors import Vector3
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6
 
 
 class AnalogDomain(IntEnum):
@@ -62,3 +62,8 @@ class Signals:
     payload: float = nan
     #: Centre of gravity of the payload in the flange [m]; NaN = not reported.
     payload_cog: Vector3 = (nan, nan, nan)
+    #: Inertia of the payload about that point, along the axes of the flange [kg m^2]: xx, yy, zz,
+    #: xy, xz, yz; NaN = not reported.
+    payload_inertia: Vector6 = (nan,) * 6
+    #: Acceleration that opposes gravity, in base axes [m/s^2]; NaN = not reported.
+    gravity: Vector3 = (nan, nan, nan)

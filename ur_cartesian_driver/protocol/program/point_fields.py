@@ -52,6 +52,7 @@ Words that the table does not list are zeros:
 14, 15   AWAIT_INPUT: threshold [A, V, or 0 to 1]; 1 = wait until below it      S
 16       AWAIT_INPUT: after the time-out, 1 = go on, 0 = end                    S
 0 - 3    CHANGE_PAYLOAD: mass [kg], centre of gravity x y z in the flange [m]   S
+6 - 11   CHANGE_PAYLOAD: inertia xx yy zz xy xz yz [kg m^2]                     S
 0 - 5    CALL_FUNCTION: arguments                                               S
 12       CALL_FUNCTION: number of the function                                  S
 0 - 5    PRESS_LAW: wrench [N, Nm]; BEGIN_PRESS: task frame in the base         S
@@ -60,7 +61,8 @@ Words that the table does not list are zeros:
 12, 13   PRESS_LAW: damping, gain scaling                                       S
 14, 15   PRESS_LAW: 1 = zero the force sensor; what contact ends                S
 12       BEGIN_PRESS: 1 = the task frame follows the tool                       S
-18       WAIT: the time; AWAIT_INPUT: longest wait [s]                          T
+18       WAIT: the time; AWAIT_INPUT: longest wait; CHANGE_PAYLOAD: transition  T
+         [s]
 20       motion type                                                            1
 =======  =====================================================================  =====
 """
@@ -403,7 +405,8 @@ def _stop_fields(stop: Stop) -> PointFields:
             wanted = (stop.input, stop.pin, stop.threshold, stop.below, stop.go_on, 0)
             return (*ZERO6, *ZERO6, *wanted, stop.timeout, 0, kind)
         case ChangePayload():
-            return (stop.mass, *stop.center_of_gravity, *(0.0,) * 14, 0, 0, kind)
+            payload = (stop.mass, *stop.center_of_gravity, 0.0, 0.0, *stop.inertia)
+            return (*payload, *ZERO6, stop.transition_time, 0, kind)
         case CallFunction():
             return (*stop.arguments, *ZERO6, stop.number, *(0.0,) * 7, kind)
         case PressLaw():
@@ -429,7 +432,12 @@ def _stop(fields: Sequence[float], kind: MotionType) -> Stop:
             go_on=bool(fields[16]),
         )
     if kind is MotionType.CHANGE_PAYLOAD:
-        return ChangePayload(mass=fields[0], center_of_gravity=(fields[1], fields[2], fields[3]))
+        return ChangePayload(
+            mass=fields[0],
+            center_of_gravity=(fields[1], fields[2], fields[3]),
+            inertia=vector6(fields[6:12]),
+            transition_time=fields[18],
+        )
     if kind is MotionType.CALL_FUNCTION:
         return CallFunction(number=int(fields[12]), arguments=vector6(fields[:6]))
     if kind is MotionType.PRESS_LAW:

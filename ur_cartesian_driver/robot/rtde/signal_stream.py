@@ -42,6 +42,8 @@ OPTIONAL_FIELDS = (
     'tool_temperature',
     'payload',
     'payload_cog',
+    'payload_inertia',
+    'target_gravity',
 )
 
 
@@ -118,4 +120,6 @@ def signals_from_rtde(values: Mapping[str, Any]) -> Signals:
         tool_mode=values.get('tool_mode', 0),
         payload=values.get('payload', nan),
         payload_cog=values.get('payload_cog', (nan,) * 3),
+        payload_inertia=values.get('payload_inertia', (nan,) * 6),
+        gravity=values.get('target_gravity', (nan,) * 3),
     )

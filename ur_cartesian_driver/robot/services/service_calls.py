@@ -17,6 +17,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector3
 from ur_cartesian_driver.motion.goal.declared_types import declare_types, WrongType
 from ur_cartesian_driver.motion.goal.goal import OutputKind
+from ur_cartesian_driver.motion.goal.inertia import inertia_problem, MAX_TRANSITION_TIME
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol.dashboard import DashboardRequest
 
@@ -32,10 +33,14 @@ PINS = {
 SCRIPT_TIMEOUT, MAX_SCRIPT_TIMEOUT = 30.0, 600.0
 #: Length [characters] above which a script must be a mistake.
 MAX_SCRIPT_LENGTH = 200_000
+#: Longest program [characters].
+MAX_PROGRAM_LENGTH = 2_000_000
 #: Longest text for the dashboard [characters]; its UTF-8 bytes fit into a line of the server.
 MAX_TEXT_LENGTH = 1000
 #: A length that no tool has [m]; a mass that no payload has [kg].
 MAX_TOOL_OFFSET, MAX_PAYLOAD_MASS = 5.0, 100.0
+#: An acceleration that no mounting on earth has [m/s^2].
+MAX_GRAVITY = 20.0
 #: How far the length of a quaternion may differ from 1.
 UNIT_TOLERANCE = 1e-3
 
@@ -84,6 +89,49 @@ class DashboardLineCall:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ListProgramsCall:
+    """Ask for the names of the robot's programs, one on each line; PolyScope X only."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UploadProgramCall:
+    """
+    Send a program to the robot; PolyScope X only.
+
+    :param program: the content of a `.urpx` file, which also names the program.
+    :param replaces: the program takes the place of one that the robot has; else it is a new one.
+    """
+
+    program: str
+    replaces: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the length of the program."""
+        _declare_types(self)
+        if not self.program.strip():
+            raise LocalProtocolError('The program is empty; give the content of a .urpx file.')
+        if len(self.program) > MAX_PROGRAM_LENGTH:
+            raise LocalProtocolError(
+                f'The program has {len(self.program)} characters, more than '
+                f'{MAX_PROGRAM_LENGTH}; upload it on the pendant.'
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DownloadProgramCall:
+    """Ask for a program of the robot, the content of a `.urpx` file; PolyScope X only."""
+
+    program_name: str
+
+    def __post_init__(self) -> None:
+        """Check that there is a name."""
+        _declare_types(self)
+        if not self.program_name.strip():
+            raise LocalProtocolError('program_name is empty; get_programs lists the names.')
+        _check_length(self.program_name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SetTcpCall:
     """Set the active TCP, given in the flange frame."""
 
@@ -107,13 +155,23 @@ class SetTcpCall:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetPayloadCall:
-    """Set the mass [kg] of the payload, and its centre of gravity in the flange frame [m]."""
+    """
+    Set the payload.
+
+    :param mass: [kg].
+    :param cog: centre of gravity in the flange frame [m].
+    :param inertia: xx, yy, zz, xy, xz, yz about that point, along the axes of the flange
+        [kg m^2]; empty = a point mass.
+    :param transition_time: how long the controller takes to go over to this payload [s].
+    """
 
     mass: float
     cog: Vector3 = (0.0, 0.0, 0.0)
+    inertia: tuple[float, ...] = ()
+    transition_time: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check mass and centre of gravity."""
+        """Check all values."""
         _declare_types(self)
         if not 0.0 <= self.mass <= MAX_PAYLOAD_MASS or not all(
             abs(value) <= MAX_TOOL_OFFSET for value in self.cog
@@ -121,6 +179,36 @@ class SetPayloadCall:
             raise LocalProtocolError(
                 f'The payload is {self.mass} kg at {self.cog} m; the mass has to be 0 to '
                 f'{MAX_PAYLOAD_MASS:g} kg, and each coordinate at most {MAX_TOOL_OFFSET:g} m.'
+            )
+        if problem := inertia_problem(self.inertia):
+            raise LocalProtocolError(
+                f'inertia {problem}; give it about the centre of gravity, or leave it empty.'
+            )
+        if not 0.0 <= self.transition_time <= MAX_TRANSITION_TIME:  # NaN fails, too
+            raise LocalProtocolError(
+                f'transition_time is {self.transition_time:g} s, it has to be 0 to '
+                f'{MAX_TRANSITION_TIME:g} s.'
+            )
+
+    @property
+    def is_point_mass(self) -> bool:
+        """Whether the payload has no inertia, and is there at once."""
+        return not any(self.inertia) and self.transition_time == 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetGravityCall:
+    """Set the acceleration that opposes gravity, in base axes [m/s^2]."""
+
+    gravity: Vector3
+
+    def __post_init__(self) -> None:
+        """Check the length."""
+        _declare_types(self)
+        if not 0.0 < hypot(*self.gravity) <= MAX_GRAVITY:  # NaN fails, too
+            raise LocalProtocolError(
+                f'gravity is {self.gravity} m/s^2; its length has to be more than 0 and at most '
+                f'{MAX_GRAVITY:g} m/s^2, for example (0, 0, 9.82) for an arm on a table.'
             )
 
 
@@ -232,6 +320,10 @@ class RecoverCall:
         _declare_types(self)
 
 
+#: The calls that change what a goal was planned for.
+SettingCall: TypeAlias = SetTcpCall | SetPayloadCall | SetGravityCall
+
+
 def succeeded(text: str) -> ServiceAnswer:
     """Return the answer of a call that succeeded."""
     return ServiceAnswer(ok=True, text=text)
@@ -259,8 +351,10 @@ def _check_length(text: str) -> None:
 ServiceCall: TypeAlias = (
     DashboardCall
     | DashboardLineCall
-    | SetTcpCall
-    | SetPayloadCall
+    | ListProgramsCall
+    | UploadProgramCall
+    | DownloadProgramCall
+    | SettingCall
     | ZeroFtSensorCall
     | SetOutputCall
     | SetSpeedSliderCall

@@ -6,44 +6,55 @@ Carries out the service calls of a driver's owner.
 A call uses the dashboard, a single command to the robot program, the primary interface, or RTDE
 inputs. It succeeds once the robot reports the effect, if the robot can report it. A call ends
 within :data:`CALL_TIMEOUT`, a recovery within :data:`RECOVERY_TIMEOUT`, a script within
-:data:`CALL_TIMEOUT` plus its timeout.
+:data:`CALL_TIMEOUT` plus its timeout, and so does a report (:data:`REPORT_TIMEOUTS`).
 """
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from math import dist, isnan
 
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.geometry.pose import angle_between, normalize, Pose
+from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
+from ur_cartesian_driver.motion.state.io_signals import Signals
 from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
+from ur_cartesian_driver.program.render import has_feature
 from ur_cartesian_driver.protocol.program import script_command
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.services import rtde_input_writer
+from ur_cartesian_driver.robot.services.dashboard_connection import REPORT_TIMEOUTS
 from ur_cartesian_driver.robot.services.dashboard_service import (
     DashboardPorts,
     DashboardService,
     EFFECT_TIMEOUT,
 )
 from ur_cartesian_driver.robot.services.polling import wait_for_state
+from ur_cartesian_driver.robot.services.program_files import ProgramFiles
 from ur_cartesian_driver.robot.services.recovery import RecoveryRunner
 from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,
+    DownloadProgramCall,
     failed,
     HandBackCall,
+    ListProgramsCall,
     RecoverCall,
     RunScriptCall,
     SendProgramCall,
     ServiceAnswer,
     ServiceCall,
+    SetGravityCall,
     SetOutputCall,
     SetPayloadCall,
     SetSpeedSliderCall,
     SetTcpCall,
+    SettingCall,
     succeeded,
+    UploadProgramCall,
     ZeroFtSensorCall,
 )
 
@@ -55,8 +66,10 @@ RECOVERY_TIMEOUT = 120.0
 SETTING_TIMEOUT = 1.0
 #: Largest error of the reported TCP [m, rad], which is rounded to 32-bit integers on the wire.
 TCP_TOLERANCE = 1e-5
-#: Largest error of the reported payload: its mass [kg] and centre of gravity [m].
+#: Largest error of the reported payload: mass [kg], centre of gravity [m], inertia [kg m^2].
 PAYLOAD_TOLERANCE = 1e-4
+#: Largest error of the reported gravity [m/s^2].
+GRAVITY_TOLERANCE = 1e-4
 
 #: The first major software version of robots that may have a force sensor.
 E_SERIES = 5
@@ -82,7 +95,15 @@ QUERY_COMMANDS = frozenset(
 )
 
 #: Dashboard commands that disturb a running goal.
-INTERFERING_COMMANDS = frozenset({'load', 'load installation', 'restart safety'})
+INTERFERING_COMMANDS = frozenset(
+    {
+        'load',
+        'load installation',
+        'restart safety',
+        'set operational mode',
+        'clear operational mode',
+    }
+)
 
 
 class ServiceDispatcher:
@@ -93,6 +114,7 @@ class ServiceDispatcher:
         self._settings = settings
         self._link = link
         self._dashboard = DashboardService(settings.robot_ip, ports, link)
+        self._program_files = ProgramFiles(settings.robot_ip, ports.robot_api, link)
         self._recovery = RecoveryRunner(
             link, self._dashboard, self._send_program, headless=settings.headless_mode
         )
@@ -106,7 +128,7 @@ class ServiceDispatcher:
 
     @property
     def is_changing_settings(self) -> bool:
-        """Return whether TCP or payload is being set."""
+        """Return whether TCP, payload or gravity is being set."""
         return self._pending_settings > 0
 
     async def dispatch(self, call: ServiceCall) -> ServiceAnswer:
@@ -114,6 +136,8 @@ class ServiceDispatcher:
         bound = RECOVERY_TIMEOUT if isinstance(call, RecoverCall) else CALL_TIMEOUT
         if isinstance(call, RunScriptCall):
             bound += call.timeout
+        elif isinstance(call, DashboardCall):
+            bound += REPORT_TIMEOUTS.get(call.command, 0.0)
         try:
             async with asyncio.timeout(bound):
                 return self._refusal(call) or await self._execute(call)
@@ -131,7 +155,9 @@ class ServiceDispatcher:
                 return await self._dashboard.request(call)
             case DashboardLineCall():
                 return await self._dashboard.request_raw(call)
-            case SetTcpCall() | SetPayloadCall():
+            case ListProgramsCall() | UploadProgramCall() | DownloadProgramCall():
+                return await self._program_files.carry_out(call)
+            case SetTcpCall() | SetPayloadCall() | SetGravityCall():
                 return await self._set(call)
             case ZeroFtSensorCall():
                 return self._zero_ftsensor()
@@ -158,7 +184,9 @@ class ServiceDispatcher:
     def _refusal(self, call: ServiceCall) -> ServiceAnswer | None:
         """Return the refusal of a call that is not allowed now; None = it is allowed."""
         status = self._link.status
-        if isinstance(call, DashboardCall) and call.command in QUERY_COMMANDS:
+        if isinstance(call, ListProgramsCall | DownloadProgramCall) or (
+            isinstance(call, DashboardCall) and call.command in QUERY_COMMANDS
+        ):
             return None
         if status.state is ConnectionState.REFUSED:
             return failed(status.message)
@@ -167,7 +195,7 @@ class ServiceDispatcher:
                 'The TCP of the last goal is being restored; try again when the status is READY.'
             )
         if status.state is ConnectionState.EXECUTING and (
-            isinstance(call, SetTcpCall | SetPayloadCall | SendProgramCall | HandBackCall)
+            isinstance(call, SettingCall | SendProgramCall | HandBackCall)
             or (isinstance(call, DashboardCall) and call.command in INTERFERING_COMMANDS)
         ):
             return failed(
@@ -210,13 +238,17 @@ class ServiceDispatcher:
             'The command to zero the force sensor was sent.'
         )
 
-    async def _set(self, call: SetTcpCall | SetPayloadCall) -> ServiceAnswer:
-        """Set TCP or payload; no goal starts meanwhile."""
+    async def _set(self, call: SettingCall) -> ServiceAnswer:
+        """Set TCP, payload or gravity; no goal starts meanwhile."""
         self._pending_settings += 1
         try:
-            return await (
-                self._set_tcp(call) if isinstance(call, SetTcpCall) else self._set_payload(call)
-            )
+            match call:
+                case SetTcpCall():
+                    return await self._set_tcp(call)
+                case SetPayloadCall():
+                    return await self._set_payload(call)
+                case SetGravityCall():
+                    return await self._set_gravity(call)
         finally:
             self._pending_settings -= 1
 
@@ -244,34 +276,81 @@ class ServiceDispatcher:
         )
 
     async def _set_payload(self, call: SetPayloadCall) -> ServiceAnswer:
-        refusal = self._command(script_command.SetPayloadCommand(mass=call.mass, cog=call.cog))
+        inertia = vector6(call.inertia or ZERO6)
+        command: script_command.AnyScriptCommand
+        if call.is_point_mass:
+            command = script_command.SetPayloadCommand(mass=call.mass, cog=call.cog)
+        elif not has_feature('target_payload', self._link.status.software()):
+            return failed(
+                f'The software of the robot ({self._link.status.polyscope_version}) knows neither '
+                'inertia nor transition_time, which PolyScope 5 has from 5.10 on; leave both out.'
+            )
+        else:
+            command = script_command.SetTargetPayloadCommand(
+                mass=call.mass,
+                cog=call.cog,
+                inertia=inertia,
+                transition_time=call.transition_time,
+            )
+
+        def is_reported(signals: Signals) -> bool:
+            there = (signals.payload, *signals.payload_cog, *signals.payload_inertia)
+            wanted = (call.mass, *call.cog, *inertia)
+            return all(
+                isnan(a) or abs(a - b) < PAYLOAD_TOLERANCE
+                for a, b in zip(there, wanted, strict=True)
+            )
+
+        return await self._set_reported(
+            'payload', command, lambda signals: signals.payload, is_reported, call.transition_time
+        )
+
+    async def _set_gravity(self, call: SetGravityCall) -> ServiceAnswer:
+        return await self._set_reported(
+            'gravity',
+            script_command.SetGravityCommand(gravity=call.gravity),
+            lambda signals: signals.gravity[0],
+            lambda signals: dist(signals.gravity, call.gravity) < GRAVITY_TOLERANCE,
+        )
+
+    async def _set_reported(
+        self,
+        name: str,
+        command: script_command.AnyScriptCommand,
+        sample: Callable[[Signals], float],
+        is_reported: Callable[[Signals], bool],
+        transition: float = 0.0,
+    ) -> ServiceAnswer:
+        """
+        Send a setting, and wait until the robot reports it with inputs and outputs.
+
+        :param sample: returns one of the reported numbers, NaN if the robot does not report them.
+        :param transition: how long the controller takes to go over to the setting [s].
+        """
+        refusal = self._command(command)
         if refusal is not None:
             return refusal
         signals, rate = self._link.signals, self._settings.io_publish_rate
         if signals is None:
             return succeeded(
-                'The payload was sent, but cannot be confirmed: the robot does not report inputs '
+                f'The {name} was sent, but cannot be confirmed: the robot does not report inputs '
                 'and outputs (io_publish_rate).'
             )
-        if isnan(signals.payload):
+        if isnan(sample(signals)):
             return succeeded(
-                'The payload was sent, but cannot be confirmed: the software of the robot does '
+                f'The {name} was sent, but cannot be confirmed: the software of the robot does '
                 'not report it.'
             )
-        within = SETTING_TIMEOUT + 1.0 / rate
-        if await wait_for_state(self._link, lambda _: self._has_payload(call), within):
-            return succeeded('The payload is set.')
-        return failed(
-            f'The robot does not report the new payload within {within:g} s: its program '
-            'may not know the command; set it on the pendant.'
-        )
 
-    def _has_payload(self, call: SetPayloadCall) -> bool:
-        signals = self._link.signals
-        return (
-            signals is not None
-            and dist((signals.payload, *signals.payload_cog), (call.mass, *call.cog))
-            < PAYLOAD_TOLERANCE
+        def is_set(_: RobotState) -> bool:
+            return (newest := self._link.signals) is not None and is_reported(newest)
+
+        within = SETTING_TIMEOUT + transition + 1.0 / rate
+        if await wait_for_state(self._link, is_set, within):
+            return succeeded(f'The {name} is set.')
+        return failed(
+            f'The robot does not report the new {name} within {within:g} s: its program '
+            'may not know the command; set it on the pendant.'
         )
 
     async def _send_program(self) -> ServiceAnswer:

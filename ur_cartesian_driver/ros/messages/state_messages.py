@@ -198,6 +198,7 @@ def tool_data_message(signals: Signals, stamp: Time) -> ToolData:
         mode=signals.tool_mode,
         payload=signals.payload,
         payload_center_of_gravity=vector_message(signals.payload_cog),
+        payload_inertia=signals.payload_inertia,
     )
 
 

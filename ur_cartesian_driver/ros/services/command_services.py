@@ -24,30 +24,44 @@ from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,
+    DownloadProgramCall,
     HandBackCall,
+    ListProgramsCall,
     RecoverCall,
     RunScriptCall,
     SCRIPT_TIMEOUT,
     SendProgramCall,
     ServiceAnswer,
     ServiceCall,
+    SetGravityCall,
     SetOutputCall,
     SetPayloadCall,
     SetSpeedSliderCall,
     SetTcpCall,
+    SettingCall,
+    UploadProgramCall,
     ZeroFtSensorCall,
 )
 from ur_cartesian_driver.ros.message_fields import pose_from_message
 from ur_cartesian_driver.ros.services.deferred_service import completed_answer, DeferredService
 from ur_cartesian_driver.srv import (
+    DownloadProgram,
+    GenerateFlightReport,
+    GenerateSupportFile,
     Load,
     Popup,
     RawRequest,
     Recover,
     RunScript,
     SetIO,
+    SetOperationalMode,
     SetSpeedSliderFraction,
     SetTCP,
+    SetUserRole,
+    UploadProgram,
+)
+from ur_cartesian_driver.srv import (
+    SetGravity as SetGravityService,
 )
 from ur_cartesian_driver.srv import (
     SetPayload as SetPayloadService,
@@ -58,6 +72,7 @@ TRIGGER_SERVICES: Mapping[str, ServiceCall] = {
     'resend_robot_program': SendProgramCall(),
     'hand_back_control': HandBackCall(),
     'zero_ftsensor': ZeroFtSensorCall(),
+    'dashboard/get_programs': ListProgramsCall(),
     **{
         f'dashboard/{name}': DashboardCall(command=command)
         for name, command in {
@@ -73,6 +88,10 @@ TRIGGER_SERVICES: Mapping[str, ServiceCall] = {
             'stop': 'stop',
             'get_robot_mode': 'robotmode',
             'get_safety_mode': 'safetymode',
+            'get_safety_status': 'safetystatus',
+            'get_operational_mode': 'get operational mode',
+            'clear_operational_mode': 'clear operational mode',
+            'get_user_role': 'getUserRole',
             'get_loaded_program': 'get loaded program',
             'program_state': 'programState',
             'program_running': 'running',
@@ -92,7 +111,17 @@ def _tcp(request: Any) -> ServiceCall:
 
 def _payload(request: Any) -> ServiceCall:
     cog = request.center_of_gravity
-    return SetPayloadCall(mass=request.mass, cog=(cog.x, cog.y, cog.z))
+    return SetPayloadCall(
+        mass=request.mass,
+        cog=(cog.x, cog.y, cog.z),
+        inertia=tuple(request.inertia),
+        transition_time=request.transition_time,
+    )
+
+
+def _gravity(request: Any) -> ServiceCall:
+    gravity = request.gravity
+    return SetGravityCall(gravity=(gravity.x, gravity.y, gravity.z))
 
 
 def _output(request: Any) -> ServiceCall:
@@ -118,6 +147,7 @@ REQUEST_SERVICES: Mapping[str, tuple[Any, Callable[[Any], ServiceCall]]] = {
     ),
     'set_tcp': (SetTCP, _tcp),
     'set_payload': (SetPayloadService, _payload),
+    'set_gravity': (SetGravityService, _gravity),
     'set_io': (SetIO, _output),
     'set_speed_slider': (
         SetSpeedSliderFraction,
@@ -134,6 +164,38 @@ REQUEST_SERVICES: Mapping[str, tuple[Any, Callable[[Any], ServiceCall]]] = {
     'dashboard/popup': (
         Popup,
         lambda request: DashboardCall(command='popup', argument=request.message),
+    ),
+    'dashboard/set_operational_mode': (
+        SetOperationalMode,
+        lambda request: DashboardCall(
+            command='set operational mode', argument=request.operational_mode
+        ),
+    ),
+    'dashboard/set_user_role': (
+        SetUserRole,
+        lambda request: DashboardCall(command='setUserRole', argument=request.user_role),
+    ),
+    'dashboard/generate_flight_report': (
+        GenerateFlightReport,
+        lambda request: DashboardCall(
+            command='generate flight report', argument=request.report_type
+        ),
+    ),
+    'dashboard/generate_support_file': (
+        GenerateSupportFile,
+        lambda request: DashboardCall(command='generate support file', argument=request.dir_path),
+    ),
+    'dashboard/upload_program': (
+        UploadProgram,
+        lambda request: UploadProgramCall(program=request.program),
+    ),
+    'dashboard/update_program': (
+        UploadProgram,
+        lambda request: UploadProgramCall(program=request.program, replaces=True),
+    ),
+    'dashboard/download_program': (
+        DownloadProgram,
+        lambda request: DownloadProgramCall(program_name=request.program_name),
     ),
     'dashboard/raw_request': (RawRequest, lambda request: DashboardLineCall(line=request.query)),
 }
@@ -165,8 +227,8 @@ class CommandServices:
             return completed_answer(str(error))
 
     def _call(self, call: ServiceCall, _: Any = None) -> Future[ServiceAnswer]:
-        # A goal that is being planned depends on the TCP and payload that it found.
-        if isinstance(call, SetTcpCall | SetPayloadCall) and not self._is_idle():
+        # A goal that is being planned depends on the settings that it found.
+        if isinstance(call, SettingCall) and not self._is_idle():
             return completed_answer(
                 'A goal that is being planned or executed depends on the present value; wait for '
                 'its end or cancel it, then try again.'

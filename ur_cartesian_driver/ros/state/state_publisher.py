@@ -57,6 +57,8 @@ LATCHED_QOS = QoSProfile(
 )
 #: The QoS that tf2 requires.
 TF_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+#: Enough for all messages that a subscriber may not have received yet.
+KEPT_STAMPS = 1000
 #: Period in which an unchanged status is published again [s].
 STATUS_PERIOD = 1.0
 #: Shortest time between two logs of the same defect [s].
@@ -87,6 +89,10 @@ class StatePublisher:
         self._status_topics = _StatusTopics(node)
         self._io_topics = _IoTopics(node)
         self._diagnostics_topic = _DiagnosticsTopic(node, settings.node.diagnostics_rate)
+
+    def has_published(self, stamp: Time) -> bool:
+        """Return whether one of the last ``joint_states`` has this stamp."""
+        return self._state_topics.has_published(stamp)
 
     def start(self) -> None:
         """Start publishing."""
@@ -156,11 +162,19 @@ class _StateTopics:
         self._publishes_links = settings.node.publish_link_frames
         self._tf_prefix = settings.planning.tf_prefix
         self._arm: Arm | None = None
+        #: The stamps of the last messages, as keys: another thread looks into it.
+        self._stamps: dict[tuple[int, int], None] = {}
+
+    def has_published(self, stamp: Time) -> bool:
+        return (stamp.sec, stamp.nanosec) in self._stamps
 
     def publish(self, state: RobotState | None, arm: Arm, stamp: Time) -> None:
         last, self._last = self._last, state
         if state is None or (last is not None and state.timestamp == last.timestamp):
             return
+        self._stamps[stamp.sec, stamp.nanosec] = None
+        if len(self._stamps) > KEPT_STAMPS:
+            del self._stamps[next(iter(self._stamps))]
         self._joint_states.publish(joint_state_message(state, self._joint_names, stamp))
         self._tcp_pose.publish(tcp_pose_message(state, self._base, stamp))
         self._wrench.publish(wrench_message(state, self._tcp, stamp))
