@@ -90,11 +90,36 @@ def test_a_closed_port_is_refused(closed_port, polyscope, sentence):
         wait_for(lambda: any(sentence in line for line in robot.state().messages))
 
 
-def test_a_name_that_nobody_has():
-    with robot_of(50002, external_control_host='no-such-host.invalid') as robot:
+@pytest.fixture
+def deaf_port():
+    """Return a port to which nobody can connect, as if a firewall dropped what comes."""
+    with contextlib.ExitStack() as stack:
+        listener = stack.enter_context(socket.socket())
+        listener.bind(('127.0.0.1', 0))
+        listener.listen(0)
+        for _ in range(4):  # fill the queue of those who wait to be accepted
+            client = stack.enter_context(socket.socket())
+            client.setblocking(False)
+            client.connect_ex(listener.getsockname())
+        yield listener.getsockname()[1]
+
+
+@pytest.mark.parametrize(
+    ('polyscope', 'reason'), [('5.21', 'Reason: connect timed out'), ('10.12', ': timed out')]
+)
+def test_a_host_that_drops_what_comes_is_given_up(deaf_port, polyscope, reason):
+    with robot_of(deaf_port, polyscope=polyscope) as robot:
+        robot.play_program()
+        wait_for(lambda: robot.state().messages, 20.0)
+        assert robot.state().messages[0].endswith(reason)
+
+
+@pytest.mark.parametrize('name', ['no-such-host.invalid', 'a' * 70])
+def test_a_name_that_nobody_has(name):
+    with robot_of(50002, external_control_host=name) as robot:
         robot.play_program()
         wait_for(lambda: robot.state().popups, 20.0)
-        assert robot.state().popups[0].endswith(' Reason: no-such-host.invalid')
+        assert robot.state().popups[0].endswith(f' Reason: {name}')
 
 
 def test_cycles_go_on_while_a_host_is_silent_and_stop_gives_up(host):

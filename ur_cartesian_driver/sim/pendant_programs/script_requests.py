@@ -110,6 +110,8 @@ class ScriptRequests:
                     local_addr=self._local_address(),
                 )
             return await collector.answer
+        except UnicodeError as error:  # of a name that can be no host
+            return socket.gaierror(socket.EAI_NONAME, str(error))
         except OSError as error:
             return error
         finally:
