@@ -23,6 +23,8 @@ NODES = (
     EXTERNAL_CONTROL,
     f'<Folder name="f"><children>{script_file(CODE)}</children></Folder>',
     '<Wait type="Sleep"><waitTime>1.5</waitTime></Wait>',
+    '<Popup type="Message" haltProgram="false" message="a &quot;b&quot;"/>',
+    '<Popup type="Message" haltProgram="true" message="end"/>',
 )
 TREE = ProgramTree(
     (
@@ -30,6 +32,8 @@ TREE = ProgramTree(
         ExternalControlNode(),
         ScriptText(CODE),
         ScriptText('sleep(1.5)'),
+        ScriptText('popup("a \'b\'", "Message", False, False, blocking=True)'),
+        ScriptText('popup("end", "Message", False, False, blocking=True)\nhalt'),
     )
 )
 

@@ -35,10 +35,12 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
     :raises OSError: the calibration or a program cannot be read.
     """
     files = []
+    if arguments.programs:
+        found = [file for file in arguments.programs.iterdir() if file.suffix in _READERS]
+        # Of two files with one name the last one counts: PolyScope writes a .script beside a .urp.
+        files += sorted(found, key=lambda file: file.suffix)
     if arguments.program and not _is_built_in(arguments.program):
         files.append(arguments.program)
-    if arguments.programs:
-        files += [file for file in arguments.programs.iterdir() if file.suffix in _READERS]
     return SimulatorConfig(
         model=arguments.model,
         host=arguments.host,

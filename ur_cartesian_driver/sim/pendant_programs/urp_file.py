@@ -105,9 +105,20 @@ def _sleep(node: Element) -> str | None:
         return None
 
 
+def _popup(node: Element) -> str:
+    text = node.get('message', '').replace('"', "'")
+    window = f'popup("{text}", "Message", False, False, blocking=True)'
+    return f'{window}\nhalt' if node.get('haltProgram') == 'true' else window
+
+
 #: Tag and type of a node -> function that returns its URScript, or None if it has none.
 _READERS: Mapping[tuple[str, str], Callable[[Element], str | None]] = MappingProxyType(
-    {('Script', 'Line'): _line, ('Script', 'File'): _file, ('Wait', 'Sleep'): _sleep}
+    {
+        ('Script', 'Line'): _line,
+        ('Script', 'File'): _file,
+        ('Wait', 'Sleep'): _sleep,
+        ('Popup', 'Message'): _popup,
+    }
 )
 
 
@@ -116,5 +127,5 @@ def _unknown_node(node: Element, name: str) -> ValueError:
     what = f'<{node.tag}> ({kind})' if kind else f'<{node.tag}>'
     return ValueError(
         f'{name} has a node {what}, which the simulator does not run; it runs script lines and '
-        'files, waits, comments, folders and External Control: write the node as a script.'
+        'files, waits, popups, comments, folders and External Control: write the node as a script.'
     )
