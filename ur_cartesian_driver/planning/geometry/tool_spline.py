@@ -83,24 +83,27 @@ class ToolSpline:
         begin, end = slice(None, -1), slice(1, None)
         x, v, a = points.poses[:, :3], points.twists, points.accelerations
         orientations = points.poses[:, 3:]
-        turn = log_rows(multiply_rows(orientations[end], conjugate_rows(orientations[begin])))
-        zero = np.zeros_like(turn)
         between = quintic_rows if points.quintic else cubic_rows
         durations = np.diff(points.times)
+        positions = between(
+            durations,
+            MotionRows(x[begin], v[begin, :3], a[begin, :3]),
+            MotionRows(x[end], v[end, :3], a[end, :3]),
+        )
+        turns = np.zeros_like(positions)
+        if (orientations != orientations[0]).any() or v[:, 3:].any() or a[:, 3:].any():
+            turn = log_rows(multiply_rows(orientations[end], conjugate_rows(orientations[begin])))
+            # At the start of a piece the vector is 0, so its derivatives are the angular rates.
+            turns = between(
+                durations,
+                MotionRows(np.zeros_like(turn), v[begin, 3:], a[begin, 3:]),
+                rotation_rates(turn, v[end, 3:], a[end, 3:]),
+            )
         return cls(
             times=points.times,
             orientations=orientations[begin],
-            positions=between(
-                durations,
-                MotionRows(x[begin], v[begin, :3], a[begin, :3]),
-                MotionRows(x[end], v[end, :3], a[end, :3]),
-            ),
-            # At the start of a piece the vector is 0, so its derivatives are the angular rates.
-            turns=between(
-                durations,
-                MotionRows(zero, v[begin, 3:], a[begin, 3:]),
-                rotation_rates(turn, v[end, 3:], a[end, 3:]),
-            ),
+            positions=positions,
+            turns=turns,
         )
 
     def rows(self, piece: Indices, t: Floats) -> ToolRows:
@@ -114,12 +117,18 @@ class ToolSpline:
 
     def rates(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
         """Return the twists and the accelerations that :meth:`rows` returns, (m, 6) each."""
-        x, turn = evaluate(self.positions[piece], t), evaluate(self.turns[piece], t)
-        w, e = angular_rates(turn)
+        x = evaluate(self.positions[piece], t)
+        if not self.turns.any():
+            none = np.zeros_like(x.v)
+            return np.concatenate([x.v, none], axis=1), np.concatenate([x.a, none], axis=1)
+        w, e = angular_rates(evaluate(self.turns[piece], t))
         return np.concatenate([x.v, w], axis=1), np.concatenate([x.a, e], axis=1)
 
     def poses(self, piece: Indices, t: Floats) -> Floats:
         """Return the poses (m, 7) that :meth:`rows` returns."""
+        if not self.turns.any():
+            position = values(self.positions[piece], t)
+            return np.concatenate([position, self.orientations[piece]], axis=1)
         position, turn = self.vectors(piece, t)
         turned = multiply_rows(exp_rows(turn), self.orientations[piece])
         return np.concatenate([position, normalized_rows(turned)], axis=1)

@@ -40,6 +40,8 @@ _CHORD_ERROR = 2e-6
 _CHORD_TURN = radians(2.0)
 #: Steps shorter than this [m] count as no motion.
 _NO_STEP = 1e-9
+#: Quaternions that differ by less than this are the same.
+_NO_TURN = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -87,6 +89,8 @@ def programmed_sections(
     number = np.arange(1, last[-1] + 1) - (last - count)[segment]
     rows = np.concatenate([curves.start[:1], curves.rows(segment, number / count[segment])])
     keep_hemisphere(rows)
+    if np.abs(rows[:, 3:] - rows[0, 3:]).max() < _NO_TURN:
+        rows[:, 3:] = rows[0, 3:]  # rounding errors would count as a tool that turns
     bounds = np.empty((len(rows), 2))
     bounds[:] = CURVE_BOUNDS
     bounds[last] = corners

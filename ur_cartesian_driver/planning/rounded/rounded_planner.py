@@ -43,7 +43,6 @@ from ur_cartesian_driver.planning.rounded.tool_knots import (
     CLOSE_ENOUGH,
     MIN_PIECE_TIME,
     tool_knots,
-    tool_points,
     TRIES,
 )
 from ur_cartesian_driver.planning.spline.joint_polynomials import (
@@ -67,8 +66,8 @@ _WIDTH_TIME = 0.25
 _SLOW_WIDTH = 0.001
 #: A tool that travels less [m] turns on the spot, if it turns farther than this [rad].
 _NO_TRAVEL, _NO_TURN = 1e-6, 1e-6
-#: Samples inside each piece that measure its accelerations: a quintic that starts and ends like
-#: the law is farthest from it near these quarters.
+#: Samples inside each piece that measure its deviation and its accelerations: a quintic that starts
+#: and ends like the law is farthest from it near these quarters.
 _SAMPLES_INSIDE = 3
 
 
@@ -131,8 +130,7 @@ def plan_rounded_path(
         widest = max(_SLOW_WIDTH, _WIDTH_TIME * float(own.speeds.max()))
         path = RoundedPath(section.polyline, widest)
         laws.append(SectionLaw(section, path, own, kinematics, q, options))
-        if laws[-1].samples.q.shape[1]:
-            q = vector6(laws[-1].samples.q[-1].tolist())
+        q = laws[-1].q_end
     if not laws:
         raise InvalidGoal(
             'trajectory.points',
@@ -199,19 +197,22 @@ def _fit(
 ) -> RoundedMotion:
     # This slows the laws where pieces are too coarse, so durations are read afterwards.
     knots = [tool_knots(law, _TOOL_PART * tolerance) for law in laws]
-    tool = [tool_points(law, t) for law, t in zip(laws, knots, strict=True)]
     durations = np.array([law.duration for law in laws])
     begins = np.cumsum(durations) - durations
     # The first row of a section is left out if it repeats the last one of the section before.
     join = [slice(1 if i else 0, None) for i in range(len(laws))]
+    points = [section.points for section in knots]
     spline = ToolSpline.through(
         ToolPoints(
             times=np.concatenate(
-                [(t + begin)[own] for t, begin, own in zip(knots, begins, join, strict=True)]
+                [
+                    (rows.times + begin)[own]
+                    for rows, begin, own in zip(points, begins, join, strict=True)
+                ]
             ),
             **{
                 name: np.concatenate(
-                    [getattr(rows, name)[own] for rows, own in zip(tool, join, strict=True)]
+                    [getattr(rows, name)[own] for rows, own in zip(points, join, strict=True)]
                 )
                 for name in ('poses', 'twists', 'accelerations')
             },
@@ -220,7 +221,15 @@ def _fit(
     )
     places = Places(laws, begins)
     path = solve_spline_path(
-        kinematics, spline, {}, q_start, options, first=0, rests=True, places=places
+        kinematics,
+        spline,
+        {},
+        q_start,
+        options,
+        first=0,
+        rests=True,
+        places=places,
+        count=np.concatenate([section.sample_count for section in knots]),
     )
     polynomials = fit_joint_polynomials(
         kinematics,
@@ -229,6 +238,7 @@ def _fit(
         True,
         (1.0 - _TOOL_PART) * tolerance,
         min_time=MIN_PIECE_TIME,
+        compared=(_SAMPLES_INSIDE, _SAMPLES_INSIDE),
     )
     return RoundedMotion(
         laws=laws,
