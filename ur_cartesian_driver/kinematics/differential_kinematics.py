@@ -45,10 +45,9 @@ def joint_rates(
     # Avoid a division by zero for an arm at rest in a singularity.
     regular = at.jacobian + _MIN_SINGULAR_VALUE * np.eye(6)
     # To solve twice takes two thirds of the time that one inverse takes.
-    qd: Floats = np.linalg.solve(regular, twist[:, :, None])[:, :, 0]
+    qd = _solved(regular, twist)
     rest = acceleration - _bias_acceleration(at, qd)
-    qdd: Floats = np.linalg.solve(regular, rest[:, :, None])[:, :, 0]
-    return qd, qdd
+    return qd, _solved(regular, rest)
 
 
 def largest_joint_rates(
@@ -69,7 +68,7 @@ def largest_joint_rates(
     inverse = np.linalg.inv(at.jacobian + _MIN_SINGULAR_VALUE * np.eye(6))
     travel, turn = (np.linalg.norm(inverse[:, :, part], axis=2) for part in _TRAVEL_AND_TURN)
     qd: Floats = rates[0] * travel + rates[1] * turn
-    # Constant joint rates accelerate the TCP by at most the square of their sum, times its distance.
+    # Constant joint rates accelerate the TCP by at most the square of their sum times its reach.
     bias = qd.sum(axis=1)[:, None] ** 2
     reach = np.linalg.norm(np.array(at.frames.origins) - at.tcp, axis=1).max(axis=0)[:, None]
     qdd: Floats = (accelerations[0] + reach * bias) * travel
@@ -83,6 +82,14 @@ def tool_rates(
     at = _jacobians(arm, T_flange_tcp, q)
     twist: Floats = (at.jacobian @ qd[:, :, None])[:, :, 0]
     return twist, (at.jacobian @ qdd[:, :, None])[:, :, 0] + _bias_acceleration(at, qd)
+
+
+def _solved(matrices: Floats, rows: Floats) -> Floats:
+    """Return the solution (n, 6) of each system of six equations."""
+    found: Floats = np.linalg.solve(matrices, rows[:, :, None])[:, :, 0].astype(
+        np.float64, copy=False
+    )
+    return found
 
 
 def _jacobians(arm: Arm, T_flange_tcp: Pose, q: Floats) -> _Jacobians:

@@ -94,5 +94,5 @@ def _near_limits(
         (peaks.speed, peaks.turn_rate),
         (peaks.acceleration, peaks.turn_acceleration),
     )
-    limits = np.array(kinematics.arm.model.max_joint_speed)
-    return bool((qd > _NEAR * limits).any() or (qdd > _NEAR * options.max_joint_acceleration).any())
+    speeds = qd / kinematics.arm.model.max_joint_speed
+    return max(float(speeds.max()), float(qdd.max()) / options.max_joint_acceleration) > _NEAR

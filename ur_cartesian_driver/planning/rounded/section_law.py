@@ -18,7 +18,7 @@ from math import inf, sqrt
 import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose_rows import (
     conjugate_rows,
     length_rows,
@@ -116,6 +116,9 @@ class CurveSamples:
 def tool_rows(rows: PathRows) -> tuple[Floats, Floats, Floats]:
     """Return poses (m, 7), turns per unit of s (m, 3) and their derivatives (m, 3) in base."""
     quaternions = rows.x[:, 3:]
+    if not rows.d1[:, 3:].any() and not rows.d2[:, 3:].any():
+        none = np.zeros((len(quaternions), 3))
+        return rows.x, none, none
     inverse = (
         conjugate_rows(quaternions) / np.einsum('ij,ij->i', quaternions, quaternions)[:, None]
     )
@@ -271,49 +274,57 @@ class SectionLaw:
         )
 
     def _fitted(self) -> TimeLaw:
-        s = self.samples.s
+        s, window = self.samples.s, self.window
 
-        def law(speed: Floats) -> TimeLaw:
-            squares = self._fastest.squares(speed, _AIM / self._tightened)
-            return TimeLaw(s, squares, self.window)
+        def squares(speed: Floats) -> Floats:
+            return self._fastest.squares(speed, _AIM / self._tightened)
 
-        first = law(self._speed)
-        reach = 0.5 * self.window
+        first = TimeLaw(s, squares(self._speed), window)
+        y, excess = np.full(len(s), np.nan), np.zeros(len(s))
         for _ in range(_ROUNDS):
             slowed = self._speed / np.sqrt(self._tightened)
-            found = law(lowered_over(slowed, first.times, reach))
-            excess = self.excess(found)
+            before, y = y, squares(lowered_over(slowed, first.times, 0.5 * window))
+            found = TimeLaw(s, y, window)
+            # Elsewhere the law is as it was, only later.
+            changed = np.where(y == before, 0.0, 1.0)
+            again = _largest_around(changed, found.times, 2.0 * window) > 0.0
+            excess[again] = self.excess(found, again)[again]
             if excess.max() <= 1.0:
                 break
-            wide = -lowered_over(-excess, found.times, self.window)
+            wide = _largest_around(excess, found.times, window)
             more = np.where(wide > _FAR, wide**_LESS, wide**_MORE)
             self._tightened *= np.where(wide > 1.0, more * _EXTRA, 1.0)
         return found
 
-    def _measured_times(self, law: TimeLaw) -> Floats:
-        """Return times near which each place is passed, closer together where limits change."""
+    def _measured_times(self, law: TimeLaw, at: Flags) -> Floats:
+        """Return times near which the law passes places, closer together where limits change."""
         tool = self._tool
         changes = np.flatnonzero(
             (np.diff(tool.accelerations) != 0.0) | (np.diff(tool.turn_accelerations) != 0.0)
         )
+        times = law.sampled_times(at)
         if not len(changes):
-            return law.sampled_times
+            return times
         passed = np.interp(self.section.ends[changes], self.samples.s, law.times)
         around = passed[:, None] + self.window * np.linspace(0.0, 1.5, _AROUND)
-        return np.sort(np.concatenate([law.sampled_times, around.ravel()]))
+        return np.sort(np.concatenate([times, around.ravel()]))
 
-    def excess(self, law: TimeLaw) -> Floats:
-        """Return the greatest ratio, at each place (m,), of a measured quantity to its limit."""
+    def excess(self, law: TimeLaw, at: Flags) -> Floats:
+        """
+        Return the greatest ratio, at each place (m,), of a measured quantity to its limit.
+
+        :param at: (m,) the places at which it is measured, with both neighbours of each.
+        """
         s, excess = self.samples.s, np.zeros(len(self.samples.s))
-        times = self._measured_times(law)
+        times = self._measured_times(law, at)
         for begin in range(0, len(times), _BLOCK):
             t = times[begin : begin + _BLOCK]
             places = law.at(t)
-            at = np.clip(np.searchsorted(s, places.s, side='right') - 1, 0, len(s) - 2)
+            row = np.clip(np.searchsorted(s, places.s, side='right') - 1, 0, len(s) - 2)
             jerk = law.accelerations(t + _JERK_STEP) - law.accelerations(t - _JERK_STEP)
-            worst = self._excess_at(places, jerk / (2.0 * _JERK_STEP), at)
-            np.maximum.at(excess, at, worst)
-            np.maximum.at(excess, at + 1, worst)
+            worst = self._excess_at(places, jerk / (2.0 * _JERK_STEP), row)
+            np.maximum.at(excess, row, worst)
+            np.maximum.at(excess, row + 1, worst)
         return excess
 
     def _excess_at(self, law: PathTimes, jerk: Floats, at: Indices) -> Floats:
@@ -347,6 +358,11 @@ class SectionLaw:
             values.append(speeds.max(axis=1))
         worst: Floats = np.maximum.reduce(values)
         return worst
+
+
+def _largest_around(values: Floats, times: Floats, reach: float) -> Floats:
+    """Return, for each time (m,), the greatest value (m,) within ``reach`` [s] of it."""
+    return -lowered_over(-values, times, reach)
 
 
 def places(path: RoundedPath, ends: Floats) -> Floats:

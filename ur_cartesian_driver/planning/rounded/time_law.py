@@ -18,6 +18,7 @@ reaches (:func:`lowered_over`).
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple
@@ -30,6 +31,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
 # Number of halvings in a bisection.
 _HALVINGS = 30
 _TINY = 1e-12
+_JUST_BELOW = 1.0 - 1e-9
 # Whether a time just within reach counts must not depend on rounding errors [s].
 _NO_TIME = 1e-9
 # Newton's method finds times of places, unless the law nearly rests there [1/s].
@@ -86,22 +88,18 @@ class _Bounds:
         matter: Flags = ~(reached <= limits.bound).all(axis=0)
         return matter
 
-    def _changed(self, change: Callable[[Floats], Floats], c_and_r: bool = False) -> _Bounds:
-        """Return bounds with each column changed, or only those that limits scale."""
-        found = object.__new__(_Bounds)
-        for name in 'cdmnr':
-            columns: list[Floats] = getattr(self, name)
-            changed = [change(each) for each in columns] if not c_and_r or name in 'cr' else columns
-            setattr(found, name, changed)
-        return found
-
     def take(self, rows: Indices | slice) -> _Bounds:
         """Return the bounds at some places."""
-        return self._changed(lambda column: column[rows])
+        found = object.__new__(_Bounds)
+        for name in 'cdrmn':
+            setattr(found, name, [column[rows] for column in getattr(self, name)])
+        return found
 
     def scaled(self, factor: Floats) -> _Bounds:
         """Return the bounds with the limits of acceleration multiplied by factors (m,)."""
-        return self._changed(lambda column: column * factor, c_and_r=True)
+        found = copy(self)
+        found.c, found.r = ([column * factor for column in each] for each in (self.c, self.r))
+        return found
 
     def range(self, y: Floats) -> tuple[Floats, Floats]:
         """Return least and largest u (m,) at each place; NaN or least > largest = none allowed."""
@@ -175,6 +173,8 @@ def fastest_law(s: Floats, limits: LawLimits) -> Floats:
 
 def _possible(bounds: _Bounds, y: Floats) -> Floats:
     """Return the largest y (m,), but at most the given ones, at which some u is allowed."""
+    for r, n in zip(bounds.r, bounds.n, strict=True):
+        y = np.minimum(y, _JUST_BELOW * r / np.maximum(n, _TINY))
     low, high = bounds.range(y)
     rows = np.flatnonzero(~(low <= high))
     if not len(rows):
@@ -271,17 +271,25 @@ class TimeLaw:
         found: Floats = (after - before) / self.window
         return found
 
-    @property
-    def sampled_times(self) -> Floats:
-        """Times (2 m - 1,) near which the averaged law passes places, and between them [s]."""
+    def sampled_times(self, at: Flags | None = None) -> Floats:
+        """
+        Return times (k,) near which the averaged law passes places, and between them [s].
+
+        :param at: (m,) the places; each comes with its two neighbours. None = all.
+        """
         passed = self.times + 0.5 * self.window
-        return np.sort(np.concatenate([passed, 0.5 * (passed[1:] + passed[:-1])]))
+        between = 0.5 * (passed[1:] + passed[:-1])
+        if at is not None:
+            near = at[1:] | at[:-1]
+            passed = passed[np.append(near, False) | np.append(False, near)]
+            between = between[near]
+        return np.sort(np.concatenate([passed, between]))
 
     def times_of(self, s: Floats) -> Floats:
         """Return when the averaged law passes places (m,) [s]."""
         low = np.interp(s, self._s, self.times)
         high = low + self.window
-        known = np.concatenate([[0.0], self.sampled_times, [self.duration]])
+        known = np.concatenate([[0.0], self.sampled_times(), [self.duration]])
         t = np.clip(np.interp(s, self.at(known).s, known), low, high)
         for _ in range(_NEWTON_STEPS):
             place, v, _ = self.at(t)

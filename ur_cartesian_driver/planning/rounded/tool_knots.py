@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
-from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, distance_rows, length_rows
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, length_rows
 from ur_cartesian_driver.planning.geometry.curves import ARC_CHORD_ERROR
 from ur_cartesian_driver.planning.geometry.samples import counted, STEP_ANGLE, STEP_LENGTH
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
@@ -129,15 +129,15 @@ class _HalfSteps:
         jerk /= times[rows + 1] - times[rows - 1]
         worst = np.maximum.reduce(
             [
-                distance_rows(exact.poses[rows], made.poses) / tolerance,
-                ANGLE_TOLERANCE_RADIUS
-                * angle_rows(exact.poses[rows, 3:], made.poses[:, 3:])
-                / tolerance,
+                length_rows(exact.poses[rows, :3] - made.poses[:, :3]) / tolerance,
                 _ratios(change, limits) / _ACCELERATION_PART,
                 _ratios(made.accelerations, limits) / CLOSE_ENOUGH,
                 jerk / (JERK_CLOSE_ENOUGH * self._law.jerk),
             ]
         )
+        if self._law.samples.turns:
+            angle = angle_rows(exact.poses[rows, 3:], made.poses[:, 3:])
+            worst = np.maximum(worst, ANGLE_TOLERANCE_RADIUS * angle / tolerance)
         fits: Flags = np.maximum.reduceat(worst, np.flatnonzero(inner == 1)) <= 1.0
         return fits
 
