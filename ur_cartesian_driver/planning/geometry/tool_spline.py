@@ -91,13 +91,17 @@ class ToolSpline:
             MotionRows(x[end], v[end, :3], a[end, :3]),
         )
         turns = np.zeros_like(positions)
-        if (orientations != orientations[0]).any() or v[:, 3:].any() or a[:, 3:].any():
-            turn = log_rows(multiply_rows(orientations[end], conjugate_rows(orientations[begin])))
+        turning = (orientations[begin] != orientations[end]).any(axis=1)
+        turning |= (v[begin, 3:] != 0.0).any(axis=1) | (v[end, 3:] != 0.0).any(axis=1)
+        turning |= (a[begin, 3:] != 0.0).any(axis=1) | (a[end, 3:] != 0.0).any(axis=1)
+        if turning.any():
+            to, since = orientations[end][turning], orientations[begin][turning]
+            turn = log_rows(multiply_rows(to, conjugate_rows(since)))
             # At the start of a piece the vector is 0, so its derivatives are the angular rates.
-            turns = between(
-                durations,
-                MotionRows(np.zeros_like(turn), v[begin, 3:], a[begin, 3:]),
-                rotation_rates(turn, v[end, 3:], a[end, 3:]),
+            turns[turning] = between(
+                durations[turning],
+                MotionRows(np.zeros_like(turn), v[begin, 3:][turning], a[begin, 3:][turning]),
+                rotation_rates(turn, v[end, 3:][turning], a[end, 3:][turning]),
             )
         return cls(
             times=points.times,
@@ -118,20 +122,24 @@ class ToolSpline:
     def rates(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
         """Return the twists and the accelerations that :meth:`rows` returns, (m, 6) each."""
         x = evaluate(self.positions[piece], t)
-        if not self.turns.any():
-            none = np.zeros_like(x.v)
-            return np.concatenate([x.v, none], axis=1), np.concatenate([x.a, none], axis=1)
-        w, e = angular_rates(evaluate(self.turns[piece], t))
+        w, e = np.zeros_like(x.v), np.zeros_like(x.a)
+        rows = self._turning(piece)
+        if len(rows):
+            w[rows], e[rows] = angular_rates(evaluate(self.turns[piece[rows]], t[rows]))
         return np.concatenate([x.v, w], axis=1), np.concatenate([x.a, e], axis=1)
 
     def poses(self, piece: Indices, t: Floats) -> Floats:
         """Return the poses (m, 7) that :meth:`rows` returns."""
-        if not self.turns.any():
-            position = values(self.positions[piece], t)
-            return np.concatenate([position, self.orientations[piece]], axis=1)
-        position, turn = self.vectors(piece, t)
-        turned = multiply_rows(exp_rows(turn), self.orientations[piece])
-        return np.concatenate([position, normalized_rows(turned)], axis=1)
+        position, orientations = values(self.positions[piece], t), self.orientations[piece]
+        rows = self._turning(piece)
+        if len(rows):
+            turn = values(self.turns[piece[rows]], t[rows])
+            orientations[rows] = normalized_rows(multiply_rows(exp_rows(turn), orientations[rows]))
+        return np.concatenate([position, orientations], axis=1)
+
+    def _turning(self, piece: Indices) -> Indices:
+        """Return the rows of pieces (m,) on which the tool turns: often none."""
+        return np.flatnonzero(self.turns.any(axis=(1, 2))[piece])
 
     def vectors(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
         """Return positions [m] and rotation vectors since the piece began [rad], (m, 3) each."""

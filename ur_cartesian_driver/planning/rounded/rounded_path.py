@@ -42,8 +42,6 @@ _AIM = 0.95
 _ROUNDS = 10
 #: Smallest and greatest factor on a width in a round.
 _STEPS = 0.5, 1.3
-#: Relative change of the widths in the last round.
-_SETTLED = 0.001
 #: If more than ``_MANY`` corners lie within a corner's width, samples are farther apart by the
 #: factor ``_SMOOTHER``.
 _MANY, _SMOOTHER = 5, 2.4
@@ -177,9 +175,7 @@ class RoundedPath:
         for _ in range(_ROUNDS):
             excess = self._excess(places, widths, self._bounds)
             step = np.clip(np.maximum(excess / _AIM, 1e-6) ** -0.5, *_STEPS)
-            before, widths = widths, self._evened(np.minimum(widths * step, largest))
-            if (np.abs(widths - before) <= _SETTLED * before).all():
-                break
+            widths = self._evened(np.minimum(widths * step, largest))
         return widths
 
     def _evened(self, widths: Floats) -> Floats:

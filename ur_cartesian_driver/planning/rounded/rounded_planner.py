@@ -58,7 +58,8 @@ PIECE_TOLERANCE = 1e-5
 #: Greatest such deviation as a fraction of the smallest bound of a corner.
 _PIECE_PART = 0.2
 #: Fraction of this deviation that is allowed to the tool spline; the joints get the remainder.
-_TOOL_PART = 0.3
+#: They need little of it: pieces are short beside the arm.
+_TOOL_PART = 0.6
 #: Fraction of the jerk limit at which the law aims, because the pieces have a little more jerk.
 _JERK_PART = 0.97
 #: Corners get no larger width than the tool travels in this time [s].

@@ -177,6 +177,8 @@ class SectionLaw:
         self._fastest = FastestLaw(s, self._limits())
         #: Factor by which limits are tightened at each place if the averaged law exceeds them.
         self._tightened = np.ones(len(s))
+        #: The last law, as its squares (m,), and its :meth:`excess` (m,).
+        self._measured = np.full(len(s), np.nan), np.zeros(len(s))
         self.law = self._fitted()
         #: Places, about :data:`_ANCHOR_TIME` apart, at which a grid of pieces begins anew.
         last = self.duration - 0.5 * _ANCHOR_TIME
@@ -280,7 +282,7 @@ class SectionLaw:
             return self._fastest.squares(speed, _AIM / self._tightened)
 
         first = TimeLaw(s, squares(self._speed), window)
-        y, excess = np.full(len(s), np.nan), np.zeros(len(s))
+        y, excess = self._measured
         for _ in range(_ROUNDS):
             slowed = self._speed / np.sqrt(self._tightened)
             before, y = y, squares(lowered_over(slowed, first.times, 0.5 * window))
@@ -289,6 +291,7 @@ class SectionLaw:
             changed = np.where(y == before, 0.0, 1.0)
             again = _largest_around(changed, found.times, 2.0 * window) > 0.0
             excess[again] = self.excess(found, again)[again]
+            self._measured = y, excess
             if excess.max() <= 1.0:
                 break
             wide = _largest_around(excess, found.times, window)

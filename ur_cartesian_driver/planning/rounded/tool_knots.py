@@ -26,17 +26,18 @@ from ur_cartesian_driver.planning.spline.joint_polynomials import ANGLE_TOLERANC
 
 #: Shortest time of a piece [s] that robot program and sockets sustain over any number of pieces.
 MIN_PIECE_TIME = 0.02
-#: Greatest acceptable ratio of an acceleration inside a piece to its limit, and of the jerk to
-#: the limit of the law.
-CLOSE_ENOUGH, JERK_CLOSE_ENOUGH = 1.017, 1.01
+#: Greatest acceptable ratio of an acceleration inside a shortest piece to its limit; inside pieces
+#: that can be split; and of the jerk there to the limit of the law.
+CLOSE_ENOUGH, _SPLIT_EXCESS, _SPLIT_JERK = 1.017, 1.012, 1.01
 #: Greatest number of times that the law is slowed around pieces that are too coarse.
 TRIES = 6
 #: Number of shortest pieces that are joined into one at first; the result is split as necessary.
 _JOINED = 8
-#: Number of samples inside a shortest piece at which its accelerations are measured.
-_MEASURED = 3
+#: Where inside a shortest piece its accelerations are measured; and inside one that can be split,
+#: beside the half steps: it may have most acceleration close to its ends.
+_QUARTERS, _MEASURED = (0.25, 0.5, 0.75), (0.08, 0.16, 0.3, 0.42, 0.58, 0.7, 0.84, 0.92)
 #: Greatest error of the acceleration, as a fraction of its limit, on pieces that can be split.
-_ACCELERATION_PART = 0.1
+_ACCELERATION_PART = 0.15
 #: Greatest error [m] along the path of a place between two samples, by its time.
 _TIME_ERROR = 2e-5
 #: A tool slower than this [m/s] rests.
@@ -80,6 +81,7 @@ class _HalfSteps:
         at = law.law.at(times)
         self._law = law
         self._points = _points_at(law, times, at)
+        self._s = at.s
         self._limits = law.acceleration_limits(at.s)
 
     def points(self, rows: Indices) -> ToolPoints:
@@ -131,27 +133,38 @@ class _HalfSteps:
             [
                 length_rows(exact.poses[rows, :3] - made.poses[:, :3]) / tolerance,
                 _ratios(change, limits) / _ACCELERATION_PART,
-                _ratios(made.accelerations, limits) / CLOSE_ENOUGH,
-                jerk / (JERK_CLOSE_ENOUGH * self._law.jerk),
+                _ratios(made.accelerations, limits) / _SPLIT_EXCESS,
+                jerk / (_SPLIT_JERK * self._law.jerk),
             ]
         )
-        if self._law.samples.turns:
-            angle = angle_rows(exact.poses[rows, 3:], made.poses[:, 3:])
-            worst = np.maximum(worst, ANGLE_TOLERANCE_RADIUS * angle / tolerance)
+        turned = np.flatnonzero((exact.poses[rows, 3:] != made.poses[:, 3:]).any(axis=1))
+        if len(turned):
+            angle = angle_rows(exact.poses[rows[turned], 3:], made.poses[turned, 3:])
+            worst[turned] = np.maximum(worst[turned], ANGLE_TOLERANCE_RADIUS * angle / tolerance)
         fits: Flags = np.maximum.reduceat(worst, np.flatnonzero(inner == 1)) <= 1.0
-        return fits
+        return fits & (self._excess(spline, number, begin, end, _MEASURED) <= _SPLIT_EXCESS)
 
     def excess(self, begin: Indices) -> Floats:
         """Return the greatest ratio of an acceleration to its limit on shortest pieces (r,)."""
         if not len(begin):
             return np.empty(0)
-        part = np.arange(1, _MEASURED + 1) / (_MEASURED + 1)
-        spline, number = self._spline(begin, begin + 1)
-        t = (np.diff(self.grid)[begin][:, None] * part).ravel()
-        _, accelerations = spline.rates(np.repeat(number, _MEASURED), t)
-        s = self._law.law.at(np.repeat(self.grid[begin], _MEASURED) + t).s
+        return self._excess(*self._spline(begin, begin + 1), begin, begin + 1, _QUARTERS)
+
+    def _excess(
+        self,
+        spline: ToolSpline,
+        number: Indices,
+        begin: Indices,
+        end: Indices,
+        parts: tuple[float, ...],
+    ) -> Floats:
+        """Return the greatest such ratio (r,) at some parts of the time between grid times."""
+        count = len(parts)
+        t = ((self.grid[end] - self.grid[begin])[:, None] * parts).ravel()
+        _, accelerations = spline.rates(np.repeat(number, count), t)
+        s = np.interp(np.repeat(self.grid[begin], count) + t, self._points.times, self._s)
         ratios = _ratios(accelerations, self._law.acceleration_limits(s))
-        largest: Floats = ratios.reshape(-1, _MEASURED).max(axis=1)
+        largest: Floats = ratios.reshape(-1, count).max(axis=1)
         return largest
 
     def _spline(self, begin: Indices, end: Indices) -> tuple[ToolSpline, Indices]:
@@ -198,6 +211,13 @@ def _piece_ends(steps: _HalfSteps, tolerance: float) -> Indices:
         ends = np.insert(ends, split + 1, (ends[split] + ends[split + 1]) // 2)
         moved = split + np.arange(len(split))
         open_rows = np.sort(np.concatenate([moved, moved + 1]))
+    # Halves of neighbours may make one piece: first the odd neighbours, then the even ones.
+    for first in (1, 2):
+        left = np.arange(first, len(ends) - 2, 2)
+        left = left[ends[left + 2] - ends[left] <= _JOINED]
+        if len(left):
+            joined = left[steps.fits(ends[left], ends[left + 2], tolerance)]
+            ends = np.delete(ends, joined + 1)
     return ends
 
 
