@@ -91,10 +91,12 @@ class ToolSpline:
             MotionRows(x[end], v[end, :3], a[end, :3]),
         )
         turns = np.zeros_like(positions)
-        turning = (orientations[begin] != orientations[end]).any(axis=1)
-        turning |= (v[begin, 3:] != 0.0).any(axis=1) | (v[end, 3:] != 0.0).any(axis=1)
-        turning |= (a[begin, 3:] != 0.0).any(axis=1) | (a[end, 3:] != 0.0).any(axis=1)
-        if turning.any():
+        rates = np.concatenate([v[:, 3:], a[:, 3:]], axis=1)
+        changes = np.concatenate(
+            [rates[begin], rates[end], orientations[end] - orientations[begin]], axis=1
+        )
+        turning = np.flatnonzero(changes.any(axis=1))
+        if len(turning):
             to, since = orientations[end][turning], orientations[begin][turning]
             turn = log_rows(multiply_rows(to, conjugate_rows(since)))
             # At the start of a piece the vector is 0, so its derivatives are the angular rates.
@@ -117,16 +119,24 @@ class ToolSpline:
         :param piece: (m,) the piece to which each time belongs.
         :param t: (m,) time since this piece began [s].
         """
-        return ToolRows(self.poses(piece, t), *self.rates(piece, t))
-
-    def rates(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
-        """Return the twists and the accelerations that :meth:`rows` returns, (m, 6) each."""
         x = evaluate(self.positions[piece], t)
+        orientations = self.orientations[piece]
         w, e = np.zeros_like(x.v), np.zeros_like(x.a)
         rows = self._turning(piece)
         if len(rows):
-            w[rows], e[rows] = angular_rates(evaluate(self.turns[piece[rows]], t[rows]))
-        return np.concatenate([x.v, w], axis=1), np.concatenate([x.a, e], axis=1)
+            turn = evaluate(self.turns[piece[rows]], t[rows])
+            w[rows], e[rows] = angular_rates(turn)
+            orientations[rows] = _turned(turn.x, orientations[rows])
+        return ToolRows(
+            np.concatenate([x.x, orientations], axis=1),
+            np.concatenate([x.v, w], axis=1),
+            np.concatenate([x.a, e], axis=1),
+        )
+
+    def rates(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
+        """Return the twists and the accelerations that :meth:`rows` returns, (m, 6) each."""
+        _, twists, accelerations = self.rows(piece, t)
+        return twists, accelerations
 
     def poses(self, piece: Indices, t: Floats) -> Floats:
         """Return the poses (m, 7) that :meth:`rows` returns."""
@@ -139,7 +149,7 @@ class ToolSpline:
 
     def _turning(self, piece: Indices) -> Indices:
         """Return the rows of pieces (m,) on which the tool turns: often none."""
-        return np.flatnonzero(self.turns.any(axis=(1, 2))[piece])
+        return np.flatnonzero(np.any(self.turns, axis=(1, 2))[piece])
 
     def vectors(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
         """Return positions [m] and rotation vectors since the piece began [rad], (m, 3) each."""
@@ -161,6 +171,11 @@ class ToolSpline:
             positions=self.positions * powers,
             turns=self.turns * powers,
         )
+
+
+def _turned(turns: Floats, orientations: Floats) -> Floats:
+    """Return orientations (m, 4) turned by rotation vectors (m, 3)."""
+    return normalized_rows(multiply_rows(exp_rows(turns), orientations))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
