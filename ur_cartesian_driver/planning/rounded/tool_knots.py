@@ -71,6 +71,19 @@ def tool_knots(law: SectionLaw, tolerance: float) -> ToolKnots:
     return ToolKnots(steps.points(2 * ends), steps.sample_count(ends))
 
 
+class _Pieces(NamedTuple):
+    """Quintics between rows of the grid, ``begin`` and ``end`` (r,), numbered on a spline."""
+
+    spline: ToolSpline
+    number: Indices
+    begin: Indices
+    end: Indices
+
+    def take(self, rows: Indices) -> _Pieces:
+        """Return some of them."""
+        return _Pieces(self.spline, self.number[rows], self.begin[rows], self.end[rows])
+
+
 class _HalfSteps:
     """The law at the times of a grid and halfway between them: rows 0, 2, ... are on the grid."""
 
@@ -117,26 +130,24 @@ class _HalfSteps:
 
     def fits(self, begin: Indices, end: Indices, tolerance: float) -> Flags:
         """Return whether quintics between grid times (r,) follow the law closely enough."""
+        pieces = self._pieces(begin, end)
         # Most that do not are off at a quarter, so few are compared at all half steps.
-        fits = self._follows(begin, end, tolerance, at_quarters=True)
+        fits = self._follows(pieces, tolerance, at_quarters=True)
         rows = np.flatnonzero(fits)
         if len(rows):
-            begin, end = begin[rows], end[rows]
-            fits[rows] = self._follows(begin, end, tolerance, at_quarters=False)
-            spline, number = self._spline(begin, end)
-            fits[rows] &= self._excess(spline, number, begin, end, _MEASURED) <= _SPLIT_EXCESS
+            few = pieces.take(rows)
+            fits[rows] = self._follows(few, tolerance, at_quarters=False)
+            fits[rows] &= self._excess(few, _MEASURED) <= _SPLIT_EXCESS
         return fits
 
-    def _follows(
-        self, begin: Indices, end: Indices, tolerance: float, *, at_quarters: bool
-    ) -> Flags:
+    def _follows(self, pieces: _Pieces, tolerance: float, *, at_quarters: bool) -> Flags:
         """Return whether they do at all half steps, or at those next to the quarters."""
+        begin, end = pieces.begin, pieces.end
         exact, times = self._points, self._points.times
         steps = 2 * (end - begin)
         piece, inner = counted(np.full(len(begin), 3) if at_quarters else steps - 1)
         rows = 2 * begin[piece] + (inner * steps[piece] // 4 if at_quarters else inner)
-        spline, number = self._spline(begin, end)
-        made = spline.rows(number[piece], times[rows] - times[2 * begin[piece]])
+        made = pieces.spline.rows(pieces.number[piece], times[rows] - times[2 * begin[piece]])
         limits = self._limits[0][rows], self._limits[1][rows]
         worst = np.maximum.reduce(
             [
@@ -164,30 +175,23 @@ class _HalfSteps:
         """Return the greatest ratio of an acceleration to its limit on shortest pieces (r,)."""
         if not len(begin):
             return np.empty(0)
-        return self._excess(*self._spline(begin, begin + 1), begin, begin + 1, _QUARTERS)
+        return self._excess(self._pieces(begin, begin + 1), _QUARTERS)
 
-    def _excess(
-        self,
-        spline: ToolSpline,
-        number: Indices,
-        begin: Indices,
-        end: Indices,
-        parts: tuple[float, ...],
-    ) -> Floats:
-        """Return the greatest such ratio (r,) at some parts of the time between grid times."""
-        count = len(parts)
-        t = ((self.grid[end] - self.grid[begin])[:, None] * parts).ravel()
-        _, accelerations = spline.rates(np.repeat(number, count), t)
-        s = np.interp(np.repeat(self.grid[begin], count) + t, self._points.times, self._s)
+    def _excess(self, pieces: _Pieces, parts: tuple[float, ...]) -> Floats:
+        """Return the greatest such ratio (r,) at some parts of the time of each piece."""
+        count, begin = len(parts), self.grid[pieces.begin]
+        t = ((self.grid[pieces.end] - begin)[:, None] * parts).ravel()
+        _, accelerations = pieces.spline.rates(np.repeat(pieces.number, count), t)
+        s = np.interp(np.repeat(begin, count) + t, self._points.times, self._s)
         ratios = _ratios(accelerations, self._law.acceleration_limits(s))
         largest: Floats = ratios.reshape(-1, count).max(axis=1)
         return largest
 
-    def _spline(self, begin: Indices, end: Indices) -> tuple[ToolSpline, Indices]:
-        """Return a spline with quintics between grid times, and their numbers on it (r,)."""
+    def _pieces(self, begin: Indices, end: Indices) -> _Pieces:
         knots = np.unique(np.concatenate([begin, end]))
         # The spline also has pieces across the gaps between the given ones.
-        return ToolSpline.through(self.points(2 * knots)), np.searchsorted(knots, begin)
+        spline = ToolSpline.through(self.points(2 * knots))
+        return _Pieces(spline, np.searchsorted(knots, begin), begin, end)
 
 
 def _points_at(law: SectionLaw, times: Floats, at: PathTimes) -> ToolPoints:
