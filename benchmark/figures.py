@@ -11,7 +11,8 @@ import json
 from math import floor, isnan, log10
 import os
 import platform
-from time import perf_counter, strftime
+from time import perf_counter, process_time, strftime
+import tracemalloc
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,14 +101,35 @@ def median(values: Sequence[float]) -> float:
     return percentile(values, 50.0)
 
 
-def seconds(function: Callable[[], object], repeat: int = 5) -> float:
+def seconds(
+    function: Callable[[], object], repeat: int = 5, clock: Callable[[], float] = perf_counter
+) -> float:
     """Return the shortest time of some calls [s]: other processes can only make it longer."""
     times = []
     for _ in range(repeat):
-        start = perf_counter()
+        start = clock()
         function()
-        times.append(perf_counter() - start)
+        times.append(clock() - start)
     return min(times)
+
+
+def processor_seconds(function: Callable[[], object], repeat: int = 5) -> float:
+    """Return the least processor time of some calls [s], which other processes hardly change."""
+    return seconds(function, repeat, process_time)
+
+
+def memory_of(function: Callable[[], object]) -> tuple[int, int]:
+    """Return the peak memory of a call, and what its result keeps [bytes]; by tracemalloc."""
+    function()  # what is imported or cached once is not counted
+    gc.collect()
+    tracemalloc.start()
+    before, _ = tracemalloc.get_traced_memory()
+    kept = function()
+    gc.collect()
+    after, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    del kept
+    return peak - before, after - before
 
 
 def seconds_each(function: Callable[[], object], budget: float = 0.2) -> float:

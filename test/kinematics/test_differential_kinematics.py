@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates, tool_rates
+from ur_cartesian_driver.kinematics.differential_kinematics import (
+    joint_rates,
+    largest_joint_rates,
+    tool_rates,
+)
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
 
@@ -55,6 +59,24 @@ def test_joint_rates_invert_tool_rates(arm):
     qd, qdd = joint_rates(arm, TOOL, A, *tool_rates(arm, TOOL, A, B, C))
     np.testing.assert_allclose(qd, B, atol=1e-8)
     np.testing.assert_allclose(qdd, C, atol=1e-8)
+
+
+def test_no_motion_of_the_tool_exceeds_the_largest_joint_rates(arm):
+    speed, turn_rate, acceleration, turn_acceleration = 0.3, 0.5, 2.0, 3.0
+    qd_bound, qdd_bound = largest_joint_rates(
+        arm, TOOL, A, (speed, turn_rate), (acceleration, turn_acceleration)
+    )
+    reached = np.zeros(6)
+    for _ in range(200):
+        way = RANDOM.normal(size=(4, len(A), 3))
+        way /= np.linalg.norm(way, axis=2)[:, :, None]
+        twist = np.concatenate([speed * way[0], turn_rate * way[1]], axis=1)
+        change = np.concatenate([acceleration * way[2], turn_acceleration * way[3]], axis=1)
+        qd, qdd = joint_rates(arm, TOOL, A, twist, change)
+        assert (np.abs(qd) <= qd_bound * (1.0 + 1e-9)).all()
+        assert (np.abs(qdd) <= qdd_bound * (1.0 + 1e-9)).all()
+        reached = np.maximum(reached, (np.abs(qd) / qd_bound).max(axis=0))
+    assert (reached > 0.8).all()  # the bounds are close
 
 
 def test_an_arm_at_rest_in_a_singularity_has_rates_of_zero(arm):

@@ -90,7 +90,7 @@ from ur_cartesian_driver.planning.request.point_events.stops import Stops
 from ur_cartesian_driver.planning.request.program_features import time_remarks
 from ur_cartesian_driver.planning.request.validate import check
 from ur_cartesian_driver.planning.rounded.rounded_planner import plan_rounded_path
-from ur_cartesian_driver.planning.rounded.rounded_report import RoundedReport
+from ur_cartesian_driver.planning.rounded.rounded_report import planned_rows, RoundedReport
 from ur_cartesian_driver.planning.spline.spline_planner import (
     plan_spline,
     SplineState,
@@ -249,7 +249,7 @@ def plan_rounded_goal(planner: GoalPlanner) -> Plan:
         options,
         planner.stops.waypoints,
     )
-    report = RoundedReport(goal, motion)
+    report = RoundedReport(motion)
     clearance = clearance_lines(
         planner.arm,
         tool_tips(goal, planner.T_flange_active),
@@ -261,9 +261,9 @@ def plan_rounded_goal(planner: GoalPlanner) -> Plan:
     )
     planned = planner.plan(
         goal,
-        report.segments(),
+        planned_rows(motion, report),
         motion.reference,
-        [*ignored_remarks(goal), *clearance, *report.remarks()],
+        [*ignored_remarks(goal), *clearance, *report.remarks],
         cache(partial(report.slow_stretches, slower_by(goal))),
         motion.point_times,
     )

@@ -4,7 +4,9 @@
 
 from collections import Counter
 from dataclasses import replace
+import gc
 from math import sqrt
+import tracemalloc
 
 from curve_distance import distances
 from forward_model import dh_forward, pose_matrix
@@ -280,6 +282,29 @@ def test_paths_of_any_size_and_reversals_are_planned(cell, places, deviation):
     found = plan(goal, cell.state, cell.arm, OPTIONS)
     end = cell.arm.forward(found.rows.joints[-1].tolist()) @ cell.T_flange_tcp
     assert end.distance_to(goal.waypoints[-1].pose) < 1e-6
+
+
+def test_a_plan_keeps_no_more_memory_than_a_spline_through_the_same_points(cell):
+    # Zigzag: a corner at every point, and a fifth of a second from one to the next.
+    points = [cell.point(5e-4 * k, 0.01 * (k % 2)) for k in range(1, 200)]
+    rounded = Goal(waypoints=tuple(points), corner_deviation=1e-4)
+    spline = Goal(
+        waypoints=tuple(replace(point, time=5.0 + 0.2 * k) for k, point in enumerate(points)),
+        execution=ExecutionMode.SPLINE,
+    )
+
+    def kept(goal):
+        plan(goal, cell.state, cell.arm, OPTIONS)  # what is made only once does not count
+        gc.collect()
+        tracemalloc.start()
+        found = plan(goal, cell.state, cell.arm, OPTIONS)
+        gc.collect()
+        size, _ = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        assert len(found.segments) > 100
+        return size
+
+    assert kept(rounded) <= kept(spline)
 
 
 def test_times_are_refused(cell):

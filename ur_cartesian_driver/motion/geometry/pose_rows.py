@@ -45,6 +45,12 @@ def conjugate_rows(a: Floats) -> Floats:
     return inverse
 
 
+def length_rows(vectors: Floats) -> Floats:
+    """Return the lengths of vectors (n, k); np.linalg.norm takes several times as long."""
+    lengths: Floats = np.sqrt(np.einsum('ij,ij->i', vectors, vectors))
+    return lengths
+
+
 def distance_rows(a: Floats, b: Floats) -> Floats:
     """Return the distances of positions (n, 3 or more) [m]; huge distances do not overflow."""
     x, y, z = (b[:, :3] - a[:, :3]).T

@@ -28,6 +28,8 @@ from ur_cartesian_driver.planning.geometry.blend_shapes import (
     fillet_rows,
 )
 from ur_cartesian_driver.planning.geometry.curves import (
+    arc_rows,
+    ArcCurve,
     JointLineCurve,
     MAX_TURN_PER_SAMPLE,
     SegmentCurve,
@@ -131,9 +133,15 @@ class CurveRows:
         rows = np.empty((len(u), 7))
         lines = row[on_line]
         rows[on_line] = interpolate_rows(self.start[lines], self.end[lines], u[on_line])
-        for k in np.unique(row[~on_line]).tolist():
+        numbers, number = np.unique(row[~on_line], return_inverse=True)
+        curves = [self.others[k] for k in numbers.tolist()]
+        arcs = [curve for curve in curves if isinstance(curve, ArcCurve)]
+        if len(arcs) == len(curves):
+            rows[~on_line] = arc_rows(arcs, number, u[~on_line])
+            return rows
+        for k, curve in zip(numbers.tolist(), curves, strict=True):
             first, last = np.searchsorted(row, (k, k + 1))
-            rows[first:last] = self.others[k].rows(u[first:last])
+            rows[first:last] = curve.rows(u[first:last])
         return rows
 
     def trim(self, row: Indices, radius: Floats, *, at_end: bool = False) -> Floats:

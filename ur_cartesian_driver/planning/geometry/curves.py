@@ -11,6 +11,7 @@ adds the blends between them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import asin, atan2, ceil, degrees, hypot, pi, sqrt
 from typing import ClassVar, TypeAlias
@@ -18,7 +19,7 @@ from typing import ClassVar, TypeAlias
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose import (
     distance,
     multiply,
@@ -27,6 +28,7 @@ from ur_cartesian_driver.motion.geometry.pose import (
 )
 from ur_cartesian_driver.motion.geometry.pose_rows import (
     compose_rows,
+    cross_rows,
     distance_rows,
     interpolate_rows,
     multiply_rows,
@@ -130,19 +132,35 @@ class ArcCurve:
 
     def rows(self, u: Floats) -> Floats:
         """Return the poses (n, 7) at many ``u`` (n,)."""
-        rows = interpolate_rows(np.array([self.start.row()]), np.array([self.end.row()]), u)
-        spoke = subtract(self.start.position, self.center)  # at a right angle to the axis
-        angle, across = u[:, None] * self.sweep, cross(self.axis, spoke)
-        rows[:, :3] = self.center + np.cos(angle) * spoke + np.sin(angle) * across
-        if self.mode is ArcMode.FIXED:
-            turn = np.concatenate([np.sin(0.5 * angle) * self.axis, np.cos(0.5 * angle)], axis=1)
-            rows[:, 3:] = normalized_rows(multiply_rows(turn, np.array([self.start.quaternion])))
-        return rows
+        return arc_rows([self], np.zeros(len(u), dtype=np.intp), u)
 
     def trim(self, radius: float, *, at_end: bool) -> float:
         """Return the ``u`` at a distance ``radius`` [m] from the start of the arc, or its end."""
         u = min(1.0, 2.0 * asin(min(1.0, 0.5 * radius / self.radius)) / self.sweep)
         return 1.0 - u if at_end else u
+
+
+def arc_rows(arcs: Sequence[ArcCurve], number: Indices, u: Floats) -> Floats:
+    """
+    Return poses (n, 7) on many arcs.
+
+    :param number: (n,) the arc of each pose.
+    :param u: (n,) its place on the arc.
+    """
+    starts = np.array([arc.start.row() for arc in arcs])
+    centers, axes = (np.array([getattr(arc, name) for arc in arcs]) for name in ('center', 'axis'))
+    spokes = starts[:, :3] - centers  # at a right angle to the axes
+    ends = np.array([arc.end.row() for arc in arcs])
+    rows = interpolate_rows(starts[number], ends[number], u)
+    angle = (u * np.array([arc.sweep for arc in arcs])[number])[:, None]
+    across = cross_rows(axes, spokes)
+    rows[:, :3] = centers[number] + np.cos(angle) * spokes[number] + np.sin(angle) * across[number]
+    fixed = np.array([arc.mode is ArcMode.FIXED for arc in arcs])[number]
+    if fixed.any():
+        half, arc = 0.5 * angle[fixed], number[fixed]
+        turn = np.concatenate([np.sin(half) * axes[arc], np.cos(half)], axis=1)
+        rows[fixed, 3:] = normalized_rows(multiply_rows(turn, starts[arc, 3:]))
+    return rows
 
 
 @dataclass(frozen=True, slots=True)

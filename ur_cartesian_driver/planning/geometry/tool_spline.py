@@ -83,24 +83,33 @@ class ToolSpline:
         begin, end = slice(None, -1), slice(1, None)
         x, v, a = points.poses[:, :3], points.twists, points.accelerations
         orientations = points.poses[:, 3:]
-        turn = log_rows(multiply_rows(orientations[end], conjugate_rows(orientations[begin])))
-        zero = np.zeros_like(turn)
         between = quintic_rows if points.quintic else cubic_rows
         durations = np.diff(points.times)
+        positions = between(
+            durations,
+            MotionRows(x[begin], v[begin, :3], a[begin, :3]),
+            MotionRows(x[end], v[end, :3], a[end, :3]),
+        )
+        turns = np.zeros_like(positions)
+        rates = np.concatenate([v[:, 3:], a[:, 3:]], axis=1)
+        changes = np.concatenate(
+            [rates[begin], rates[end], orientations[end] - orientations[begin]], axis=1
+        )
+        turning = np.flatnonzero(changes.any(axis=1))
+        if len(turning):
+            to, since = orientations[end][turning], orientations[begin][turning]
+            turn = log_rows(multiply_rows(to, conjugate_rows(since)))
+            # At the start of a piece the vector is 0, so its derivatives are the angular rates.
+            turns[turning] = between(
+                durations[turning],
+                MotionRows(np.zeros_like(turn), v[begin, 3:][turning], a[begin, 3:][turning]),
+                rotation_rates(turn, v[end, 3:][turning], a[end, 3:][turning]),
+            )
         return cls(
             times=points.times,
             orientations=orientations[begin],
-            positions=between(
-                durations,
-                MotionRows(x[begin], v[begin, :3], a[begin, :3]),
-                MotionRows(x[end], v[end, :3], a[end, :3]),
-            ),
-            # At the start of a piece the vector is 0, so its derivatives are the angular rates.
-            turns=between(
-                durations,
-                MotionRows(zero, v[begin, 3:], a[begin, 3:]),
-                rotation_rates(turn, v[end, 3:], a[end, 3:]),
-            ),
+            positions=positions,
+            turns=turns,
         )
 
     def rows(self, piece: Indices, t: Floats) -> ToolRows:
@@ -110,19 +119,37 @@ class ToolSpline:
         :param piece: (m,) the piece to which each time belongs.
         :param t: (m,) time since this piece began [s].
         """
-        return ToolRows(self.poses(piece, t), *self.rates(piece, t))
+        x = evaluate(self.positions[piece], t)
+        orientations = self.orientations[piece]
+        w, e = np.zeros_like(x.v), np.zeros_like(x.a)
+        rows = self._turning(piece)
+        if len(rows):
+            turn = evaluate(self.turns[piece[rows]], t[rows])
+            w[rows], e[rows] = angular_rates(turn)
+            orientations[rows] = _turned(turn.x, orientations[rows])
+        return ToolRows(
+            np.concatenate([x.x, orientations], axis=1),
+            np.concatenate([x.v, w], axis=1),
+            np.concatenate([x.a, e], axis=1),
+        )
 
     def rates(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
         """Return the twists and the accelerations that :meth:`rows` returns, (m, 6) each."""
-        x, turn = evaluate(self.positions[piece], t), evaluate(self.turns[piece], t)
-        w, e = angular_rates(turn)
-        return np.concatenate([x.v, w], axis=1), np.concatenate([x.a, e], axis=1)
+        _, twists, accelerations = self.rows(piece, t)
+        return twists, accelerations
 
     def poses(self, piece: Indices, t: Floats) -> Floats:
         """Return the poses (m, 7) that :meth:`rows` returns."""
-        position, turn = self.vectors(piece, t)
-        turned = multiply_rows(exp_rows(turn), self.orientations[piece])
-        return np.concatenate([position, normalized_rows(turned)], axis=1)
+        position, orientations = values(self.positions[piece], t), self.orientations[piece]
+        rows = self._turning(piece)
+        if len(rows):
+            turn = values(self.turns[piece[rows]], t[rows])
+            orientations[rows] = normalized_rows(multiply_rows(exp_rows(turn), orientations[rows]))
+        return np.concatenate([position, orientations], axis=1)
+
+    def _turning(self, piece: Indices) -> Indices:
+        """Return the rows of pieces (m,) on which the tool turns: often none."""
+        return np.flatnonzero(np.any(self.turns, axis=(1, 2))[piece])
 
     def vectors(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
         """Return positions [m] and rotation vectors since the piece began [rad], (m, 3) each."""
@@ -144,6 +171,11 @@ class ToolSpline:
             positions=self.positions * powers,
             turns=self.turns * powers,
         )
+
+
+def _turned(turns: Floats, orientations: Floats) -> Floats:
+    """Return orientations (m, 4) turned by rotation vectors (m, 3)."""
+    return normalized_rows(multiply_rows(exp_rows(turns), orientations))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

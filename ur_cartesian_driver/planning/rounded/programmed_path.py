@@ -40,13 +40,14 @@ _CHORD_ERROR = 2e-6
 _CHORD_TURN = radians(2.0)
 #: Steps shorter than this [m] count as no motion.
 _NO_STEP = 1e-9
+#: Quaternions that differ by less than this are the same.
+_NO_TURN = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ProgrammedSection:
-    """A section of the programmed path, from rest to rest."""
+class SegmentEnds:
+    """Where the segments of a section end."""
 
-    polyline: Polyline
     #: (k,) the segments of the goal that the section contains, in order.
     segments: Indices
     #: (k,) the place s at which each of these segments ends.
@@ -55,9 +56,16 @@ class ProgrammedSection:
     def locate(self, s: Floats) -> tuple[Indices, Floats]:
         """Return the segment of each place s (m,), and the fraction of the segment there (m,)."""
         row = np.minimum(np.searchsorted(self.ends, s, side='left'), len(self.ends) - 1)
-        begin = np.where(row > 0, self.ends[row - 1], self.polyline.s[0])
+        begin = np.where(row > 0, self.ends[row - 1], 0.0)
         length = np.maximum(self.ends[row] - begin, _NO_STEP)
         return self.segments[row], np.clip((s - begin) / length, 0.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ProgrammedSection(SegmentEnds):
+    """A section of the programmed path, from rest to rest; it begins at s = 0."""
+
+    polyline: Polyline
 
 
 def programmed_sections(
@@ -87,6 +95,8 @@ def programmed_sections(
     number = np.arange(1, last[-1] + 1) - (last - count)[segment]
     rows = np.concatenate([curves.start[:1], curves.rows(segment, number / count[segment])])
     keep_hemisphere(rows)
+    if np.abs(rows[:, 3:] - rows[0, 3:]).max() < _NO_TURN:
+        rows[:, 3:] = rows[0, 3:]  # rounding errors would count as a tool that turns
     bounds = np.empty((len(rows), 2))
     bounds[:] = CURVE_BOUNDS
     bounds[last] = corners

@@ -4,14 +4,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.geometry.arrays import Floats, Int32s
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable, zeros
+from ur_cartesian_driver.motion.geometry.arrays import Bytes, Floats, Singles
+from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
+from ur_cartesian_driver.motion.goal.goal_table import zeros
 from ur_cartesian_driver.motion.plan.move_rows import SplineRows
 from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SlowStretch
+from ur_cartesian_driver.planning.rounded.programmed_path import SegmentEnds
 from ur_cartesian_driver.planning.rounded.rounded_planner import RoundedMotion
 from ur_cartesian_driver.planning.rounded.section_law import SectionLaw
 
@@ -19,56 +23,45 @@ from ur_cartesian_driver.planning.rounded.section_law import SectionLaw
 _KEPT = 0.01
 #: The path reverses if the dot product of its unit directions before and after is below this.
 _REVERSAL = -0.5
+#: Decimal places of speeds [m/s] that single precision has.
+_DIGITS = 8
 
 
 class RoundedReport:
     """
-    The rows and lines of a plan with rounded corners.
+    What is said of a plan with rounded corners.
 
-    :param goal: the goal, expressed for the TCP with which it runs.
+    It keeps a few numbers for each place of the path, because texts are made only when they are
+    read, and a plan is kept until its motion ends.
     """
 
-    def __init__(self, goal: GoalTable, motion: RoundedMotion) -> None:
-        """Store goal and motion."""
-        self._goal, self._motion = goal, motion
+    def __init__(self, motion: RoundedMotion) -> None:
+        """Measure the motion."""
+        self._sections = [_SectionSpeeds.of(law) for law in motion.laws]
+        self._point_times = motion.point_times
+        self._piece_ends = motion.polynomials.times[1:]
+        #: (n,) the distance [m] by which the tool misses each point; -1 = it stops.
+        self.corner_deviations = np.full(len(motion.point_times), -1.0)
+        for law in motion.laws:
+            section = law.section
+            self.corner_deviations[section.segments[:-1]] = law.path.deviations(section.ends[:-1])[
+                :, 0
+            ]
+        #: The remarks on the whole motion.
+        self.remarks = self._remarks(motion)
 
-    def segments(self) -> PlannedRows:
-        """Return the pieces, each with the first point that is passed at its end or later."""
-        motion, polynomials = self._motion, self._motion.polynomials
-        path, ends = motion.path, polynomials.times[1:]
-        durations = np.round(np.diff(polynomials.times), 6)
-        waypoints = np.minimum(
-            np.searchsorted(motion.point_times, ends - 1e-6), len(motion.point_times) - 1
-        ).astype(np.int32)
-        n = len(durations)
-        return PlannedRows(
-            waypoints=waypoints,
-            lengths=np.diff(np.interp(polynomials.times, path.times, path.length)),
-            angles=np.diff(np.interp(polynomials.times, path.times, path.angle)),
-            durations=durations,
-            blend_entries=zeros(n, 5),
-            joints=polynomials.joints.x[1:],
-            primitives=SplineRows(
-                targets=polynomials.joints.x[1:],
-                velocities=polynomials.joints.v[1:],
-                accelerations=polynomials.joints.a[1:],
-                durations=durations,
-                quintic=np.ones(n, dtype=np.bool_),
-            ),
-            report_lines=LateLines(n, lambda: self._lines(waypoints)),
-        )
-
-    def _lines(self, waypoints: Int32s) -> list[str]:
+    def lines(self) -> list[str]:
         """Return the text of each piece: a line for each point that is passed on it, or ''."""
-        motion = self._motion
-        deviations = self.corner_deviations()
-        passed = np.searchsorted(
-            motion.polynomials.times[1:] + 1e-6, motion.point_times, side='left'
-        )
-        lines = [''] * len(waypoints)
+        passed = np.searchsorted(self._piece_ends + 1e-6, self._point_times, side='left')
+        lines = [''] * len(self._piece_ends)
         begin = 0.0
         for k, (row, time, deviation) in enumerate(
-            zip(passed.tolist(), motion.point_times.tolist(), deviations.tolist(), strict=True)
+            zip(
+                passed.tolist(),
+                self._point_times.tolist(),
+                self.corner_deviations.tolist(),
+                strict=True,
+            )
         ):
             row = min(row, len(lines) - 1)
             how = (
@@ -79,43 +72,24 @@ class RoundedReport:
             begin = time
         return lines
 
-    def corner_deviations(self) -> Floats:
-        """Return the distance (n,) [m] by which the tool misses each point; -1 = it stops."""
-        found = np.full(len(self._motion.point_times), -1.0)
-        for law in self._motion.laws:
-            section = law.section
-            found[section.segments[:-1]] = law.path.deviations(section.ends)[:-1, 0]
-        return found
-
-    def remarks(self) -> list[str]:
-        """Return the remarks on the whole motion."""
-        motion, polynomials = self._motion, self._motion.polynomials
-        kept = self._kept_length()
-        passed = self.corner_deviations()
-        widest = float(passed.max(initial=-1.0))
+    def _remarks(self, motion: RoundedMotion) -> list[str]:
+        polynomials = motion.polynomials
+        kept, total = np.sum([each.kept_length for each in self._sections], axis=0).tolist()
+        widest = float(self.corner_deviations.max(initial=-1.0))
         pieces = len(polynomials.piece)
-        total = float(polynomials.times[-1])
+        duration = float(polynomials.times[-1])
         return [
-            f'rounded corners: {100.0 * kept:.0f} % of the length at the speed that was asked, '
-            f'within {100.0 * _KEPT:.0f} %'
+            f'rounded corners: {100.0 * kept / total if total else 100.0:.0f} % of the length at '
+            f'the speed that was asked, within {100.0 * _KEPT:.0f} %'
             + (f'; points are passed within {1e3 * widest:.3f} mm' if widest >= 0.0 else ''),
-            f'joints: {pieces} quintic pieces in {total:.3f} s ({pieces / total:.0f} a second), '
-            f'which keep the tool within {1e3 * polynomials.distance:.3f} mm and '
+            f'joints: {pieces} quintic pieces in {duration:.3f} s ({pieces / duration:.0f} a '
+            f'second), which keep the tool within {1e3 * polynomials.distance:.3f} mm and '
             f'{polynomials.angle:.5f} rad of the rounded path',
             'assumed of the robot: speedj is followed within a step, the program steps in every '
             'cycle, a socket goes on after a pause; ur-cartesian check-robot --with-motion checks '
             'them (corner_*, steps_*, corner_pause); all else here is planned',
             motion.path.tightest_margins.remark,
         ]
-
-    def _kept_length(self) -> float:
-        """Return the fraction of the path length on which the tool has the requested speed."""
-        kept = total = 0.0
-        for law in self._motion.laws:
-            speed, asked, step = _speeds(law)
-            total += float(step.sum())
-            kept += float(step[speed >= (1.0 - _KEPT) * asked].sum())
-        return kept / total if total > 0.0 else 1.0
 
     def slow_stretches(self, slower_by: float) -> tuple[SlowStretch, ...]:
         """
@@ -124,76 +98,130 @@ class RoundedReport:
         :param slower_by: a speed is too low if it is more than this fraction below the requested
             one.
         """
-        laws = self._motion.laws
+        last = len(self._sections) - 1
         return tuple(
             stretch
-            for law in laws
-            for stretch in _slow_stretches(
-                law, slower_by, begins=law is laws[0], ends=law is laws[-1]
-            )
+            for k, section in enumerate(self._sections)
+            for stretch in section.slow_stretches(slower_by, begins=k == 0, ends=k == last)
         )
 
 
-def _speeds(law: SectionLaw) -> tuple[Floats, Floats, Floats]:
-    """Return, at each sample (m,), actual and requested tool speed [m/s] and step length [m]."""
-    samples = law.samples
-    rate = law.law.at(law.law.times_of(samples.s)).v
-    length = np.linalg.norm(samples.x1, axis=1)
-    step = np.gradient(samples.s) * length
-    return rate * length, law.asked, step
+def planned_rows(motion: RoundedMotion, report: RoundedReport) -> PlannedRows:
+    """Return the pieces, each with the first point that is passed at its end or later."""
+    polynomials, path = motion.polynomials, motion.path
+    durations = np.round(np.diff(polynomials.times), 6)
+    waypoints = np.minimum(
+        np.searchsorted(motion.point_times, polynomials.times[1:] - 1e-6),
+        len(motion.point_times) - 1,
+    ).astype(np.int32)
+    n, times = len(durations), path.times
+    return PlannedRows(
+        waypoints=waypoints,
+        lengths=np.diff(np.interp(polynomials.times, times, path.length)),
+        angles=np.diff(np.interp(polynomials.times, times, path.angle)),
+        durations=durations,
+        blend_entries=zeros(n, 5),
+        joints=polynomials.joints.x[1:],
+        primitives=SplineRows(
+            targets=polynomials.joints.x[1:],
+            velocities=polynomials.joints.v[1:],
+            accelerations=polynomials.joints.a[1:],
+            durations=durations,
+            quintic=np.ones(n, dtype=np.bool_),
+        ),
+        report_lines=LateLines(n, report.lines),
+    )
 
 
-def _slow_stretches(
-    law: SectionLaw, slower_by: float, *, begins: bool, ends: bool
-) -> list[SlowStretch]:
-    speed, asked, _ = _speeds(law)
-    slow = (speed < (1.0 - slower_by) * asked) & (np.linalg.norm(law.samples.x1, axis=1) > 1e-3)
-    edges = np.flatnonzero(np.diff(slow, prepend=False, append=False))
-    segments, fractions = law.section.locate(law.samples.s)
-    found = []
-    for begin, stop in edges.reshape(-1, 2).tolist():
-        slowest = begin + int(np.argmin(speed[begin:stop] / asked[begin:stop]))
-        # The corner of a place is at the nearer end of its segment.
-        point = max(int(segments[slowest]) - bool(fractions[slowest] < 0.5), 0)
-        cause, reason = _cause(law, begin, stop, point, begins=begins, ends=ends)
-        found.append(
-            SlowStretch(
-                first=int(segments[begin]),
-                first_fraction=float(fractions[begin]),
-                last=int(segments[stop - 1]),
-                last_fraction=float(fractions[stop - 1]),
-                asked=float(asked[slowest]),
-                lowest=float(max(speed[slowest], 0.0)),
-                cause=cause,
-                reason=reason,
-                point=point,
-            )
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _SectionSpeeds:
+    """The speed along a section at m places, and the limits there, in single precision."""
+
+    ends: SegmentEnds
+    s: Floats
+    #: (m,) planned and requested speed of the tool [m/s].
+    speed: Singles
+    asked: Singles
+    #: (m, 3) derivative of the position by s.
+    directions: Singles
+    #: (m,) the greatest ds/dt that limits allow, and the number of this limit among ``names``.
+    cap: Singles
+    limit: Bytes
+    names: tuple[str, ...]
+    #: The length of the path with the requested speed, and the whole length [m].
+    kept_length: tuple[float, float]
+
+    @classmethod
+    def of(cls, law: SectionLaw) -> _SectionSpeeds:
+        """Return the speeds of a law."""
+        times = law.law.sampled_times()
+        place, rate, _ = law.law.at(times)
+        s, caps = law.samples.s, np.stack(list(law.caps.values()))
+        limit, travel = np.argmin(caps, axis=0), length_rows(law.samples.x1)
+        speed, step = np.interp(s, place, rate) * travel, np.gradient(s) * travel
+        kept = float(step[speed >= (1.0 - _KEPT) * law.asked].sum())
+        return cls(
+            ends=SegmentEnds(segments=law.section.segments, ends=law.section.ends),
+            s=s,
+            speed=speed.astype(np.float32),
+            asked=law.asked.astype(np.float32),
+            directions=law.samples.x1.astype(np.float32),
+            cap=caps[limit, np.arange(len(s))].astype(np.float32),
+            limit=limit.astype(np.uint8),
+            names=tuple(law.caps),
+            kept_length=(kept, float(step.sum())),
         )
-    return found
 
+    def slow_stretches(self, slower_by: float, *, begins: bool, ends: bool) -> list[SlowStretch]:
+        """Return the slow stretches; ``begins``, ``ends``: the section is the first, the last."""
+        speed, asked = self.speed, self.asked
+        moves = np.abs(self.directions).max(axis=1) > 1e-3
+        slow = (speed < (1.0 - slower_by) * asked) & moves
+        edges = np.flatnonzero(np.diff(slow, prepend=False, append=False))
+        segments, fractions = self.ends.locate(self.s)
+        found = []
+        for begin, stop in edges.reshape(-1, 2).tolist():
+            slowest = begin + int(np.argmin(speed[begin:stop] / asked[begin:stop]))
+            # The corner of a place is at the nearer end of its segment.
+            point = max(int(segments[slowest]) - bool(fractions[slowest] < 0.5), 0)
+            cause, reason = self._cause(begin, stop, point, begins=begins, ends=ends)
+            found.append(
+                SlowStretch(
+                    first=int(segments[begin]),
+                    first_fraction=float(fractions[begin]),
+                    last=int(segments[stop - 1]),
+                    last_fraction=float(fractions[stop - 1]),
+                    asked=round(float(asked[slowest]), _DIGITS),
+                    lowest=round(float(max(speed[slowest], 0.0)), _DIGITS),
+                    cause=cause,
+                    reason=reason,
+                    point=point,
+                )
+            )
+        return found
 
-def _cause(
-    law: SectionLaw, begin: int, stop: int, point: int, *, begins: bool, ends: bool
-) -> tuple[SlowCause, str]:
-    directions = law.samples.x1[[max(begin - 1, 0), min(stop, len(law.samples.s) - 1)]]
-    if directions[0] @ directions[1] < _REVERSAL * np.prod(np.linalg.norm(directions, axis=1)):
-        return SlowCause.REVERSAL, f'the path reverses near point {point}'
-    if begin == 0 and begins:
-        return SlowCause.RAMP, 'the arm starts from rest'
-    if stop == len(law.samples.s) and ends:
-        return SlowCause.RAMP, 'the arm comes to rest'
-    if begin == 0 or stop == len(law.samples.s):
-        return SlowCause.STOP, f'the arm stops at point {point}'
-    own = slice(begin, stop)
-    lows = {name: float((cap[own]).min()) for name, cap in law.caps.items()}
-    name = min(lows, key=lambda each: lows[each])
-    if name in JOINT_NAMES:
-        return SlowCause.JOINT_LIMIT, f'of the speed limit of {name}'
-    if name == 'max_tool_speed':
-        return SlowCause.TOOL_LIMIT, 'of max_tool_speed'
-    what = {
-        'corner': 'the acceleration across the path',
-        'turn': 'the angular acceleration across the path',
-        'jerk': 'max_linear_jerk',
-    }.get(name, 'the acceleration')
-    return SlowCause.CORNER, f'of {what} at the corner near point {point}'
+    def _cause(
+        self, begin: int, stop: int, point: int, *, begins: bool, ends: bool
+    ) -> tuple[SlowCause, str]:
+        last = len(self.s)
+        rows = [max(begin - 1, 0), min(stop, last - 1)]
+        directions = self.directions[rows].astype(np.float64)
+        if directions[0] @ directions[1] < _REVERSAL * np.prod(length_rows(directions)):
+            return SlowCause.REVERSAL, f'the path reverses near point {point}'
+        if begin == 0 and begins:
+            return SlowCause.RAMP, 'the arm starts from rest'
+        if stop == last and ends:
+            return SlowCause.RAMP, 'the arm comes to rest'
+        if begin == 0 or stop == last:
+            return SlowCause.STOP, f'the arm stops at point {point}'
+        name = self.names[self.limit[begin + int(np.argmin(self.cap[begin:stop]))]]
+        if name in JOINT_NAMES:
+            return SlowCause.JOINT_LIMIT, f'of the speed limit of {name}'
+        if name == 'max_tool_speed':
+            return SlowCause.TOOL_LIMIT, 'of max_tool_speed'
+        what = {
+            'corner': 'the acceleration across the path',
+            'turn': 'the angular acceleration across the path',
+            'jerk': 'max_linear_jerk',
+        }.get(name, 'the acceleration')
+        return SlowCause.CORNER, f'of {what} at the corner near point {point}'

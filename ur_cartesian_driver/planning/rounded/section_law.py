@@ -17,25 +17,25 @@ from math import inf, sqrt
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
-from ur_cartesian_driver.kinematics.inverse_rows import solve_path
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose_rows import (
-    compose_rows,
     conjugate_rows,
+    length_rows,
     multiply_rows,
     normalized_rows,
 )
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
+from ur_cartesian_driver.planning.rounded.path_joints import path_joints, ToolPeaks
 from ur_cartesian_driver.planning.rounded.programmed_path import ProgrammedSection
 from ur_cartesian_driver.planning.rounded.rounded_path import PathRows, RoundedPath
 from ur_cartesian_driver.planning.rounded.time_law import (
-    fastest_law,
+    FastestLaw,
     LawLimits,
     lowered_over,
+    PathTimes,
     TimeLaw,
 )
 
@@ -64,6 +64,8 @@ _ANCHOR_TIME = 2.0
 _SLOWER = 1.5
 #: Times before and after a sample between which its jerk is measured [s].
 _JERK_STEP = 0.002
+#: Number of times that are measured at once, so that the intermediate arrays stay in the cache.
+_BLOCK = 8192
 _TINY = 1e-12
 _NEARLY = 1e-10
 
@@ -91,10 +93,9 @@ class ToolLimits:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CurveSamples:
-    """A rounded path at m places: tool in base and joints, with their derivatives by s."""
+    """The derivatives of a rounded path by s at m places: of the tool, in base."""
 
     s: Floats
-    poses: Floats
     #: (m, 3) first derivative of the position.
     x1: Floats
     #: (m, 3) second derivative of the position.
@@ -105,13 +106,6 @@ class CurveSamples:
     w1: Floats
     #: (m, 3) derivative of ``w1``.
     w2: Floats
-    #: (m, 6) joint positions [rad]. If the arm cannot follow the whole path, ``q``, ``q1`` and
-    #: ``q2`` are (m, 0); a later check of the plan refuses the path.
-    q: Floats
-    #: (m, 6) first derivative of the joint positions.
-    q1: Floats
-    #: (m, 6) second derivative of the joint positions.
-    q2: Floats
 
     @property
     def turns(self) -> bool:
@@ -119,33 +113,12 @@ class CurveSamples:
         return bool(self.w1.any() or self.w2.any())
 
 
-def sample_curve(
-    path: RoundedPath, s: Floats, kinematics: TcpKinematics, q_start: Joints
-) -> CurveSamples:
-    """Return the samples of a path at places (m,)."""
-    rows = path.rows(s)
-    poses, w1, w2 = tool_rows(rows)
-    x1, x2, x3 = rows.d1[:, :3], rows.d2[:, :3], rows.d3[:, :3]
-    solved = solve_path(
-        kinematics.arm, compose_rows(poses, kinematics.T_tcp_flange), q_start, skip_gaps=False
-    )
-    q = solved.q
-    if solved.found.all():
-        q1, q2 = joint_rates(
-            kinematics.arm,
-            kinematics.T_flange_tcp,
-            q,
-            np.concatenate([x1, w1], axis=1),
-            np.concatenate([x2, w2], axis=1),
-        )
-    else:
-        q = q1 = q2 = np.empty((len(s), 0))
-    return CurveSamples(s=s, poses=poses, x1=x1, x2=x2, x3=x3, w1=w1, w2=w2, q=q, q1=q1, q2=q2)
-
-
 def tool_rows(rows: PathRows) -> tuple[Floats, Floats, Floats]:
     """Return poses (m, 7), turns per unit of s (m, 3) and their derivatives (m, 3) in base."""
     quaternions = rows.x[:, 3:]
+    if not rows.d1[:, 3:].any() and not rows.d2[:, 3:].any():
+        none = np.zeros((len(quaternions), 3))
+        return rows.x, none, none
     inverse = (
         conjugate_rows(quaternions) / np.einsum('ij,ij->i', quaternions, quaternions)[:, None]
     )
@@ -174,10 +147,14 @@ class SectionLaw:
     ) -> None:
         """Find the time law."""
         self.section, self.path = section, path
-        self.samples = sample_curve(path, places(path, section.ends), kinematics, q_start)
-        row = self._rows(self.samples.s)
+        s = places(path, section.ends)
+        rows = path.rows(s)
+        poses, w1, w2 = tool_rows(rows)
+        x1, x2, x3 = (each[:, :3].copy() for each in rows[1:])
+        self.samples = CurveSamples(s=s, x1=x1, x2=x2, x3=x3, w1=w1, w2=w2)
+        row = self._rows(s)
         # Where two segments meet, the lower limits apply, because the next step is in the second.
-        after = np.minimum(row + np.isin(self.samples.s, section.ends), len(section.ends) - 1)
+        after = np.minimum(row + np.isin(s, section.ends), len(section.ends) - 1)
         self._limits_at = tool.at(row, after)
         self._tool, self._options, self._model = tool, options, kinematics.arm.model
         # More acceleration along the path needs a longer window for its jerk. A ramp to the speed
@@ -188,10 +165,20 @@ class SectionLaw:
         )
         self.window = max(_MIN_WINDOW, 2.0 * self._ramp / tool.jerk)
         #: By name of a limit: the greatest ds/dt that it allows at each place (m,).
-        self.caps = self._caps()
-        m = len(self.samples.s)
+        self.caps = self._tool_caps()
+        derivatives = np.concatenate([x1, w1], axis=1), np.concatenate([x2, w2], axis=1)
+        self._joints = path_joints(
+            kinematics, q_start, s, poses, derivatives, self._tool_peaks(), options
+        )
+        #: The configuration at the end of the section [rad].
+        self.q_end = self._joints.end or q_start
+        self.caps |= self._joint_caps()
+        self._speed = np.minimum.reduce(list(self.caps.values()))
+        self._fastest = FastestLaw(s, self._limits())
         #: Factor by which limits are tightened at each place if the averaged law exceeds them.
-        self._tightened = np.ones(m)
+        self._tightened = np.ones(len(s))
+        #: The last law, as its squares (m,), and its :meth:`excess` (m,).
+        self._measured = np.full(len(s), np.nan), np.zeros(len(s))
         self.law = self._fitted()
         #: Places, about :data:`_ANCHOR_TIME` apart, at which a grid of pieces begins anew.
         last = self.duration - 0.5 * _ANCHOR_TIME
@@ -207,6 +194,11 @@ class SectionLaw:
         """The requested speed of the tool at each place (m,) [m/s]."""
         return self._limits_at.speeds
 
+    @property
+    def jerk(self) -> float:
+        """The limit of the tool's jerk [m/s^3]."""
+        return self._tool.jerk
+
     def acceleration_limits(self, s: Floats) -> tuple[Floats, Floats]:
         """Return the limits of the tool's acceleration at places (m,) [m/s^2], [rad/s^2]."""
         row = self._rows(s)
@@ -214,9 +206,8 @@ class SectionLaw:
 
     def _rows(self, s: Floats) -> Indices:
         """Return, for places (m,), the rows that their segments have in the tool's limits."""
-        segments, _ = self.section.locate(s)
-        rows: Indices = segments - self.section.segments[0]
-        return rows
+        rows: Indices = np.searchsorted(self.section.ends, s, side='left')
+        return np.minimum(rows, len(self.section.ends) - 1)
 
     def slow_around(self, times: Floats) -> None:
         """
@@ -232,109 +223,149 @@ class SectionLaw:
             self._tightened[inside] *= _SLOWER
             self.law = self._fitted()
 
-    def _caps(self) -> dict[str, Floats]:
+    def _tool_caps(self) -> dict[str, Floats]:
         samples, tool, options = self.samples, self._limits_at, self._options
-        speed = np.maximum(np.linalg.norm(samples.x1, axis=1), _TINY)
-        turn = np.maximum(np.linalg.norm(samples.w1, axis=1), _TINY)
-        caps = {
+        speed = np.maximum(length_rows(samples.x1), _TINY)
+        turn = np.maximum(length_rows(samples.w1), _TINY)
+        return {
             'speed': np.minimum(tool.speeds / speed, tool.turn_rates / turn),
             'max_tool_speed': (options.max_tool_speed or inf) / speed,
-            'jerk': np.cbrt(tool.jerk / np.maximum(np.linalg.norm(samples.x3, axis=1), _TINY)),
+            'jerk': np.cbrt(tool.jerk / np.maximum(length_rows(samples.x3), _TINY)),
             'corner': _corner_speed(samples.x1, samples.x2, tool.accelerations),
             'turn': _corner_speed(samples.w1, samples.w2, tool.turn_accelerations),
         }
-        for k in range(samples.q1.shape[1]):
-            limit = self._model.max_joint_speed[k]
-            caps[JOINT_NAMES[k]] = limit / np.maximum(np.abs(samples.q1[:, k]), _TINY)
-        return caps
+
+    def _tool_peaks(self) -> ToolPeaks:
+        samples, fastest = self.samples, np.minimum.reduce(list(self.caps.values()))
+        travel, turn = length_rows(samples.x1), length_rows(samples.w1)
+        along = turn * self._ramp / np.maximum(travel, _TINY)
+        across = length_rows(samples.w2) * fastest**2
+        return ToolPeaks(
+            speed=float((travel * fastest).max()),
+            turn_rate=float((turn * fastest).max()),
+            acceleration=float(self._tool.accelerations.max()),
+            turn_acceleration=float(
+                np.minimum(along + across, self._limits_at.turn_accelerations).max()
+            ),
+        )
+
+    def _joint_caps(self) -> dict[str, Floats]:
+        return {
+            JOINT_NAMES[k]: self._model.max_joint_speed[k] / np.maximum(np.abs(column), _TINY)
+            for k, column in enumerate(self._joints.q1.T)
+        }
 
     def _limits(self) -> LawLimits:
-        samples, tool = self.samples, self._limits_at
-        bound = _AIM / self._tightened
+        samples, tool, joints = self.samples, self._limits_at, self._joints
+        travel = length_rows(samples.x1)
         return LawLimits(
-            speed=np.minimum.reduce(list(self.caps.values())),
+            speed=self._speed,
             # The acceleration along the path is one more column beside the joints.
-            first=np.column_stack([samples.q1, np.linalg.norm(samples.x1, axis=1)]),
-            second=np.column_stack([samples.q2, np.zeros(len(bound))]),
+            first=np.column_stack([joints.q1, travel]),
+            second=np.column_stack([joints.q2, np.zeros(len(travel))]),
             bound=np.column_stack(
                 [
-                    self._options.max_joint_acceleration
-                    * bound[:, None]
-                    * np.ones(samples.q1.shape),
-                    self._ramp * bound,
+                    np.full(joints.q1.shape, self._options.max_joint_acceleration),
+                    np.full(len(travel), self._ramp),
                 ]
             ),
             vectors=(
-                (samples.x1, samples.x2, tool.accelerations * bound),
-                *[(samples.w1, samples.w2, tool.turn_accelerations * bound)] * samples.turns,
+                (samples.x1, samples.x2, tool.accelerations),
+                *[(samples.w1, samples.w2, tool.turn_accelerations)] * samples.turns,
             ),
         )
 
     def _fitted(self) -> TimeLaw:
-        s, limits = self.samples.s, self._limits()
-        first = TimeLaw(s, fastest_law(s, limits), self.window)
-        reach = 0.5 * self.window
+        s, window = self.samples.s, self.window
+
+        def squares(speed: Floats) -> Floats:
+            return self._fastest.squares(speed, _AIM / self._tightened)
+
+        first = TimeLaw(s, squares(self._speed), window)
+        y, excess = self._measured
         for _ in range(_ROUNDS):
-            limits = self._limits()
-            slowed = limits.speed / np.sqrt(self._tightened)
-            limits = replace(limits, speed=lowered_over(slowed, first.times, reach))
-            law = TimeLaw(s, fastest_law(s, limits), self.window)
-            excess = self.excess(law)
+            slowed = self._speed / np.sqrt(self._tightened)
+            before, y = y, squares(lowered_over(slowed, first.times, 0.5 * window))
+            found = TimeLaw(s, y, window)
+            # Elsewhere the law is as it was, only later.
+            changed = np.where(y == before, 0.0, 1.0)
+            again = _largest_around(changed, found.times, 2.0 * window) > 0.0
+            excess[again] = self.excess(found, again)[again]
+            self._measured = y, excess
             if excess.max() <= 1.0:
                 break
-            wide = -lowered_over(-excess, law.times, self.window)
+            wide = _largest_around(excess, found.times, window)
             more = np.where(wide > _FAR, wide**_LESS, wide**_MORE)
             self._tightened *= np.where(wide > 1.0, more * _EXTRA, 1.0)
-        return law
+        return found
 
-    def _measured_times(self, law: TimeLaw) -> Floats:
-        """Return times near which each place is passed, closer together where limits change."""
+    def _measured_times(self, law: TimeLaw, at: Flags) -> Floats:
+        """Return times near which the law passes places, closer together where limits change."""
         tool = self._tool
         changes = np.flatnonzero(
             (np.diff(tool.accelerations) != 0.0) | (np.diff(tool.turn_accelerations) != 0.0)
         )
+        times = law.sampled_times(at)
+        if not len(changes):
+            return times
         passed = np.interp(self.section.ends[changes], self.samples.s, law.times)
         around = passed[:, None] + self.window * np.linspace(0.0, 1.5, _AROUND)
-        return np.sort(np.concatenate([law.sampled_times, around.ravel()]))
+        return np.sort(np.concatenate([times, around.ravel()]))
 
-    def excess(self, law: TimeLaw) -> Floats:
-        """Return the greatest ratio, at each place (m,), of a measured quantity to its limit."""
-        samples, tool, options = self.samples, self._tool, self._options
-        t = self._measured_times(law)
-        s, v, a = law.at(t)
-        at = np.clip(np.searchsorted(samples.s, s, side='right') - 1, 0, len(samples.s) - 2)
-        part = ((s - samples.s[at]) / (samples.s[at + 1] - samples.s[at]))[:, None]
-        row = self._rows(s)
+    def excess(self, law: TimeLaw, at: Flags) -> Floats:
+        """
+        Return the greatest ratio, at each place (m,), of a measured quantity to its limit.
+
+        :param at: (m,) the places at which it is measured, with both neighbours of each.
+        """
+        s, excess = self.samples.s, np.zeros(len(self.samples.s))
+        times = self._measured_times(law, at)
+        for begin in range(0, len(times), _BLOCK):
+            t = times[begin : begin + _BLOCK]
+            places = law.at(t)
+            row = np.clip(np.searchsorted(s, places.s, side='right') - 1, 0, len(s) - 2)
+            jerk = law.accelerations(t + _JERK_STEP) - law.accelerations(t - _JERK_STEP)
+            worst = self._excess_at(places, jerk / (2.0 * _JERK_STEP), row)
+            np.maximum.at(excess, row, worst)
+            np.maximum.at(excess, row + 1, worst)
+        return excess
+
+    def _excess_at(self, law: PathTimes, jerk: Floats, at: Indices) -> Floats:
+        """Return the greatest such ratio (b,) of a law at some times; ``at`` = places before."""
+        samples, tool, joints = self.samples, self._tool, self._joints
+        part = ((law.s - samples.s[at]) / (samples.s[at + 1] - samples.s[at]))[:, None]
+        row = self._rows(law.s)
 
         def rows(values: Floats) -> Floats:
-            found: Floats = values[at] + part * (values[at + 1] - values[at])
-            return found
+            found: Floats = values[at]
+            return found + part * (values[at + 1] - found)
 
-        v, a = v[:, None], a[:, None]
+        v, a, jerk = law.v[:, None], law.a[:, None], jerk[:, None]
+        square = v * v
         x1, x2 = rows(samples.x1), rows(samples.x2)
-        _, _, before = law.at(t - _JERK_STEP)
-        _, _, after = law.at(t + _JERK_STEP)
-        jerk = ((after - before) / (2.0 * _JERK_STEP))[:, None]
         values = [
-            np.linalg.norm(x1 * a + x2 * v * v, axis=1) / tool.accelerations[row],
-            np.linalg.norm(rows(samples.w1) * a + rows(samples.w2) * v * v, axis=1)
-            / tool.turn_accelerations[row],
-            np.linalg.norm(x1 * jerk + 3.0 * x2 * v * a + rows(samples.x3) * v**3, axis=1)
+            length_rows(x1 * a + x2 * square) / tool.accelerations[row],
+            length_rows(x1 * jerk + x2 * (3.0 * v * a) + rows(samples.x3) * (square * v))
             / tool.jerk,
             # Speeds have their limits at the places; between them they may be a little higher.
-            np.linalg.norm(x1 * v, axis=1) / (_SPEED_MARGIN * tool.speeds[row]),
+            length_rows(x1) * law.v / (_SPEED_MARGIN * tool.speeds[row]),
         ]
-        if samples.q1.shape[1]:
-            q1 = rows(samples.q1)
-            qdd = q1 * a + rows(samples.q2) * v * v
-            values.append(np.abs(qdd).max(axis=1) / options.max_joint_acceleration)
+        if samples.turns:
+            turn = length_rows(rows(samples.w1) * a + rows(samples.w2) * square)
+            values.append(turn / tool.turn_accelerations[row])
+        if joints.q1.shape[1]:
+            q1 = rows(joints.q1)
+            qdd = q1 * a + rows(joints.q2) * square
+            values.append(np.abs(qdd).max(axis=1) / self._options.max_joint_acceleration)
             speeds = np.abs(q1 * v) / (_SPEED_MARGIN * np.array(self._model.max_joint_speed))
             values.append(speeds.max(axis=1))
-        worst = np.maximum.reduce(values)
-        excess = np.zeros(len(samples.s))
-        np.maximum.at(excess, at, worst)
-        np.maximum.at(excess, at + 1, worst)
-        return excess
+        worst: Floats = np.maximum.reduce(values)
+        return worst
+
+
+def _largest_around(values: Floats, times: Floats, reach: float) -> Floats:
+    """Return, for each time (m,), the greatest value (m,) within ``reach`` [s] of it."""
+    return -lowered_over(-values, times, reach)
 
 
 def places(path: RoundedPath, ends: Floats) -> Floats:
@@ -365,5 +396,5 @@ def _corner_speed(first: Floats, second: Floats, bound: Floats) -> Floats:
     """Return the ds/dt (m,) at which the acceleration across the path reaches ``bound``."""
     square = np.maximum(np.einsum('ij,ij->i', first, first), _TINY)
     across = second - (np.einsum('ij,ij->i', first, second) / square)[:, None] * first
-    speed: Floats = np.sqrt(bound / np.maximum(np.linalg.norm(across, axis=1), _TINY))
+    speed: Floats = np.sqrt(bound / np.maximum(length_rows(across), _TINY))
     return speed

@@ -18,6 +18,7 @@ reaches (:func:`lowered_over`).
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple
@@ -25,10 +26,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
+from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
 
 # Number of halvings in a bisection.
 _HALVINGS = 30
 _TINY = 1e-12
+_JUST_BELOW = 1.0 - 1e-9
 # Whether a time just within reach counts must not depend on rounding errors [s].
 _NO_TIME = 1e-9
 # Newton's method finds times of places, unless the law nearly rests there [1/s].
@@ -56,24 +59,23 @@ class _Bounds:
     """Bounds of u for a given y: +-c - d y of joints, +-sqrt(r^2 - (n y)^2) - m y of vectors."""
 
     def __init__(self, limits: LawLimits) -> None:
+        self.c: list[Floats] = []
+        self.d: list[Floats] = []
         self.r: list[Floats] = []
         self.m: list[Floats] = []
         self.n: list[Floats] = []
         for first, second, bound in limits.vectors:
             square = np.maximum(np.einsum('ij,ij->i', first, first), _TINY**2)
             along = np.einsum('ij,ij->i', first, second) / square
-            across = np.linalg.norm(second - along[:, None] * first, axis=1)
             length = np.sqrt(square)
             self.r.append(bound / length)
             self.m.append(along)
-            self.n.append(across / length)
-        joints = self._joints_that_matter(limits)
-        first, second, bound = (
-            each[:, joints] for each in (limits.first, limits.second, limits.bound)
-        )
-        size = np.maximum(np.abs(first), _TINY)
-        self.c = bound / size
-        self.d = np.sign(first) * second / size
+            self.n.append(length_rows(second - along[:, None] * first) / length)
+        for k in np.flatnonzero(self._joints_that_matter(limits)):
+            first, second = limits.first[:, k], limits.second[:, k]
+            size = np.maximum(np.abs(first), _TINY)
+            self.c.append(limits.bound[:, k] / size)
+            self.d.append(np.sign(first) * second / size)
 
     def _joints_that_matter(self, limits: LawLimits) -> Flags:
         """Return whether each joint (k,) might reach its limit within the vectors' limits."""
@@ -89,35 +91,75 @@ class _Bounds:
     def take(self, rows: Indices | slice) -> _Bounds:
         """Return the bounds at some places."""
         found = object.__new__(_Bounds)
-        found.c, found.d = self.c[rows], self.d[rows]
-        found.r, found.m, found.n = (
-            [each[rows] for each in one] for one in (self.r, self.m, self.n)
-        )
+        for name in 'cdrmn':
+            setattr(found, name, [column[rows] for column in getattr(self, name)])
+        return found
+
+    def scaled(self, factor: Floats) -> _Bounds:
+        """Return the bounds with the limits of acceleration multiplied by factors (m,)."""
+        found = copy(self)
+        found.c, found.r = ([column * factor for column in each] for each in (self.c, self.r))
         return found
 
     def range(self, y: Floats) -> tuple[Floats, Floats]:
         """Return least and largest u (m,) at each place; NaN or least > largest = none allowed."""
-        high = (self.c - self.d * y[:, None]).min(axis=1, initial=inf)
-        low = (-self.c - self.d * y[:, None]).max(axis=1, initial=-inf)
+        high, low = np.full(len(y), inf), np.full(len(y), -inf)
+        for c, d in zip(self.c, self.d, strict=True):
+            middle = d * y
+            high, low = np.minimum(high, c - middle), np.maximum(low, -c - middle)
         for r, m, n in zip(self.r, self.m, self.n, strict=True):
-            root = np.sqrt(np.where(n * y <= r, r * r - (n * y) ** 2, np.nan))
-            high, low = np.minimum(high, root - m * y), np.maximum(low, -root - m * y)
+            across, middle = n * y, m * y
+            root = np.sqrt(np.where(across <= r, r * r - across * across, np.nan))
+            high, low = np.minimum(high, root - middle), np.maximum(low, -root - middle)
         return low, high
 
     def largest_before(self, step: Floats, after: Floats) -> Floats:
         """Return the largest y (m,) from which a step leads to at most ``after``."""
+        largest = np.full(len(after), inf)
         with np.errstate(divide='ignore', invalid='ignore'):
-            rate = 1.0 - step[:, None] * self.d
-            reached = (after[:, None] + step[:, None] * self.c) / rate
-            largest = np.where(rate > 0.0, reached, inf).min(axis=1, initial=inf)
+            for c, d in zip(self.c, self.d, strict=True):
+                rate = 1.0 - step * d
+                reached = (after + step * c) / rate
+                largest = np.minimum(largest, np.where(rate > 0.0, reached, inf))
             for r, m, n in zip(self.r, self.m, self.n, strict=True):
                 # (1 - step m) y - step sqrt(r^2 - n^2 y^2) <= after; where step m >= 1, any y fits
                 a, b = 1.0 - step * m, step * n
                 square = a * a + b * b
                 root = np.sqrt(square * (step * r) ** 2 - (b * after) ** 2)
                 largest = np.fmin(largest, np.where(a > 0.0, (a * after + root) / square, inf))
-        found: Floats = largest
-        return found
+        return largest
+
+
+class FastestLaw:
+    """
+    The fastest law along a path, for limits that may be tightened.
+
+    :param s: the places (m,), increasing.
+    :param limits: the limits as they are; those that no law can reach are left out.
+    """
+
+    def __init__(self, s: Floats, limits: LawLimits) -> None:
+        """Prepare the bounds."""
+        self._step, self._bounds = 2.0 * np.diff(s), _Bounds(limits)
+
+    def squares(self, speed: Floats, factor: Floats) -> Floats:
+        """
+        Return the square of the greatest possible ds/dt at places (m,); it is 0 at both ends.
+
+        :param speed: (m,) greatest ds/dt, not above that of the limits.
+        :param factor: (m,) factor on the limits of acceleration.
+        """
+        bounds, step = self._bounds.scaled(factor), self._step
+        y = _possible(bounds, speed**2)
+        y[0] = y[-1] = 0.0
+        y = _lowered(y, lambda row, after: bounds.take(row).largest_before(step[row], after))
+        back, step_back = bounds.take(slice(None, None, -1)), step[::-1]
+        # A step in the other direction begins in the later row.
+        after_step = back.take(slice(1, None))
+        return _lowered(
+            y[::-1],
+            lambda row, before: before + step_back[row] * after_step.take(row).range(before)[1],
+        )[::-1]
 
 
 def fastest_law(s: Floats, limits: LawLimits) -> Floats:
@@ -126,20 +168,13 @@ def fastest_law(s: Floats, limits: LawLimits) -> Floats:
 
     :param s: the places (m,), increasing.
     """
-    bounds = _Bounds(limits)
-    y = _possible(bounds, limits.speed**2)
-    y[0] = y[-1] = 0.0
-    step = 2.0 * np.diff(s)
-    y = _lowered(y, lambda row, after: bounds.take(row).largest_before(step[row], after))
-    back, step_back = bounds.take(slice(None, None, -1)), step[::-1]
-    return _lowered(
-        y[::-1],
-        lambda row, before: before + step_back[row] * back.take(row + 1).range(before)[1],
-    )[::-1]
+    return FastestLaw(s, limits).squares(limits.speed, np.ones(len(s)))
 
 
 def _possible(bounds: _Bounds, y: Floats) -> Floats:
     """Return the largest y (m,), but at most the given ones, at which some u is allowed."""
+    for r, n in zip(bounds.r, bounds.n, strict=True):
+        y = np.minimum(y, _JUST_BELOW * r / np.maximum(n, _TINY))
     low, high = bounds.range(y)
     rows = np.flatnonzero(~(low <= high))
     if not len(rows):
@@ -156,7 +191,7 @@ def _possible(bounds: _Bounds, y: Floats) -> Floats:
     return found
 
 
-def _lowered(y: Floats, reachable: Callable[[Indices, Floats], Floats]) -> Floats:
+def _lowered(y: Floats, reachable: Callable[[Indices | slice, Floats], Floats]) -> Floats:
     """
     Return the given y (m,), lowered until the step between each and the next is possible.
 
@@ -166,22 +201,21 @@ def _lowered(y: Floats, reachable: Callable[[Indices, Floats], Floats]) -> Float
         in these rows for which the step between the two is possible.
     """
     y = y.copy()
-
-    def largest(rows: Indices) -> Floats:
-        return np.maximum(reachable(rows, y[rows + 1]), 0.0)
-
-    every = np.arange(len(y) - 1)
-    while True:
-        falls = largest(every) < y[:-1] - _TINY
+    falls = np.maximum(reachable(slice(0, len(y) - 1), y[1:]), 0.0) < y[:-1] - _TINY
+    while falls.any():
         rows = np.flatnonzero(falls & ~np.append(falls[1:], False))
-        if not len(rows):
-            return y
+        changed = np.zeros(len(y), dtype=np.bool_)
         while len(rows):
-            lower = largest(rows)
-            falls = lower < y[rows] - _TINY
-            rows = rows[falls]
-            y[rows] = lower[falls]
+            lower = np.maximum(reachable(rows, y[rows + 1]), 0.0)
+            lowered = lower < y[rows] - _TINY
+            rows = rows[lowered]
+            y[rows] = lower[lowered]
+            changed[rows] = True
             rows = rows[rows > 0] - 1
+        # Steps to and from the other rows are as they were.
+        again = np.flatnonzero(falls | changed[:-1] | changed[1:])
+        falls[again] = np.maximum(reachable(again, y[again + 1]), 0.0) < y[again] - _TINY
+    return y
 
 
 class PathTimes(NamedTuple):
@@ -231,17 +265,31 @@ class TimeLaw:
         s, v, a = ((b - a) / self.window for a, b in zip(before, after, strict=True))
         return PathTimes(np.clip(s, self._s[0], self._s[-1]), v, a)
 
-    @property
-    def sampled_times(self) -> Floats:
-        """Times (2 m - 1,) near which the averaged law passes places, and between them [s]."""
+    def accelerations(self, t: Floats) -> Floats:
+        """Return d2s/dt2 of the averaged law at times (m,) from 0 to the duration [s]."""
+        before, after = (np.interp(each, self.times, self._v) for each in (t - self.window, t))
+        found: Floats = (after - before) / self.window
+        return found
+
+    def sampled_times(self, at: Flags | None = None) -> Floats:
+        """
+        Return times (k,) near which the averaged law passes places, and between them [s].
+
+        :param at: (m,) the places; each comes with its two neighbours. None = all.
+        """
         passed = self.times + 0.5 * self.window
-        return np.sort(np.concatenate([passed, 0.5 * (passed[1:] + passed[:-1])]))
+        between = 0.5 * (passed[1:] + passed[:-1])
+        if at is not None:
+            near = at[1:] | at[:-1]
+            passed = passed[np.append(near, False) | np.append(False, near)]
+            between = between[near]
+        return np.sort(np.concatenate([passed, between]))
 
     def times_of(self, s: Floats) -> Floats:
         """Return when the averaged law passes places (m,) [s]."""
         low = np.interp(s, self._s, self.times)
         high = low + self.window
-        known = np.concatenate([[0.0], self.sampled_times, [self.duration]])
+        known = np.concatenate([[0.0], self.sampled_times(), [self.duration]])
         t = np.clip(np.interp(s, self.at(known).s, known), low, high)
         for _ in range(_NEWTON_STEPS):
             place, v, _ = self.at(t)

@@ -11,11 +11,14 @@ and pieces elsewhere are only shifted in time.
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
-from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
-from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, distance_rows
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, length_rows
+from ur_cartesian_driver.planning.geometry.curves import ARC_CHORD_ERROR
+from ur_cartesian_driver.planning.geometry.samples import counted, STEP_ANGLE, STEP_LENGTH
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.rounded.section_law import SectionLaw, tool_rows
 from ur_cartesian_driver.planning.rounded.time_law import PathTimes
@@ -23,41 +26,172 @@ from ur_cartesian_driver.planning.spline.joint_polynomials import ANGLE_TOLERANC
 
 #: Shortest time of a piece [s] that robot program and sockets sustain over any number of pieces.
 MIN_PIECE_TIME = 0.02
-#: Greatest acceptable ratio of an acceleration inside a piece to its limit.
-CLOSE_ENOUGH = 1.017
+#: Greatest acceptable ratio of an acceleration inside a shortest piece to its limit; inside pieces
+#: that can be split; and of the jerk there to the limit of the law.
+CLOSE_ENOUGH, _SPLIT_EXCESS, _SPLIT_JERK = 1.017, 1.012, 1.01
 #: Greatest number of times that the law is slowed around pieces that are too coarse.
 TRIES = 6
 #: Number of shortest pieces that are joined into one at first; the result is split as necessary.
 _JOINED = 8
-#: Number of samples inside a piece at which it is compared with the law, and at which only its
-#: accelerations are measured.
-_COMPARED, _MEASURED = 7, 3
+#: Where inside a shortest piece its accelerations are measured; and inside one that can be split,
+#: beside the half steps: it may have most acceleration close to its ends.
+_QUARTERS, _MEASURED = (0.25, 0.5, 0.75), (0.08, 0.16, 0.3, 0.42, 0.58, 0.7, 0.84, 0.92)
 #: Greatest error of the acceleration, as a fraction of its limit, on pieces that can be split.
-_ACCELERATION_PART = 0.02
+_ACCELERATION_PART = 0.15
+#: Greatest error [m] along the path of a place between two samples, by its time.
+_TIME_ERROR = 2e-5
+#: A tool slower than this [m/s] rests.
+_REST = 1e-9
 
 
-def tool_knots(law: SectionLaw, tolerance: float) -> Floats:
+class ToolKnots(NamedTuple):
+    """The knots of a section."""
+
+    #: The tool at the n + 1 knots; times are since the beginning of the section.
+    points: ToolPoints
+    #: (n,) the number of samples between them that describe the path.
+    sample_count: Indices
+
+
+def tool_knots(law: SectionLaw, tolerance: float) -> ToolKnots:
     """
-    Return the knots (n,) [s], as few as possible, and slow the law where pieces are too coarse.
+    Return the knots, as few as possible, and slow the law where pieces are too coarse.
 
     :param tolerance: bound on deviations of the quintics from the law: of the position [m]; for
         turns, of the arc at ANGLE_TOLERANCE_RADIUS.
     """
     for attempt in range(TRIES + 1):
-        grid = _grid(law)
-        ends = _piece_ends(law, grid, tolerance)
-        times = grid[ends]
-        shortest = np.flatnonzero(np.diff(ends) == 1)
-        coarse = shortest[_accelerations(law, times, shortest) > CLOSE_ENOUGH]
+        steps = _HalfSteps(law)
+        ends = _piece_ends(steps, tolerance)
+        shortest = ends[:-1][np.diff(ends) == 1]
+        coarse = shortest[steps.excess(shortest) > CLOSE_ENOUGH]
         if not len(coarse) or attempt == TRIES:
             break
-        law.slow_around(np.stack([times[coarse], times[coarse + 1]], axis=1))
-    return times
+        law.slow_around(np.stack([steps.grid[coarse], steps.grid[coarse + 1]], axis=1))
+    return ToolKnots(steps.points(2 * ends), steps.sample_count(ends))
 
 
-def tool_points(law: SectionLaw, times: Floats) -> ToolPoints:
-    """Return pose and rates of the tool at times (m,) since the beginning of the section [s]."""
-    return _points_at(law, times, law.law.at(times))
+class _Pieces(NamedTuple):
+    """Quintics between rows of the grid, ``begin`` and ``end`` (r,), numbered on a spline."""
+
+    spline: ToolSpline
+    number: Indices
+    begin: Indices
+    end: Indices
+
+    def take(self, rows: Indices) -> _Pieces:
+        """Return some of them."""
+        return _Pieces(self.spline, self.number[rows], self.begin[rows], self.end[rows])
+
+
+class _HalfSteps:
+    """The law at the times of a grid and halfway between them: rows 0, 2, ... are on the grid."""
+
+    def __init__(self, law: SectionLaw) -> None:
+        self.grid = _grid(law)
+        times = np.empty(2 * len(self.grid) - 1)
+        times[::2], times[1::2] = self.grid, 0.5 * (self.grid[1:] + self.grid[:-1])
+        at = law.law.at(times)
+        self._law = law
+        self._points = _points_at(law, times, at)
+        self._s = at.s
+        self._limits = law.acceleration_limits(at.s)
+
+    def points(self, rows: Indices) -> ToolPoints:
+        """Return the law in some rows."""
+        points = self._points
+        return ToolPoints(
+            times=points.times[rows],
+            poses=points.poses[rows],
+            twists=points.twists[rows],
+            accelerations=points.accelerations[rows],
+            quintic=True,
+        )
+
+    def sample_count(self, ends: Indices) -> Indices:
+        """Return the number of samples between grid times: at most 2 mm and one degree apart."""
+        twists, accelerations = self._points.twists, self._points.accelerations[:, :3]
+        speed = length_rows(twists[:, :3])
+        along = np.einsum('ij,ij->i', twists[:, :3], accelerations) / np.maximum(speed, _REST)
+        size = length_rows(accelerations)
+        across = np.sqrt(np.maximum(size * size - along * along, 0.0))
+        density = np.maximum.reduce(
+            [
+                speed / STEP_LENGTH,
+                length_rows(twists[:, 3:]) / STEP_ANGLE,
+                np.sqrt(across / (8.0 * ARC_CHORD_ERROR)),
+                np.sqrt(size / (8.0 * _TIME_ERROR)),
+            ]
+        )
+        first, last = 2 * ends[:-1], 2 * ends[1:]
+        greatest = np.maximum(np.maximum.reduceat(density, first), density[last])
+        count: Indices = np.ceil(greatest * np.diff(self.grid[ends])).astype(np.intp)
+        return np.maximum(count, 1)
+
+    def fits(self, begin: Indices, end: Indices, tolerance: float) -> Flags:
+        """Return whether quintics between grid times (r,) follow the law closely enough."""
+        pieces = self._pieces(begin, end)
+        # Most that do not are off at a quarter, so few are compared at all half steps.
+        fits = self._follows(pieces, tolerance, at_quarters=True)
+        rows = np.flatnonzero(fits)
+        if len(rows):
+            few = pieces.take(rows)
+            fits[rows] = self._follows(few, tolerance, at_quarters=False)
+            fits[rows] &= self._excess(few, _MEASURED) <= _SPLIT_EXCESS
+        return fits
+
+    def _follows(self, pieces: _Pieces, tolerance: float, *, at_quarters: bool) -> Flags:
+        """Return whether they do at all half steps, or at those next to the quarters."""
+        begin, end = pieces.begin, pieces.end
+        exact, times = self._points, self._points.times
+        steps = 2 * (end - begin)
+        piece, inner = counted(np.full(len(begin), 3) if at_quarters else steps - 1)
+        rows = 2 * begin[piece] + (inner * steps[piece] // 4 if at_quarters else inner)
+        made = pieces.spline.rows(pieces.number[piece], times[rows] - times[2 * begin[piece]])
+        limits = self._limits[0][rows], self._limits[1][rows]
+        worst = np.maximum.reduce(
+            [
+                length_rows(exact.poses[rows, :3] - made.poses[:, :3]) / tolerance,
+                _ratios(made.accelerations - exact.accelerations[rows], limits)
+                / _ACCELERATION_PART,
+                _ratios(made.accelerations, limits) / _SPLIT_EXCESS,
+            ]
+        )
+        if not at_quarters:
+            # The jerk is measured over a whole step, from half step to half step.
+            accelerations = exact.accelerations[:, :3].copy()
+            accelerations[rows] = made.accelerations[:, :3]
+            jerk = length_rows(accelerations[rows + 1] - accelerations[rows - 1])
+            jerk /= times[rows + 1] - times[rows - 1]
+            worst = np.maximum(worst, jerk / (_SPLIT_JERK * self._law.jerk))
+        turned = np.flatnonzero(np.any(exact.poses[rows, 3:] != made.poses[:, 3:], axis=1))
+        if len(turned):
+            angle = angle_rows(exact.poses[rows[turned], 3:], made.poses[turned, 3:])
+            worst[turned] = np.maximum(worst[turned], ANGLE_TOLERANCE_RADIUS * angle / tolerance)
+        follows: Flags = np.maximum.reduceat(worst, np.flatnonzero(inner == 1)) <= 1.0
+        return follows
+
+    def excess(self, begin: Indices) -> Floats:
+        """Return the greatest ratio of an acceleration to its limit on shortest pieces (r,)."""
+        if not len(begin):
+            return np.empty(0)
+        return self._excess(self._pieces(begin, begin + 1), _QUARTERS)
+
+    def _excess(self, pieces: _Pieces, parts: tuple[float, ...]) -> Floats:
+        """Return the greatest such ratio (r,) at some parts of the time of each piece."""
+        count, begin = len(parts), self.grid[pieces.begin]
+        t = ((self.grid[pieces.end] - begin)[:, None] * parts).ravel()
+        _, accelerations = pieces.spline.rates(np.repeat(pieces.number, count), t)
+        s = np.interp(np.repeat(begin, count) + t, self._points.times, self._s)
+        ratios = _ratios(accelerations, self._law.acceleration_limits(s))
+        largest: Floats = ratios.reshape(-1, count).max(axis=1)
+        return largest
+
+    def _pieces(self, begin: Indices, end: Indices) -> _Pieces:
+        knots = np.unique(np.concatenate([begin, end]))
+        # The spline also has pieces across the gaps between the given ones.
+        spline = ToolSpline.through(self.points(2 * knots))
+        return _Pieces(spline, np.searchsorted(knots, begin), begin, end)
 
 
 def _points_at(law: SectionLaw, times: Floats, at: PathTimes) -> ToolPoints:
@@ -85,74 +219,32 @@ def _grid(law: SectionLaw) -> Floats:
     return np.concatenate(parts)
 
 
-def _piece_ends(law: SectionLaw, grid: Floats, tolerance: float) -> Indices:
+def _piece_ends(steps: _HalfSteps, tolerance: float) -> Indices:
     """Return the rows of the grid at which the pieces end that follow the law closely enough."""
+    last = len(steps.grid) - 1
     # The first piece is short, so that an output can be sent soon after the start.
-    ends = np.unique([0, 1, *range(_JOINED, len(grid) - 1, _JOINED), len(grid) - 1])
+    ends = np.unique([0, 1, *range(_JOINED, last, _JOINED), last])
     open_rows = np.arange(len(ends) - 1)
     while len(open_rows := open_rows[np.diff(ends)[open_rows] > 1]):
-        deviations, accelerations = _compared(law, grid[ends], open_rows, tolerance)
-        split = open_rows[(deviations > 1.0) | (accelerations > CLOSE_ENOUGH)]
+        begin, end = ends[open_rows], ends[open_rows + 1]
+        split = open_rows[~steps.fits(begin, end, tolerance)]
         ends = np.insert(ends, split + 1, (ends[split] + ends[split + 1]) // 2)
         moved = split + np.arange(len(split))
         open_rows = np.sort(np.concatenate([moved, moved + 1]))
+    # Halves of neighbours may make one piece: first the odd neighbours, then the even ones.
+    for first in (1, 2):
+        left = np.arange(first, len(ends) - 2, 2)
+        left = left[ends[left + 2] - ends[left] <= _JOINED]
+        if len(left):
+            joined = left[steps.fits(ends[left], ends[left + 2], tolerance)]
+            ends = np.delete(ends, joined + 1)
     return ends
-
-
-def _compared(
-    law: SectionLaw, times: Floats, rows: Indices, tolerance: float
-) -> tuple[Floats, Floats]:
-    """
-    Compare quintics with the law between their knots.
-
-    :param times: the knots [s].
-    :param rows: (r,) the knot at which each quintic begins.
-    :return: their deviations from the law (r,) as fractions of their bounds, and their
-        accelerations (r,) as fractions of their limits.
-    """
-    spline, number, t = _samples(law, times, rows, _COMPARED)
-    at = law.law.at(spline.times[number] + t)
-    exact = _points_at(law, spline.times[number] + t, at)
-    made = spline.rows(number, t)
-    limits = law.acceleration_limits(at.s)
-    deviations = np.maximum.reduce(
-        [
-            distance_rows(exact.poses, made.poses) / tolerance,
-            ANGLE_TOLERANCE_RADIUS * angle_rows(exact.poses[:, 3:], made.poses[:, 3:]) / tolerance,
-            _ratios(made.accelerations - exact.accelerations, limits) / _ACCELERATION_PART,
-        ]
-    )
-    accelerations = _ratios(made.accelerations, limits)
-    shape = len(rows), _COMPARED
-    return deviations.reshape(shape).max(axis=1), accelerations.reshape(shape).max(axis=1)
-
-
-def _accelerations(law: SectionLaw, times: Floats, rows: Indices) -> Floats:
-    """Return the accelerations that :func:`_compared` returns."""
-    spline, number, t = _samples(law, times, rows, _MEASURED)
-    _, accelerations = spline.rates(number, t)
-    limits = law.acceleration_limits(law.law.at(spline.times[number] + t).s)
-    largest: Floats = _ratios(accelerations, limits).reshape(-1, _MEASURED).max(axis=1)
-    return largest
-
-
-def _samples(
-    law: SectionLaw, times: Floats, rows: Indices, count: int
-) -> tuple[ToolSpline, Indices, Floats]:
-    """Return a spline, and for ``count`` samples inside each quintic its number and time on it."""
-    ends = np.unique(np.concatenate([rows, rows + 1]))
-    # The spline also has pieces across the gaps between ``rows``; these have no samples.
-    spline = ToolSpline.through(tool_points(law, times[ends]))
-    part = np.arange(1, count + 1) / (count + 1)
-    number = np.repeat(np.searchsorted(ends, rows), count)
-    return spline, number, (np.diff(times)[rows][:, None] * part).ravel()
 
 
 def _ratios(accelerations: Floats, limits: tuple[Floats, Floats]) -> Floats:
     """Return the ratios (m,) of accelerations (m, 6) to the limits of travel and turn."""
     linear, angular = limits
     ratios: Floats = np.maximum(
-        np.linalg.norm(accelerations[:, :3], axis=1) / linear,
-        np.linalg.norm(accelerations[:, 3:], axis=1) / angular,
+        length_rows(accelerations[:, :3]) / linear, length_rows(accelerations[:, 3:]) / angular
     )
     return ratios

@@ -41,7 +41,7 @@ _MIN_PIECE_TIME = 0.002
 # Decimal places of joint rates; further digits are rounding errors.
 _DIGITS = 12
 #: Minimum and maximum number of samples inside a piece at which the deviation is computed.
-_COMPARED_SAMPLES = 7, 23
+COMPARED_SAMPLES = 7, 23
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,6 +77,7 @@ def fit_joint_polynomials(
     tolerance: float,
     max_time: float = inf,
     min_time: float = 0.0,
+    compared: tuple[int, int] = COMPARED_SAMPLES,
 ) -> JointPolynomials:
     """
     Return the joint pieces for a spline path.
@@ -87,10 +88,12 @@ def fit_joint_polynomials(
     :param max_time: longest time of a piece [s].
     :param min_time: shortest time of a piece [s]; a piece that is not twice as long is kept, even
         if it deviates more.
+    :param compared: minimum and maximum number of samples inside a piece at which the deviation is
+        computed.
     :raises TooFast: even pieces of one controller cycle deviate too much.
     """
     bounds = np.array([tolerance, tolerance / ANGLE_TOLERANCE_RADIUS])
-    refinement = _PieceRefinement(kinematics, path, start, quintic, min_time)
+    refinement = _PieceRefinement(kinematics, path, start, quintic, min_time, compared)
     refinement.halve_longer_than(max_time)
     return refinement.refine_within(bounds)
 
@@ -105,9 +108,10 @@ class _PieceRefinement:
         start: MotionRows,
         quintic: bool,
         min_time: float,
+        compared: tuple[int, int],
     ) -> None:
         self.kinematics, self.path, self.quintic = kinematics, path, quintic
-        self._min_time = min_time
+        self._min_time, self._compared = min_time, compared
         self._sample_times = path.times
         spline = path.spline
         n = len(spline.positions)
@@ -115,7 +119,9 @@ class _PieceRefinement:
         self.piece = np.arange(n)
         #: The times of the joint pieces' ends [s].
         self.times = np.concatenate([spline.times[:1], to_ticks(spline.times[1:])])
-        joints = self._joints(self.piece, np.diff(spline.times), self.times[1:])
+        # The last sample of a piece is at its end.
+        ends = np.searchsorted(path.piece, self.piece, side='right') - 1
+        joints = self._rates(self.piece, np.diff(spline.times), path.q[ends])
         self.joints = MotionRows(
             *(np.concatenate([a, b]) for a, b in zip(start, joints, strict=True))
         )
@@ -148,15 +154,19 @@ class _PieceRefinement:
 
     def _joints(self, piece: Indices, t: Floats, times: Floats) -> MotionRows:
         """Return the joints at times ``t`` [s] from the beginnings of tool spline pieces."""
-        tool = self.path.spline.rows(piece, t)
         near = self.path.q[
             np.clip(np.searchsorted(self._sample_times, times), 0, len(self._sample_times) - 1)
         ]
-        q = nearest_rows(
-            self.kinematics.arm, compose_rows(tool.poses, self.kinematics.T_tcp_flange), near
-        )
+        flange = compose_rows(self.path.spline.poses(piece, t), self.kinematics.T_tcp_flange)
+        return self._rates(piece, t, nearest_rows(self.kinematics.arm, flange, near))
+
+    def _rates(self, piece: Indices, t: Floats, q: Floats) -> MotionRows:
+        """Return joint positions with the rates that the tool has at these times."""
         qd, qdd = joint_rates(
-            self.kinematics.arm, self.kinematics.T_flange_tcp, q, tool.twists, tool.accelerations
+            self.kinematics.arm,
+            self.kinematics.T_flange_tcp,
+            q,
+            *self.path.spline.rates(piece, t),
         )
         # The rates are rounded, so that they are exactly 0 at rest.
         return MotionRows(q, np.round(qd, _DIGITS) + 0.0, np.round(qdd, _DIGITS) + 0.0)
@@ -172,7 +182,7 @@ class _PieceRefinement:
         sample_count = np.searchsorted(self._sample_times, end) - np.searchsorted(
             self._sample_times, begin
         )
-        count = int(np.clip(sample_count.max(), *_COMPARED_SAMPLES))
+        count = int(np.clip(sample_count.max(), *self._compared))
         t = (end - begin)[:, None] * (np.arange(1, count + 1) / (count + 1))
         q = values(self._coefficients(rows), t).reshape(-1, 6)
         tool = tcp_rows(self.kinematics.arm, self.kinematics.T_flange_tcp, q)

@@ -109,6 +109,7 @@ def solve_spline_path(
     first: int,
     rests: bool,
     places: Callable[[Floats], tuple[Indices, Floats]] | None = None,
+    count: Indices | None = None,
 ) -> SplinePath:
     """
     Return the path of the arm along a spline.
@@ -117,17 +118,11 @@ def solve_spline_path(
     :param first: the number of the point at the end of the first segment.
     :param rests: whether the arm is at rest at the start.
     :param places: the segments over time, see :class:`ToolSplinePath`.
+    :param count: (n,) the number of samples of each piece, where the sizes of pieces are known to
+        be right; None = measured.
     """
-    coarse = coarse_samples(spline.times)
-    _check_sizes(kinematics, spline, coarse, first)
-    twists, accelerations = spline.rates(*coarse)
-    count = sample_count(
-        spline.times,
-        np.linalg.norm(twists[:, :3], axis=1),
-        np.linalg.norm(twists[:, 3:], axis=1),
-        np.linalg.norm(accelerations[:, :3], axis=1),
-        first,
-    )
+    if count is None:
+        count = _measured_count(kinematics, spline, first)
     n = len(count)
     pieces = CurvePieces(
         path=ToolSplinePath(spline, count, places),
@@ -159,6 +154,20 @@ def solve_spline_path(
         tightest_margins=tightest_margins(
             kinematics.arm, joint_path.q, measures, joint_path.segments, joint_path.fractions
         ),
+    )
+
+
+def _measured_count(kinematics: TcpKinematics, spline: ToolSpline, first: int) -> Indices:
+    """Return the number of samples of each piece, after a check of the sizes of the pieces."""
+    coarse = coarse_samples(spline.times)
+    _check_sizes(kinematics, spline, coarse, first)
+    twists, accelerations = spline.rates(*coarse)
+    return sample_count(
+        spline.times,
+        np.linalg.norm(twists[:, :3], axis=1),
+        np.linalg.norm(twists[:, 3:], axis=1),
+        np.linalg.norm(accelerations[:, :3], axis=1),
+        first,
     )
 
 
