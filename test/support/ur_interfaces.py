@@ -10,6 +10,7 @@ for each change of them. They are kept below ``build/``, and out of the environm
 from collections.abc import Iterator, Mapping
 import contextlib
 import ctypes
+import fcntl
 from hashlib import sha256
 import importlib
 from importlib.util import find_spec
@@ -52,13 +53,17 @@ def built_interfaces() -> Path | None:
     missing = [package for package in DEPENDENCIES if find_spec(package) is None]
     if not missing:
         return None
+    BUILD.mkdir(parents=True, exist_ok=True)
     prefix, stamp = BUILD / 'prefix', BUILD / 'stamp'
     digest = _digest(missing)
-    if not stamp.exists() or stamp.read_text() != digest:
-        shutil.rmtree(BUILD, ignore_errors=True)
-        for package in missing:
-            _build(package, prefix)
-        stamp.write_text(digest)
+    with BUILD.joinpath('lock').open('w') as lock:  # of tests that run beside this one
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not stamp.exists() or stamp.read_text() != digest:
+            for folder in ('prefix', 'source', 'cmake'):
+                shutil.rmtree(BUILD / folder, ignore_errors=True)
+            for package in missing:
+                _build(package, prefix)
+            stamp.write_text(digest)
     return prefix
 
 

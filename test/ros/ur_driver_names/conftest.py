@@ -8,6 +8,29 @@ from ur_driver_client import UrDriverClient
 from ur_interfaces import built_interfaces, importable
 
 from ur_cartesian_driver.ros.ur_driver_names.names_node import UrDriverNames
+from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
+
+WELD = """def weld():
+  while True:
+    sync()
+  end
+end
+"""
+
+
+@pytest.fixture
+def sim(request):
+    """Return a simulated robot that has a program of its own; a test may set more fields."""
+    config = SimulatorConfig(
+        rtde_port=0,
+        primary_port=0,
+        dashboard_port=0,
+        when_late='wait',
+        programs={'weld.urp': WELD},
+        **getattr(request, 'param', {}),
+    )
+    with SimulatedRobot(config) as robot:
+        yield robot
 
 
 @pytest.fixture(scope='session')

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The table of names: complete, and what the node offers."""
 
+import importlib.util
+from pathlib import Path
 import re
 
 import pytest
@@ -11,6 +13,7 @@ from ur_cartesian_driver.ros.ur_driver_names.offered_name import Absent
 
 pytestmark = pytest.mark.slow
 
+SCRIPT = Path(__file__).resolve().parents[3] / 'scripts' / 'make_ur_driver_names.py'
 #: What launch files, scripts and integration tests of the UR driver name, by its nodes.
 EXPECTED = {
     'dashboard_client': """
@@ -51,6 +54,15 @@ def test_the_table_has_each_name_once():
     assert len(names) == len(set(names))
     expected = {f'{node}/{name}' for node, text in EXPECTED.items() for name in text.split()}
     assert expected | {'joint_states'} <= set(names)
+
+
+@pytest.mark.skipif(not SCRIPT.is_file(), reason='only a checkout has the documents')
+def test_the_page_has_the_tables():
+    spec = importlib.util.spec_from_file_location('make_ur_driver_names', SCRIPT)
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    text = script.PAGE.read_text('utf-8')
+    assert text == script.page(text), 'run python scripts/make_ur_driver_names.py'
 
 
 def test_a_name_is_served_or_absent_with_a_reason():

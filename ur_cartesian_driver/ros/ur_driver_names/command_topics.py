@@ -70,11 +70,16 @@ class FreedriveTopic(UrName):
 
 
 class _FreedriveSwitch:
-    """Switches freedrive with the messages, and off when they stop."""
+    """
+    Switches freedrive with the messages, and off when they stop.
+
+    One call at a time: the driver would answer a request for freedrive that it is just about to
+    end with success.
+    """
 
     def __init__(self, name: str, driver: DriverNode, timeout: float) -> None:
         self._name, self._driver = name, driver
-        self._is_on = False
+        self._is_wanted = self._is_on = self._is_calling = False
         self._watchdog = driver.node.create_timer(
             timeout, self._late, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
@@ -84,25 +89,35 @@ class _FreedriveSwitch:
         """Take a request."""
         if message.data:
             self._watchdog.reset()
-        self._switch(message.data)
+            self._is_on = False  # for all that is known: a stop of the program ends freedrive
+        else:
+            self._watchdog.cancel()
+        self._is_wanted = message.data
+        self._follow()
 
     def _late(self) -> None:
         self._driver.warn(f'{self._name}: no message for too long, freedrive ends.')
-        self._switch(False)
+        self._watchdog.cancel()
+        self._is_wanted = False
+        self._follow()
 
-    def _switch(self, on: bool) -> None:
-        if not on:
-            self._watchdog.cancel()
-        if on == self._is_on:
+    def _follow(self) -> None:
+        """Make the driver do what is wanted, unless it is being told something already."""
+        on = self._is_wanted
+        if self._is_calling or on == self._is_on:
             return
-        self._is_on = on
-        request = SetBool.Request(data=on)
-        self._driver.call(SetBool, 'freedrive_mode', request).add_done_callback(self._switched)
+        self._is_calling = True
+        answer = self._driver.call(SetBool, 'freedrive_mode', SetBool.Request(data=on))
+        answer.add_done_callback(lambda done: self._switched(on, done.result()))
 
-    def _switched(self, done: Future[ServiceAnswer]) -> None:
-        if not done.result().ok:
-            self._is_on = False  # the next message tries again
-            self._driver.warn(f'{self._name}: {done.result().text}')
+    def _switched(self, on: bool, answer: ServiceAnswer) -> None:
+        self._is_calling = False
+        if answer.ok:
+            self._is_on = on
+        else:
+            self._is_wanted = self._is_on  # the next message tries again
+            self._driver.warn(f'{self._name}: {answer.text}')
+        self._follow()
 
 
 COMMAND_TOPICS: tuple[UrName, ...] = (ScriptTopic(), FreedriveTopic())

@@ -34,7 +34,7 @@ class DriverSilent(Exception):
 
 
 @dataclass(slots=True, kw_only=True)
-class _Call:
+class _PendingCall:
     """A call that waits for the discovery of its service, or for its answer."""
 
     client: Any
@@ -70,7 +70,7 @@ class DriverNode:
         self._group = ReentrantCallbackGroup()
         self._lock = threading.Lock()  # guards the two below
         self._clients: dict[str, Any] = {}
-        self._calls: list[_Call] = []
+        self._calls: list[_PendingCall] = []
         self._is_closed = False
         node.create_timer(
             CHECK_PERIOD,
@@ -111,7 +111,9 @@ class DriverNode:
         The future has the exception :class:`DriverSilent` if there is no answer in time.
         """
         client = self.client(kind, name)
-        call = _Call(client=client, request=request, service=self.own_name(name), timeout=timeout)
+        call = _PendingCall(
+            client=client, request=request, service=self.own_name(name), timeout=timeout
+        )
         with self._lock:
             self._calls.append(call)
         self._look_at(call)
@@ -158,7 +160,7 @@ class DriverNode:
         for call in calls:
             self._look_at(call)
 
-    def _look_at(self, call: _Call) -> None:
+    def _look_at(self, call: _PendingCall) -> None:
         """Send a call when its service is there, or give it up when it is late."""
         if self._is_closed:
             _finish(call.future, DriverSilent('The node with the names of the UR driver ends.'))

@@ -6,19 +6,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from concurrent.futures import Future
-from typing import Any
 
 from std_srvs.srv import Trigger
 
+from ur_cartesian_driver.motion.goal.known_frames import BASE, BASE_LINK
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
-from ur_cartesian_driver.ros.message_fields import Message, vector_message
+from ur_cartesian_driver.ros.message_fields import Message, seconds, vector_message
 from ur_cartesian_driver.ros.services.deferred_service import completed_answer
 from ur_cartesian_driver.ros.ur_driver_names.dashboard_services import version_numbers
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import same_request, Service, UrName
 from ur_cartesian_driver.ros.ur_driver_names.state_topics import IO
-from ur_cartesian_driver.srv import RunScript, SetIO, SetPayload, SetSpeedSliderFraction
+from ur_cartesian_driver.srv import (
+    RunScript,
+    SetGravity,
+    SetIO,
+    SetPayload,
+    SetSpeedSliderFraction,
+)
 
 #: The smallest fraction that the UR driver lets the speed slider have.
 MIN_SLIDER = 0.01
@@ -93,23 +99,33 @@ def _set_payload(row: Service, driver: DriverNode, request: Message) -> Future[S
     """Set mass and centre of gravity, of either definition of the service."""
     if hasattr(request, 'mass'):
         return same_request(row, driver, request)
-    inertia = request.payload
-    moments = (inertia.ixx, inertia.ixy, inertia.ixz, inertia.iyy, inertia.iyz, inertia.izz)
-    if any(moments) or _is_set(request.transition_time):
-        return completed_answer(
-            'The driver sets mass and centre of gravity at once: leave the moments of inertia and '
-            'transition_time at 0.'
-        )
-    com = inertia.com
+    load = request.payload
+    com, time = load.com, request.transition_time
     ours = SetPayload.Request(
-        mass=inertia.m, center_of_gravity=vector_message((com.x, com.y, com.z))
+        mass=load.m,
+        center_of_gravity=vector_message((com.x, com.y, com.z)),
+        # A number or a duration, depending on the release.
+        transition_time=seconds(time) if hasattr(time, 'sec') else time,
     )
+    moments = [load.ixx, load.iyy, load.izz, load.ixy, load.ixz, load.iyz]
+    if any(moments):
+        ours.inertia = moments
     return driver.call(row.source_type, row.source, ours)
 
 
-def _is_set(time: Any) -> bool:
-    """Return whether a time is not 0; it is a number or a duration, depending on the release."""
-    return bool(time.sec or time.nanosec) if hasattr(time, 'sec') else bool(time)
+def _set_gravity(row: Service, driver: DriverNode, request: Message) -> Future[ServiceAnswer]:
+    """Set the gravity, which points down in the request and up in the driver's."""
+    frame, down = request.gravity.header.frame_id, request.gravity.vector
+    if frame.endswith(BASE_LINK):
+        up = (down.x, down.y, -down.z)  # base is base_link turned by half a turn about z
+    elif frame.endswith(BASE):
+        up = (-down.x, -down.y, -down.z)
+    else:
+        return completed_answer(
+            f'gravity.header.frame_id is {frame!r}, but must be {BASE} or {BASE_LINK} of the arm.'
+        )
+    ours = SetGravity.Request(gravity=vector_message(up))
+    return driver.call(row.source_type, row.source, ours)
 
 
 def _set_speed_slider(row: Service, driver: DriverNode, request: Message) -> Future[ServiceAnswer]:
@@ -156,6 +172,15 @@ def _services() -> Iterable[UrName]:
         source_type=SetPayload,
         call=_set_payload,
     )
+    # Its newest release has a controller of its own for it.
+    for controller in (IO, 'gravity_update_controller'):
+        yield Service(
+            name=f'{controller}/set_gravity',
+            type='ur_msgs/srv/SetGravity',
+            source='set_gravity',
+            source_type=SetGravity,
+            call=_set_gravity,
+        )
     for name in ('set_speed_slider', 'set_speed_slider_fraction'):
         yield Service(
             name=f'{IO}/{name}',

@@ -24,7 +24,7 @@ from ur_cartesian_driver.ros.parameters.parameter_table import (
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.name_table import NAMES
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
-from ur_cartesian_driver.ros.ur_driver_names.offered_name import Absent, class_of, UrName
+from ur_cartesian_driver.ros.ur_driver_names.offered_name import Absent, class_of
 
 NODE_NAME = 'ur_driver_names'
 #: Makes :func:`main` end when its standard input does: the driver that started it has ended.
@@ -56,8 +56,7 @@ class UrDriverNames(Node):
         )
         self._offered: list[Any] = []
         try:
-            values = declared_values(self, declarations_of(NamesSettings))
-            settings = NamesSettings(**values)  # type: ignore[arg-type]  # checked just before
+            settings = _settings(self)
             self.driver = DriverNode(self, settings.driver)
             self._offer_all(settings)
         except BaseException:
@@ -91,9 +90,17 @@ class UrDriverNames(Node):
         super().destroy_node()  # type: ignore[no-untyped-call]  # rclpy's
 
 
-def rows_for(release: str) -> tuple[UrName, ...]:
-    """Return the rows of the table that a release of the UR driver has."""
-    return tuple(row for row in NAMES if row.is_in(release))
+def _settings(node: Node) -> NamesSettings:
+    """
+    Declare the parameters of a node, and return their values.
+
+    :raises ParameterError: one is invalid.
+    """
+    values = declared_values(node, declarations_of(NamesSettings))
+    try:
+        return NamesSettings(**values)  # type: ignore[arg-type]  # the next line catches these
+    except ValueError as error:
+        raise ParameterError(f'Parameter {str(error).rstrip(".")}.') from None
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

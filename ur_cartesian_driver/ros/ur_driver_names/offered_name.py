@@ -183,7 +183,7 @@ class Service(UrName):
             text = self.words(text)
         if hasattr(response, 'success'):
             response.success = ok
-        for field in ('message', 'answer'):
+        for field in ('message', 'answer', 'status'):
             if hasattr(response, field):
                 setattr(response, field, text)
                 break
@@ -196,7 +196,7 @@ class Service(UrName):
 def same_request(row: Service, driver: DriverNode, request: Message) -> Future[ServiceAnswer]:
     """Call the driver's service with the values of the fields that both requests have."""
     ours = row.source_type.Request()
-    for field in ours.get_fields_and_field_types():
+    for field in ours.get_fields_and_field_types().keys() & request.get_fields_and_field_types():
         setattr(ours, field, getattr(request, field))
     return driver.call(row.source_type, row.source, ours)
 

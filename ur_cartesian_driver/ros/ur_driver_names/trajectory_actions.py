@@ -118,7 +118,7 @@ def _with_end(goal: Message) -> Message:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TrajectoryAction(UrName):
+class ControllerAction(UrName):
     """The action of one trajectory controller."""
 
     kind: str = 'action'
@@ -152,7 +152,7 @@ class _Run:
 class _Forwarder:
     """An action server whose goals the driver executes."""
 
-    def __init__(self, row: TrajectoryAction, driver: DriverNode, action: Any) -> None:
+    def __init__(self, row: ControllerAction, driver: DriverNode, action: Any) -> None:
         self._row, self._driver, self._action = row, driver, action
         self._lock = threading.Lock()
         self._runs: dict[bytes, _Run] = {}
@@ -261,11 +261,11 @@ def _failed(action: Any, text: str) -> Message:
 
 TRAJECTORY_ACTIONS: tuple[UrName, ...] = (
     # Its release for Lyrical has no scaled controller: the other one scales.
-    TrajectoryAction(
+    ControllerAction(
         name='scaled_joint_trajectory_controller/follow_joint_trajectory', release='jazzy'
     ),
-    TrajectoryAction(name='joint_trajectory_controller/follow_joint_trajectory'),
-    TrajectoryAction(
+    ControllerAction(name='joint_trajectory_controller/follow_joint_trajectory'),
+    ControllerAction(
         name='passthrough_trajectory_controller/follow_joint_trajectory',
         has_defaults=False,
         preempts=False,
