@@ -159,18 +159,31 @@ NOT_SIMULATED = {
     'convert_pose': 'frames of the world model',
     'delete_all_frames': 'frames of the world model',
     'delete_frame': 'frames of the world model',
+    'eip_reader_factory': 'EtherNet/IP devices',
+    'eip_writer_factory': 'EtherNet/IP devices',
     'estimate_payload': 'the payload from measured forces',
     'frame_tracking_disable': 'motions that follow a frame',
     'frame_tracking_enable': 'motions that follow a frame',
     'get_children': 'frames of the world model',
     'get_frame_parent': 'frames of the world model',
     'get_pose': 'frames of the world model',
+    'get_tool_digital_output_mode': 'the mode of a tool output, read back',
+    'get_tool_output_mode': 'the mode of a tool output, read back',
     'is_frame': 'frames of the world model',
+    **dict.fromkeys(
+        (
+            *('mc_add_circular', 'mc_add_linear', 'mc_add_path', 'mc_get_target_rtcp_speed'),
+            *('mc_initialize', 'mc_load_path', 'mc_run_motion', 'mc_set_pcs'),
+            'mc_set_speed_factor',
+        ),
+        'toolpaths, whose points are in files of their own',
+    ),
     'move_frame': 'frames of the world model',
     'reset_world_model': 'frames of the world model',
     'set_mass_properties': 'frames of the world model',
     'set_payload_from_attached_frames': 'frames of the world model',
     'torque_command': 'the older name of `direct_torque`',
+    'varmsg': 'the value of a variable, shown on the pendant',
 }
 
 

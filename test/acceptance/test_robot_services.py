@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Service calls of a robot: done, refused with a sentence, or explained."""
 
+import json
 import os
 import signal
 import socket
@@ -111,6 +112,7 @@ def test_settings_wait_for_the_end_of_a_goal(driver, home):
         driver.set_payload(1.0),
         driver.set_gravity((0.0, 0.0, 9.82)),
         driver.dashboard('load installation', 'default.installation'),
+        driver.dashboard('set operational mode', 'MANUAL'),
     ):
         assert not answer.ok
         assert answer.text.startswith('A goal is running')
@@ -312,6 +314,25 @@ def test_the_robot_api_loads_plays_pauses_and_stops(make_driver, ur_sim):
     assert driver.dashboard('running').text == 'false'
 
 
+@pytest.mark.ur_sim(
+    frequency=125.0, polyscope='10.12.0', programs={'one.urpx': 'def one():\n  sleep(9)\nend\n'}
+)
+def test_a_program_of_polyscope_x_is_downloaded_changed_uploaded_and_played(make_driver, ur_sim):
+    driver = make_driver(headless_mode=False)
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    program = json.loads(driver.download_program('one').text)
+    program['program']['programInformation']['name'] = 'two'
+    assert driver.upload_program(json.dumps(program)).text == 'two'
+    assert driver.list_programs().text.splitlines() == ['one', 'two']
+    refused = driver.upload_program(json.dumps(program))
+    assert 'HTTP 400' in refused.text
+    assert driver.upload_program(json.dumps(program), replaces=True).ok
+    assert driver.dashboard('load', 'two').ok
+    assert driver.dashboard('play').ok
+    assert ur_sim.state().program == 'two.urpx'
+    assert driver.dashboard('get operational mode').text == 'AUTOMATIC'
+
+
 @pytest.mark.ur_sim(frequency=125.0, polyscope='10.8.0', unlock_delay=0.0)
 def test_polyscope_x_before_its_robot_api_refuses_and_the_rest_works(make_driver, ur_sim):
     driver = make_driver()
@@ -346,6 +367,7 @@ def test_every_call_to_a_robot_that_is_not_there_is_answered(make_driver, closed
     for answer in (
         driver.dashboard('power on'),
         driver.dashboard_line('running'),
+        driver.list_programs(),
         driver.set_tcp(NOZZLE),
         driver.set_payload(1.0),
         driver.zero_ftsensor(),

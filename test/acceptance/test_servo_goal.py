@@ -76,6 +76,35 @@ def straight(seconds=1.0, distance=0.1):
     return goal
 
 
+def test_another_client_may_have_the_upper_registers():
+    async def scenario(cell):
+        other = RtdeConnection(
+            RtdeClientCodec(['timestamp'], registers.SERVO_INPUTS), lambda *_: None
+        )
+        await other.open(HOST, robot_cell.RTDE)
+        run = Run(cell, straight())
+        begin = cell.memory.read()
+        outcome = await run.end()
+        assert outcome.code is ErrorCode.SUCCESSFUL, outcome
+        moved = run.packets[-1].actual_tcp_pose.position[1] - begin.actual_tcp_pose.position[1]
+        assert moved == pytest.approx(0.1, abs=1e-3)
+        assert run.reports[-1].setpoints_done > 100
+        other.close()
+        # A fieldbus may have the lower ones: then the sentence names both.
+        fieldbus = RtdeConnection(
+            RtdeClientCodec(['timestamp'], ['input_int_register_0']), lambda *_: None
+        )
+        await fieldbus.open(HOST, robot_cell.RTDE)
+        await cell.until(cell.is_ready)
+        outcome = await Run(cell, straight(distance=-0.05)).end()
+        assert outcome.code is ErrorCode.ROBOT_NOT_READY
+        assert 'input_int_register_0 are in use by the fieldbus, or another client' in outcome.text
+        assert 'lower_registers: false' in outcome.text
+        fieldbus.close()
+
+    run_cell(scenario, lower_registers=True)
+
+
 @pytest.mark.parametrize(
     ('name', 'factor'),
     [

@@ -146,8 +146,17 @@ def test_something_else_at_the_ports_is_said(check):
     assert 'does not answer as an RTDE server' in findings['rtde']['text']
 
 
-def test_inputs_of_another_client_are_named(check, ur_sim):
-    codec = RtdeClientCodec(['timestamp'], inputs=INPUT_GROUPS['speed slider'])
+@pytest.mark.parametrize(
+    ('purpose', 'lower', 'text'),
+    [
+        ('speed slider', False, '0 to 23 are free'),
+        ('SERVO registers', False, 'lower_registers: true) if no fieldbus has them. '),
+        ('SERVO registers', True, '0 to 23 are taken, too'),
+    ],
+)
+def test_inputs_of_another_client_are_named(check, ur_sim, purpose, lower, text):
+    further = [['input_int_register_0']] if lower else []
+    codec = RtdeClientCodec(['timestamp'], inputs=INPUT_GROUPS[purpose], input_groups=further)
     with socket.create_connection(('127.0.0.1', ur_sim.ports.rtde)) as other:
         other.sendall(codec.start())
         while codec.state is not RtdeState.READY:
@@ -155,8 +164,10 @@ def test_inputs_of_another_client_are_named(check, ur_sim):
             other.sendall(codec.data_to_send())
         code, _, findings = check()
     assert code == 0
-    assert findings['rtde_inputs']['data']['refused'] == ['speed slider']
+    assert purpose in findings['rtde_inputs']['data']['refused']
+    assert findings['rtde_inputs']['data']['lower_registers_free'] is not lower
     assert 'in use by another client' in findings['rtde_inputs']['text']
+    assert text in findings['rtde_inputs']['text']
 
 
 # ---- with motion ------------------------------------------------------------------------------

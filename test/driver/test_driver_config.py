@@ -70,3 +70,8 @@ def test_our_own_program_is_not_sent_to_a_robot_with_an_older_one(dialect):
     with pytest.raises(ValueError, match='headless_mode') as error:
         DriverConfig(wire_dialect=dialect, headless_mode=True)
     assert f"wire_dialect is '{dialect}'" in str(error.value)
+
+
+def test_programs_of_others_have_the_upper_registers():
+    with pytest.raises(ValueError, match='set lower_registers to false'):
+        DriverConfig(wire_dialect='2.12', lower_registers=True)

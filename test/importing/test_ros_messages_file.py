@@ -26,6 +26,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
 from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 
 HEADER = 'header:\n  stamp:\n    sec: 3\n    nanosec: 0\n  frame_id: map\n'
@@ -293,7 +294,7 @@ def test_a_joint_trajectory(tmp_path):
 def straight_line_of_joints(count=40, length=0.2):
     """Return a trajectory that echo prints, of a line along y, and the line's ends."""
     arm = Arm(robot_model('ur5e'))
-    begin, q, points = arm.forward(HOME), tuple(HOME), []
+    begin, q, points = arm.forward(HOME), vector6(HOME), []
     for i in range(count + 1):
         y = begin.position[1] + length * i / count
         end = Pose((begin.position[0], y, begin.position[2]), begin.quaternion)

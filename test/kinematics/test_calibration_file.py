@@ -9,7 +9,7 @@ hashes that the UR drivers computed. The tables of real arms were published by t
 
 from math import asin, atan2, pi
 
-from forward_model import dh_frames, turn_between
+from forward_model import chain_of_origins, dh_frames, origin_matrix, turn, turn_between
 import numpy as np
 import pytest
 import yaml
@@ -127,36 +127,10 @@ def default_kinematics(d1, a2, a3, d4, d5, d6):
     )
 
 
-def turn(axis, angle):
-    i, j = {'x': (1, 2), 'y': (2, 0), 'z': (0, 1)}[axis]
-    angle = np.asarray(angle)
-    T = np.tile(np.eye(4), (*angle.shape, 1, 1))
-    T[..., i, i] = T[..., j, j] = np.cos(angle)
-    T[..., j, i] = np.sin(angle)
-    T[..., i, j] = -np.sin(angle)
-    return T
-
-
-def matrix(row):
-    """The matrix of a URDF's origin."""
-    *xyz, roll, pitch, yaw = row
-    T = turn('z', yaw) @ turn('y', pitch) @ turn('x', roll)
-    T[:3, 3] = xyz
-    return T
-
-
 def rows(text):
     links = yaml.safe_load(text)['kinematics']
     assert list(links) == [*NAMES, 'hash']
     return [[links[name][field] for field in FIELDS] for name in NAMES]
-
-
-def chain(text, q):
-    """The flange (n, 4, 4) of a file: each joint turns about z of its pose."""
-    T = np.eye(4)
-    for row, angles in zip(rows(text), q.T, strict=True):
-        T = T @ matrix(row) @ turn('z', angles)
-    return T
 
 
 TABLES = [
@@ -173,7 +147,7 @@ TABLES = [
 
 @pytest.mark.parametrize(('name', 'table'), TABLES)
 def test_the_chain_of_the_file_is_the_arm(name, table):
-    flange = chain(calibration_text(table), Q)
+    flange = chain_of_origins(rows(calibration_text(table)), Q)
     arm = Arm(MODELS[name], table)
     for judge in dh_frames(table, Q)[:, -1], np.array([arm.forward(q).matrix() for q in Q]):
         assert np.abs(flange[:, :3, 3] - judge[:, :3, 3]).max() < 1e-9
@@ -208,7 +182,7 @@ def test_each_frame_lies_in_the_arm(name, table):
 def test_a_nominal_arm_has_the_numbers_of_ur_description(name, lengths):
     found = rows(calibration_text(MODELS[name].geometry))
     for row, expected in zip(found, default_kinematics(*lengths), strict=True):
-        np.testing.assert_allclose(matrix(row), matrix(expected), atol=1e-9)
+        np.testing.assert_allclose(origin_matrix(row), origin_matrix(expected), atol=1e-9)
 
 
 def test_frames_are_where_ur_calibration_puts_them(tmp_path):
@@ -230,7 +204,7 @@ def test_frames_are_where_ur_calibration_puts_them(tmp_path):
     path.write_text(yaml.safe_dump({'kinematics': links}))
     found = rows(calibration_text(read_calibration(path, MODELS['ur5e'])))
     for row, T in zip(found, expected, strict=True):
-        np.testing.assert_allclose(matrix(row), T, atol=1e-9)
+        np.testing.assert_allclose(origin_matrix(row), T, atol=1e-9)
 
 
 def test_a_real_arm_has_the_numbers_of_ur_calibration():

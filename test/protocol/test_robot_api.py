@@ -75,7 +75,9 @@ def test_a_success_has_its_value(name, body, value):
     assert reply.value == value
 
 
-@pytest.mark.parametrize('body', [b'', b'{}', b'{"mode": 3}', b'<html>', b'\xff\xfe'])
+@pytest.mark.parametrize(
+    'body', [b'', b'{}', b'{"mode": 3}', b'<html>', b'\xff\xfe', b'[' * 100_000]
+)
 def test_a_success_without_the_value_is_an_error(body):
     with pytest.raises(RemoteProtocolError, match="without the field 'mode'"):
         parse('robotmode', 200, body)

@@ -73,8 +73,24 @@ def test_with_several_recipes_the_id_selects_one():
         controller.feed(DataPackage(payload=b'\3\0\0\0\x05').encode())
 
 
+def test_a_client_without_outputs_cannot_start():
+    # Clients of 5.22 report it, and so does an issue of the manufacturer's own client (RTDE #13).
+    controller = server()
+    inputs = SetupInputs(names=('input_int_register_24',)).encode()
+    for request in (b'', inputs, SetupOutputs(names=('nonsense',), frequency=10.0).encode()):
+        controller.feed(request)
+        controller.data_to_send()
+        controller.feed(b'\0\3S')
+        assert controller.data_to_send() == b'\0\4S\0'
+        assert not controller.streaming
+    (event,) = controller.feed(DataPackage(payload=b'\1\0\0\0\x05').encode())
+    assert event.values == (5,)
+
+
 def test_start_and_pause():
     controller = server()
+    controller.feed(SetupOutputs(names=('timestamp',), frequency=10.0).encode())
+    controller.data_to_send()
     for kind, streaming in ((b'S', True), (b'P', False), (b'S', True)):
         controller.feed(b'\0\3' + kind)
         assert controller.data_to_send() == b'\0\4' + kind + b'\1'

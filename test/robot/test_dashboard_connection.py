@@ -100,6 +100,19 @@ def test_a_dashboard_that_says_nothing_does_not_hold_anybody(monkeypatch):
     run(test)
 
 
+def test_a_report_may_take_longer_than_other_answers(monkeypatch):
+    monkeypatch.setattr(dashboard_connection, 'ANSWER_TIMEOUT', 0.0)
+
+    async def test():
+        answer = b'Completed successfully: ur_20241234567_2026-01-02_03-04-05.zip\n'
+        async with dashboard(answer) as client:
+            reply = await client.request('generate support file', '.')
+            assert reply.value == 'ur_20241234567_2026-01-02_03-04-05.zip'
+            assert client.asked == [b'generate support file .\n']
+
+    run(test)
+
+
 def test_nobody_there_is_named(closed_port):
     async def test():
         with pytest.raises(OSError, match=f'127.0.0.1 port {closed_port}'):

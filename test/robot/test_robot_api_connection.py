@@ -16,7 +16,6 @@ import threading
 
 import pytest
 
-from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.services import robot_api_connection
 from ur_cartesian_driver.robot.services.robot_api_connection import RobotApiConnection
@@ -166,6 +165,8 @@ DONE = (200, {'message': None})
         ('close popup', '', ('DELETE', '/popup/v1', None), {}, ''),
         ('close safety popup', '', ('DELETE', '/popup/v1/safety', None), {}, ''),
         ('addToLog', 'a line', ('POST', '/system/v1/log', {'message': 'a line'}), {}, ''),
+        ('generate flight report', 'system', ('POST', '/supportfiles/v1', None), {}, ''),
+        ('shutdown', '', ('PUT', '/system/v1/shutdown', None), {}, ''),
     ],
 )
 def test_each_command_is_one_request(command, argument, request_, answer, value):
@@ -309,7 +310,7 @@ def test_an_answer_without_end_is_not_read(monkeypatch):
     monkeypatch.setattr(robot_api_connection, 'MAX_ANSWER_SIZE', 100)
     with (
         robot({('GET', '/robotstate/v1/robotmode'): (200, {'mode': 'x' * 1000})}) as server,
-        pytest.raises(ProtocolError, match='without the field'),
+        pytest.raises(OSError, match='longer than 100 bytes'),
     ):
         ask(server, 'robotmode')
 

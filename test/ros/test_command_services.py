@@ -16,6 +16,9 @@ from ur_cartesian_driver.motion.state.rtde_state import RobotMode
 from ur_cartesian_driver.ros.services.command_services import REQUEST_SERVICES
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.srv import (
+    DownloadProgram,
+    GenerateFlightReport,
+    GenerateSupportFile,
     Load,
     Popup,
     RawRequest,
@@ -23,9 +26,12 @@ from ur_cartesian_driver.srv import (
     RunScript,
     SetGravity,
     SetIO,
+    SetOperationalMode,
     SetPayload,
     SetSpeedSliderFraction,
     SetTCP,
+    SetUserRole,
+    UploadProgram,
 )
 
 pytestmark = pytest.mark.slow
@@ -61,6 +67,9 @@ class ServiceClient:
             kind
             for kind in (
                 Trigger,
+                DownloadProgram,
+                GenerateFlightReport,
+                GenerateSupportFile,
                 Load,
                 Popup,
                 RawRequest,
@@ -68,9 +77,12 @@ class ServiceClient:
                 RunScript,
                 SetGravity,
                 SetIO,
+                SetOperationalMode,
                 SetPayload,
                 SetSpeedSliderFraction,
                 SetTCP,
+                SetUserRole,
+                UploadProgram,
             )
             if isinstance(request, kind.Request)
         )
@@ -117,6 +129,56 @@ def test_every_service_does_what_it_says(cell):
     assert call('recover', Recover.Request()).message == 'The robot is ready for goals.'
     assert call('hand_back_control').success
     assert call('resend_robot_program').success
+
+
+def test_modes_roles_and_reports_of_the_pendant(single_cell):
+    call = ServiceClient(single_cell)
+    assert call('dashboard/get_safety_status').message == 'NORMAL'
+    assert call('dashboard/get_operational_mode').message == 'NONE'
+    for mode in SetOperationalMode.Request.AUTOMATIC, SetOperationalMode.Request.MANUAL:
+        request = SetOperationalMode.Request(operational_mode=mode)
+        assert call('dashboard/set_operational_mode', request).success
+        assert call('dashboard/get_operational_mode').message == mode
+    assert call('dashboard/is_in_remote_control').message == 'false'
+    assert call('dashboard/clear_operational_mode').success
+    assert call('dashboard/get_operational_mode').message == 'NONE'
+    refused = call(
+        'dashboard/set_operational_mode', SetOperationalMode.Request(operational_mode='dancing')
+    )
+    assert not refused.success
+    assert call('dashboard/generate_flight_report', GenerateFlightReport.Request()).success
+    report = call('dashboard/generate_support_file', GenerateSupportFile.Request(dir_path='.'))
+    assert report.message.endswith('.zip')
+    for answer in (
+        call('dashboard/get_user_role'),
+        call('dashboard/set_user_role', SetUserRole.Request(user_role='OPERATOR')),
+    ):
+        assert not answer.success
+        assert 'no command' in answer.message
+
+
+def test_programs_of_polyscope_x(no_thread_left, make_cell):
+    config = SimulatorConfig(
+        rtde_port=0,
+        primary_port=0,
+        frequency=125.0,
+        polyscope='10.12',
+        programs={'one.urpx': 'def one():\n  sleep(1)\nend\n'},
+    )
+    with SimulatedRobot(config) as robot:
+        cell = make_cell(robot, robot_api_port=robot.ports.robot_api)
+        cell.wait_ready()
+        call = ServiceClient(cell)
+        assert call('dashboard/get_programs').message == 'one'
+        program = call(
+            'dashboard/download_program', DownloadProgram.Request(program_name='one')
+        ).message
+        two = UploadProgram.Request(program=program.replace('"one"', '"two"'))
+        assert not call('dashboard/update_program', two).success
+        assert call('dashboard/upload_program', two).message == 'two'
+        assert call('dashboard/update_program', two).success
+        assert call('dashboard/get_programs').message == 'one\ntwo'
+        assert not call('dashboard/upload_program', two).success
 
 
 def test_a_service_that_takes_its_time_holds_up_nobody(cell):

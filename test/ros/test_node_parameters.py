@@ -100,6 +100,7 @@ def test_every_option_is_a_parameter_but_for_what_is_found_out():
         'calibration_known',
         'optimove_known',
         'path_offset_known',
+        'target_payload_known',
         'acceleration_known',
         'dialect',
         'prelude',

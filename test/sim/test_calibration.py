@@ -1,11 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Calibrated arms: the file's own chain of poses, worked out here, and the robot's reports."""
+"""Calibrated arms: the file's own chain of poses, and the robot's reports."""
 
 from __future__ import annotations
 
 from math import pi
 
+from forward_model import chain_of_origins
 import numpy as np
 import pytest
 import yaml
@@ -61,34 +62,11 @@ def file(tmp_path):
     return write
 
 
-def turn(axis, angle):
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array(
-        {
-            'x': [[1, 0, 0], [0, c, -s], [0, s, c]],
-            'y': [[c, 0, s], [0, 1, 0], [-s, 0, c]],
-            'z': [[c, -s, 0], [s, c, 0], [0, 0, 1]],
-        }[axis]
-    )
-
-
-def chain(rows, q):
-    """The flange by the poses of the file, each followed by the turn of its joint."""
-    R, p = np.eye(3), np.zeros(3)
-    for (x, y, z, roll, pitch, yaw), angle in zip(rows, q, strict=True):
-        p = p + R @ (x, y, z)
-        R = R @ turn('z', yaw) @ turn('y', pitch) @ turn('x', roll) @ turn('z', angle)
-    return R, p
-
-
 @pytest.mark.parametrize('rows', [MEASURED, NOMINAL])
 def test_the_arm_goes_where_the_file_says(rows, file):
     arm = Arm(UR5E, read_calibration(file(rows), UR5E))
-    for q in JOINTS:
-        R, p = chain(rows, q)
-        matrix = arm.forward(q).matrix()
-        assert np.abs(matrix[:3, 3] - p).max() < 1e-8
-        assert np.abs(matrix[:3, :3] - R).max() < 1e-8
+    found = [arm.forward(q).matrix() for q in JOINTS]
+    assert np.abs(found - chain_of_origins(rows, JOINTS)).max() < 1e-8
 
 
 def test_a_nominal_file_has_the_table_of_the_model_but_for_rounding(file):

@@ -165,6 +165,24 @@ def test_in_local_control_commands_are_refused_until_the_client_reconnects(comma
     assert user.ask(command) != refusal
 
 
+def test_manual_mode_ends_remote_control():
+    # The user manual of PolyScope X says so; a client of URSim quotes the answer to `clear`.
+    user = DashboardUser(5, 21)
+    assert user.ask('is in remote control') == 'true'
+    user.ask('set operational mode AUTOMATIC')
+    assert user.ask('get operational mode') == 'AUTOMATIC'
+    assert user.ask('is in remote control') == 'true'
+    user.ask('set operational mode MANUAL')
+    assert user.ask('get operational mode') == 'MANUAL'
+    assert user.ask('is in remote control') == 'false'
+    assert user.ask('play').startswith('Command is not allowed')
+    assert user.ask('clear operational mode') == (
+        "No longer controlling the operational mode. Current operational mode: 'NONE'."
+    )
+    assert user.ask('get operational mode') == 'NONE'
+    assert user.ask('is in remote control') == 'false'
+
+
 @pytest.mark.parametrize('command', ['power on', 'brake release', 'play'])
 def test_an_arm_in_emergency_stop_refuses(command):
     user = DashboardUser(5, 21)

@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import contextlib
+import http.client
+import json
 import socket
 import threading
 import time
@@ -15,6 +17,7 @@ from robot_ports import FREE
 
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
+POWER_OFF, IDLE, RUNNING = 3, 5, 7
 LOOP = 'def loop():\n  while True:\n    sync()\n  end\nend\n'
 
 
@@ -62,6 +65,27 @@ def test_a_line_unlocks_without_the_wait_of_the_dashboard_but_not_within_a_milli
         client.send('set unlock protective stop\n')
         client.await_('state', protective=False)
         assert 0.001 < robot.state().timestamp - sent < 5.0, 'the dashboard waits 5 s'
+
+
+def test_a_stop_by_a_program_is_unlocked_within_5_s_of_power_on_and_programs_run_again(make_robot):
+    # A test of the manufacturer's client library does these steps without a pause.
+    robot = make_robot(rate=1.0)
+    with primary(robot) as client:
+        client.send('power off\n')
+        client.await_('state', mode=POWER_OFF)
+        client.send('set robotmode run\n')
+        client.await_('state', mode=RUNNING)
+        client.send('def stops():\n  protective_stop()\nend\n')
+        client.await_('state', protective=True)
+        stopped = robot.call(lambda controller: controller.time)
+        client.send('def early():\n  textmsg("early")\nend\n')
+        client.send('set unlock protective stop\n')
+        client.await_('state', protective=False)
+        assert robot.call(lambda controller: controller.time) - stopped < 5.0
+        client.send('def goes_on():\n  textmsg("on")\nend\n')
+        client.await_('key', title='PROGRAM_XXX_STARTED', text='goes_on')
+        client.await_('text', text='on')
+        assert 'early' not in robot.state().messages
 
 
 def test_a_move_of_joints_out_of_their_range_ends_the_program_before_anything_moves(make_robot):
@@ -153,6 +177,26 @@ def test_reports_and_support_files_are_generated_whatever_their_type(make_robot)
         answer = board.ask('generate support file .')
         assert answer.startswith('Completed successfully: ./ur_2')
         assert answer.endswith('.zip')
+
+
+def test_a_client_of_the_robot_api_that_switches_off_and_on_sees_each_mode(make_robot):
+    # A test of the manufacturer's client library reads the modes over the primary interface, too.
+    robot = make_robot(polyscope='10.12')
+    api = http.client.HTTPConnection(robot.config.host, robot.ports.robot_api, timeout=10.0)
+    with primary(robot) as client, contextlib.closing(api):
+        for _ in range(2):
+            for action, mode, name in (
+                ('POWER_OFF', POWER_OFF, 'POWER_OFF'),
+                ('POWER_ON', IDLE, 'IDLE'),
+                ('BRAKE_RELEASE', RUNNING, 'RUNNING'),
+            ):
+                body = json.dumps({'action': action})
+                api.request('PUT', '/universal-robots/robot-api/robotstate/v1/state', body)
+                answer = api.getresponse()
+                assert (answer.status, bool(answer.read())) == (200, True)
+                client.await_('state', mode=mode)
+                api.request('GET', '/universal-robots/robot-api/robotstate/v1/robotmode')
+                assert json.loads(api.getresponse().read())['mode'] == name
 
 
 def test_the_operational_mode_is_that_of_the_robot_and_not_of_one_client(make_robot):

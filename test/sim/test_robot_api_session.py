@@ -153,6 +153,108 @@ def test_popups_log_and_identity():
     assert user.ask('POST', '/system/v1/log', {'message': 'a line'})[0] == 200
 
 
+def urpx(name, script, **application):
+    """Return the content of a file as PolyScope X writes it, without what nobody reads."""
+    information = {'name': name, 'description': '', 'programState': 'FINAL'}
+    return {
+        'application': application,
+        'program': {
+            'id': '5',
+            'programContent': {'children': []},
+            'programInformation': information,
+            'urscript': {'script': script, 'nodeIDList': []},
+        },
+    }
+
+
+def form(method, content, path=API + '/programs/v1/', field='file'):
+    """Return a form with one file, as the manufacturer's client library sends it."""
+    body = (
+        '--frontier\r\n'
+        f'Content-Disposition: form-data; name="{field}"; filename="filename"\r\n'
+        'Content-Type: text/plain\r\n\r\n'
+        f'{content}\r\n--frontier--\r\n'
+    )
+    head = f'{method} {path} HTTP/1.1\r\nContent-Length: {len(body)}\r\n'
+    return f'{head}Content-Type: multipart/form-data; boundary=frontier\r\n\r\n{body}'.encode()
+
+
+def send_program(user, method, program):
+    return parse(user.session.feed(form(method, json.dumps(program))))[:2]
+
+
+def test_programs_are_listed_uploaded_updated_downloaded_and_played():
+    user = ApiUser()
+    assert [each['name'] for each in user.value('/programs/v1/')['programs']] == ['a']
+    assert user.ask('GET', '/programs/v1/weld%20it')[0] == 404
+    # The script of a program has labels, and uses functions that the application defines.
+    preamble = {'script': 'def twice(x):\n  return 2 * x\nend', 'nodeIDList': []}
+    script = '$ 1 "ur-program"\n$ 2 "ur-wait"\ntextmsg("twice ", twice(4))\nsleep(23)'
+    program = urpx('weld it', script, urscript=preamble)
+    status, answer = send_program(user, 'POST', program)
+    assert (status, answer['programName']) == (200, 'weld it')
+    assert send_program(user, 'POST', program)[0] == 400  # it exists
+    assert [each['name'] for each in user.value('/programs/v1')['programs']] == ['a', 'weld it']
+    assert user.value('/programs/v1/weld%20it') == program
+    assert user.ask('PUT', '/program/v1/loaded', {'name': 'weld it'})[0] == 200
+    assert user.act('play') == 200
+    user.controller.step()
+    assert 'twice 8' in '\n'.join(user.controller.messages.log)
+    changed = urpx('weld it', 'textmsg("changed")\nsleep(23)')
+    assert send_program(user, 'PUT', changed)[0] == 409  # it is loaded
+    assert user.act('stop') == 200
+    assert user.ask('PUT', '/program/v1/loaded', {'name': 'a'})[0] == 200
+    assert send_program(user, 'PUT', changed)[0] == 200
+    assert send_program(user, 'PUT', urpx('other', 'sleep(1)'))[0] == 404
+    assert user.ask('PUT', '/program/v1/loaded', {'name': 'weld it'})[0] == 200
+    assert user.act('play') == 200
+    user.controller.step()
+    assert 'changed' in '\n'.join(user.controller.messages.log)
+
+
+def test_a_program_of_the_configuration_can_be_downloaded_and_uploaded_elsewhere():
+    program = ApiUser().value('/programs/v1/a')
+    user = ApiUser(programs={})
+    assert send_program(user, 'POST', program)[0] == 200
+    assert user.ask('PUT', '/program/v1/loaded', {'name': 'a'})[0] == 200
+    assert user.act('play') == 200
+
+
+@pytest.mark.parametrize(
+    'content',
+    [
+        *('', 'no JSON', '[]', '{}', '{"program": null}', '[' * 100_000),
+        json.dumps(urpx('', 'sleep(1)')),
+    ],
+)
+def test_what_is_no_program_is_not_uploaded(content):
+    user = ApiUser()
+    assert parse(user.session.feed(form('POST', content)))[0] == 422
+    assert parse(user.session.feed(form('POST', json.dumps(urpx('b', 'x')), field='f')))[0] == 422
+
+
+def test_in_local_control_programs_are_only_read():
+    user = ApiUser(remote_control=False)
+    assert user.value('/programs/v1/a')['program']['programInformation']['name'] == 'a'
+    assert send_program(user, 'POST', urpx('b', 'sleep(1)'))[0] == 403
+
+
+def test_manual_mode_ends_remote_control():
+    user = ApiUser()
+    user.controller.set_operational_mode('MANUAL')
+    assert user.value('/system/v1/operationalmode') == {'mode': 'MANUAL'}
+    assert user.value('/system/v1/controlmode') == {'mode': 'LOCAL'}
+    assert user.act('POWER_OFF') == 403
+
+
+def test_a_flight_report_and_a_shutdown_are_answered():
+    user = ApiUser()
+    status, answer = user.ask('POST', '/supportfiles/v1')
+    assert (status, answer['message']) == (200, 'Flight report generated successfully.')
+    assert user.ask('PUT', '/system/v1/shutdown') == (202, {'message': None})
+    assert user.controller.power.mode is RobotMode.POWER_OFF
+
+
 @pytest.mark.parametrize(
     ('polyscope', 'method', 'path', 'known'),
     [
@@ -162,6 +264,9 @@ def test_popups_log_and_identity():
         ('10.11', 'PUT', '/program/v1/loaded', False),
         ('10.12', 'PUT', '/program/v1/loaded', True),
         ('10.11', 'PUT', '/program/v1/load', True),
+        ('10.11', 'GET', '/programs/v1', False),
+        ('10.11', 'GET', '/programs/v1/a', False),
+        ('10.12', 'GET', '/programs/v1/a', True),
         ('10.13', 'GET', '/versions/v1', False),
         ('10.14', 'GET', '/versions/v1', True),
     ],

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from script_calls import call
 
+from ur_cartesian_driver.importing.script.script_terms import FUNCTIONS
 from ur_cartesian_driver.protocol.rtde.rtde_fields import fields_of, OUTPUT_TYPES
 from ur_cartesian_driver.sim import SimulatorConfig
 from ur_cartesian_driver.sim.builtins import controller_builtins
@@ -131,7 +132,7 @@ def test_the_page_is_that_of_the_registered_functions(script):
 def test_each_function_of_the_manual_is_simulated_or_refused(script):
     names = {row[0].strip('`').split('(')[0] for row in script.rows()}
     assert set(script.MANUAL_5_21) - names == set()
-    for known in (script.CB3, script.POLYSCOPE_X, script.FIRST):
+    for known in (script.CB3, script.POLYSCOPE_X, script.FIRST, FUNCTIONS):
         assert set(known) - names == set()
 
 

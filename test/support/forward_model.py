@@ -63,6 +63,33 @@ def dh_frames(geometry, q):
     return frames
 
 
+def turn(axis, angle):
+    """Return the matrices (..., 4, 4) of turns about x, y or z by angles [rad]."""
+    i, j = {'x': (1, 2), 'y': (2, 0), 'z': (0, 1)}[axis]
+    angle = np.asarray(angle)
+    T = np.tile(np.eye(4), (*angle.shape, 1, 1))
+    T[..., i, i] = T[..., j, j] = np.cos(angle)
+    T[..., j, i] = np.sin(angle)
+    T[..., i, j] = -np.sin(angle)
+    return T
+
+
+def origin_matrix(row):
+    """The matrix of a URDF's origin: x, y, z, roll, pitch, yaw."""
+    *xyz, roll, pitch, yaw = row
+    T = turn('z', yaw) @ turn('y', pitch) @ turn('x', roll)
+    T[:3, 3] = xyz
+    return T
+
+
+def chain_of_origins(rows, q):
+    """The flange (n, 4, 4) at joints (n, 6), each of which turns about z of its origin."""
+    T = np.eye(4)
+    for row, angles in zip(rows, np.transpose(q), strict=True):
+        T = T @ origin_matrix(row) @ turn('z', angles)
+    return T
+
+
 def turn_between(a, b):
     """Return the angle between rotations (..., 3, 3) [rad]; exact near 0."""
     chord = np.linalg.norm(a - b, axis=(-2, -1)) / (2.0 * np.sqrt(2.0))

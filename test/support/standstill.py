@@ -22,24 +22,24 @@ LIMIT = 0.2
 class Standstill:
     """A plugin for pytest that marks the tests which wait, and watches the time while they run."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.longest = 0.0
         Thread(target=self._watch, name='standstill', daemon=True).start()
 
-    def __bool__(self):
+    def __bool__(self) -> bool:
         """Tell whether this process stood still; pytest-rerunfailures asks when a test failed."""
         return self.longest > LIMIT
 
-    def pytest_collection_modifyitems(self, items):
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         again = pytest.mark.flaky(reruns=1, condition=self)
         for item in items:
             if rank(item.nodeid) < 0:
                 item.add_marker(again)
 
-    def pytest_runtest_logstart(self):
+    def pytest_runtest_logstart(self) -> None:
         self.longest = 0.0
 
-    def _watch(self):
+    def _watch(self) -> None:
         while True:
             asleep = monotonic()
             sleep(STEP)

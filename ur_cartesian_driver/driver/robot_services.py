@@ -15,7 +15,9 @@ from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,
+    DownloadProgramCall,
     HandBackCall,
+    ListProgramsCall,
     RecoverCall,
     RunScriptCall,
     SCRIPT_TIMEOUT,
@@ -26,6 +28,7 @@ from ur_cartesian_driver.robot.services.service_calls import (
     SetPayloadCall,
     SetSpeedSliderCall,
     SetTcpCall,
+    UploadProgramCall,
     ZeroFtSensorCall,
 )
 
@@ -49,6 +52,23 @@ class RobotServices(ABC):
     def dashboard_line(self, line: str) -> ServiceAnswer:
         """Send any line to the dashboard, and return its answer."""
         return self.call(DashboardLineCall(line=line)).result()
+
+    def list_programs(self) -> ServiceAnswer:
+        """Return the names of the robot's programs, one on each line; PolyScope X only."""
+        return self.call(ListProgramsCall()).result()
+
+    def upload_program(self, program: str, *, replaces: bool = False) -> ServiceAnswer:
+        """
+        Send a program to the robot, and return its name there; PolyScope X only.
+
+        :param program: the content of a ``.urpx`` file, which also names the program.
+        :param replaces: the program takes the place of one that the robot has.
+        """
+        return self.call(UploadProgramCall(program=program, replaces=replaces)).result()
+
+    def download_program(self, program_name: str) -> ServiceAnswer:
+        """Return a program of the robot, the content of a ``.urpx`` file; PolyScope X only."""
+        return self.call(DownloadProgramCall(program_name=program_name)).result()
 
     def set_tcp(self, T_flange_tcp: Pose) -> ServiceAnswer:
         """Set the active TCP."""

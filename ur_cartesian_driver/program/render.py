@@ -44,6 +44,7 @@ from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.framing import FIXED_POINT
 from ur_cartesian_driver.protocol.program import point_fields, registers, reverse, script_command
 from ur_cartesian_driver.protocol.program import trajectory_points as trajectory
+from ur_cartesian_driver.protocol.rtde.rtde_client import LOWER_REGISTERS
 
 PROGRAM_NAME = 'ur_cartesian_driver'
 
@@ -203,6 +204,8 @@ class ProgramSettings:
     servo_buffer_depth: int = 250
     #: Whether the buffered servo may switch to freedrive.
     allow_freedrive: bool = False
+    #: Whether the program uses the int and double registers from 0 on, not those from 24 on.
+    lower_registers: bool = False
     #: The user's functions that the program contains.
     prelude: Prelude = NO_PRELUDE
 
@@ -317,17 +320,36 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'COMMAND_FIELDS = {script_command.COMMAND_WORDS}'
     yield f'STREAM_LENGTH = {2**31 - 1}'
     yield f'TCP_RESOLUTION = {2.0 / FIXED_POINT:.6f}'
-    yield f'REGISTER_POINTS_BEGUN = {int(registers.POINTS_BEGUN)}'
-    yield f'REGISTER_SAFE_OUTPUTS_TOKEN = {int(registers.OutputInteger.SAFE_OUTPUTS_TOKEN)}'
-    yield f'REGISTER_PROGRAM_VERSION = {int(registers.OutputInteger.PROGRAM_VERSION)}'
-    yield f'REGISTER_PROGRAM_NUMBER = {int(registers.OutputInteger.PROGRAM_NUMBER)}'
-    yield f'REGISTER_PROGRAM_RUN = {int(registers.OutputInteger.PROGRAM_RUN)}'
+    yield from _register_constants(settings)
     yield f'PROGRAM_VERSION = {registers.PROGRAM_VERSION}'
     yield f'PROGRAM_NUMBER = {settings.number}'
     yield from _servo_constants(settings)
     yield from _message_constants()
     yield from _output_constants()
     yield from _event_constants()
+
+
+def _register_constants(settings: ProgramSettings) -> Iterator[str]:
+    """Yield the numbers of the RTDE registers that the program reads and writes."""
+    shift = -LOWER_REGISTERS if settings.lower_registers else 0
+    output = registers.OutputInteger
+    for register in (
+        output.POINTS_BEGUN,
+        output.SAFE_OUTPUTS_TOKEN,
+        output.PROGRAM_VERSION,
+        output.PROGRAM_NUMBER,
+        output.PROGRAM_RUN,
+    ):
+        yield f'REGISTER_{register.name} = {register + shift}'
+    for prefix, members in (
+        ('SERVO_IN', registers.InputInteger),
+        ('SERVO_IN', registers.InputDouble),
+        ('SERVO_OUT', registers.OutputInteger),
+        ('SERVO_OUT', registers.OutputDouble),
+        ('OFFSET_IN', registers.OffsetInput),
+        ('OFFSET_OUT', registers.OffsetOutput),
+    ):
+        yield from _enum(prefix, members, offset=shift)
 
 
 def _message_constants() -> Iterator[str]:
@@ -372,8 +394,6 @@ def _event_constants() -> Iterator[str]:
         yield f'PRESS_{name} = {value}'
     for name, value in OFFSET_CONSTANTS.items():
         yield f'OFFSET_{name} = {value:.10g}'
-    yield from _enum('OFFSET_IN', registers.OffsetInput)
-    yield from _enum('OFFSET_OUT', registers.OffsetOutput)
     yield f'TRAJECTORY_TAKES_OFFSETS = {int(reverse.TAKES_OFFSETS)}'
     yield from _enum('FOLLOW', point_fields.FollowKind)
     # Floats, because a matrix of floats is made from them: a row for each analog output.
@@ -404,10 +424,6 @@ def _servo_constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'SERVO_END_TOLERANCE = {SERVO_END_TOLERANCE}'
     yield f'SERVO_REST_SPEED = {SERVO_REST_SPEED}'
     yield f'SERVO_SETTLED = {SERVO_SETTLED:.10f}'
-    yield from _enum('SERVO_IN', registers.InputInteger)
-    yield from _enum('SERVO_IN', registers.InputDouble)
-    yield from _enum('SERVO_OUT', registers.OutputInteger)
-    yield from _enum('SERVO_OUT', registers.OutputDouble)
     yield from _enum('SERVO_MODE', registers.ServoMode)
     yield from _enum('SERVO_SYNC', registers.SyncState)
     yield from _enum('SERVO_ERROR', registers.ExternalError)

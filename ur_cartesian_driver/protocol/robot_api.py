@@ -127,8 +127,18 @@ API_COMMANDS: Mapping[str, tuple[ApiCommand, ...]] = MappingProxyType(
                 method='POST', path='/system/v1/log', body={'message': '{}'}, since=(10, 14)
             ),
         ),
+        # There is one kind of report: the type, the argument on the dashboard, is not sent.
+        'generate flight report': (
+            ApiCommand(method='POST', path='/supportfiles/v1', since=(10, 14)),
+        ),
+        'shutdown': (ApiCommand(method='PUT', path='/system/v1/shutdown', since=(10, 14)),),
     }
 )
+#: The requests for programs as files; ``{}`` in a path stands for the name of a program.
+LIST_PROGRAMS = ApiCommand(method='GET', path='/programs/v1/', since=(10, 12))
+UPLOAD_PROGRAM = ApiCommand(method='POST', path='/programs/v1/', since=(10, 12))
+UPDATE_PROGRAM = ApiCommand(method='PUT', path='/programs/v1/', since=(10, 12))
+DOWNLOAD_PROGRAM = ApiCommand(method='GET', path='/programs/v1/{}', since=(10, 12))
 #: The request for ``play`` if the program is paused: the dashboard has one command for both cases.
 RESUME = _action(_PROGRAM, 'resume')
 
@@ -164,12 +174,9 @@ def parse_answer(
 
     :raises RemoteProtocolError: the request succeeded, but the answer lacks the requested value.
     """
-    fields = _fields(body)
     if not 200 <= status < 300:
-        said = ': '.join(
-            text for key in ('message', 'details', 'detail') if (text := _text(fields.get(key)))
-        )
-        return DashboardReply(request=request, text=f'HTTP {status} {said}'.rstrip(), value=None)
+        return DashboardReply(request=request, text=refusal_text(status, body), value=None)
+    fields = _fields(body)
     value = ''
     if command.value:
         found = fields.get(command.value)
@@ -182,11 +189,44 @@ def parse_answer(
     return DashboardReply(request=request, text=_text(fields.get('message')) or 'OK', value=value)
 
 
+def refusal_text(status: int, body: bytes) -> str:
+    """Return the words of a refusal on one line."""
+    fields = _fields(body)
+    said = ': '.join(
+        text for key in ('message', 'details', 'detail') if (text := _text(fields.get(key)))
+    )
+    return f'HTTP {status} {said}'.rstrip()
+
+
+def parse_program_names(body: bytes) -> list[str]:
+    """
+    Return the names in a list of programs.
+
+    :raises RemoteProtocolError: the answer is not such a list.
+    """
+    programs = _fields(body).get('programs')
+    names = [
+        program.get('name') if isinstance(program, dict) else None
+        for program in (programs if isinstance(programs, list) else [None])
+    ]
+    texts = [name for name in names if isinstance(name, str)]
+    if len(texts) < len(names):
+        raise RemoteProtocolError(
+            f'The Robot API answers without the names of its programs: {body!r:.200}.'
+        )
+    return texts
+
+
+def parse_program_name(body: bytes) -> str:
+    """Return the name that the robot gave to a program; empty if it does not say it."""
+    return _text(_fields(body).get('programName'))
+
+
 def _fields(body: bytes) -> Mapping[str, Any]:
     """Return the JSON object in an answer; empty if the answer is none (a proxy's error page)."""
     try:
         fields = json.loads(body)
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
     return fields if isinstance(fields, dict) else {}
 

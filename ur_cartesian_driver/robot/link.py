@@ -226,7 +226,12 @@ class RobotLink:
         :raises DriverError: the robot program cannot be made from the settings.
         """
         settings = self._settings
-        stream = StateStream(settings.rtde_frequency, settings.max_state_age, self._on_state)
+        stream = StateStream(
+            settings.rtde_frequency,
+            settings.max_state_age,
+            self._on_state,
+            lower_registers=settings.lower_registers,
+        )
         try:
             self.version = await stream.open(settings.robot_ip, settings.rtde_port)
             self._status.apply(ConnectionEvent.ROBOT_ANSWERED)

@@ -77,6 +77,10 @@ class LinkSettings:
     # from a lost one.
     #: Rate of the robot's RTDE reports [Hz]; 0.0: the largest that it supports (500, CB3: 125).
     rtde_frequency: Annotated[float, Range(10.0, 500.0, zero='as often as the robot can')] = 0.0
+    #: true: driver and robot program use the int and double RTDE registers 0 to 23, because
+    #: another client needs those from 24 on. A fieldbus (EtherNet/IP, PROFINET) of the robot has
+    #: the lower ones if the installation enables it. false: they use those from 24 on.
+    lower_registers: bool = False
     #: Rate at which ~/io_states and ~/tool_data are checked for changes [Hz]; 0.0: never.
     io_publish_rate: Annotated[float, Range(0.0, 125.0)] = 25.0
     #: Deceleration of the leading axis when a goal is stopped [rad/s^2].
@@ -158,6 +162,11 @@ class LinkSettings:
                 f"'{NEWEST_DIALECT.name}'; "
                 'leave wire_dialect out, or set headless_mode to false and start the program that '
                 'is saved on the robot.'
+            )
+        if self.lower_registers and not self.runs_own_program:
+            raise ValueError(
+                f"wire_dialect is '{self.wire_dialect}' and lower_registers is true, but such "
+                'programs use the registers from 24 on; set lower_registers to false.'
             )
 
 

@@ -34,6 +34,7 @@ from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState, Moti
 from ur_cartesian_driver.sim.programs.interpreter_mode import InterpreterMode
 from ur_cartesian_driver.sim.programs.program_runner import ProgramRunner
 from ur_cartesian_driver.sim.programs.rtde_watchdog import Watchdogs
+from ur_cartesian_driver.sim.programs.stored_programs import StoredPrograms
 from ur_cartesian_driver.sim.programs.timed_function_guard import Builtins
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets, ScriptSockets
@@ -157,6 +158,7 @@ class Controller:
             thread_delay=config.thread_delay,
             interleaving_seed=config.interleaving_seed,
         )
+        self.stored_programs = StoredPrograms(config.programs)
         self.interpreter_mode = InterpreterMode(self.programs, self.ownership)
         self.programs.on_end = self.sockets.close_all
         if config.program and (refusal := self.load_program(config.program)):
@@ -375,6 +377,16 @@ class Controller:
 
     # ---- commands of clients and programs -----------------------------------------------------
 
+    def set_operational_mode(self, mode: str) -> None:
+        """
+        Set the operational mode: ``MANUAL``, ``AUTOMATIC``, or ``NONE`` if no client controls it.
+
+        Manual mode ends remote control, and only a person at the pendant can switch it on again.
+        """
+        self.pendant.operational_mode = mode
+        if mode == 'MANUAL':
+            self.remote_control = False
+
     def set_slider(self, fraction: float) -> None:
         """Set the speed slider, cut to 0..1."""
         self.speed_slider = min(1.0, max(0.0, fraction))
@@ -385,7 +397,7 @@ class Controller:
 
         Directories in the name are ignored.
         """
-        text = self.config.programs.get(file := PurePosixPath(name).name)
+        text = self.stored_programs.script(file := PurePosixPath(name).name)
         return f'File not found: {name}' if text is None else self.programs.load(file, text)
 
     def power_on(self) -> str:

@@ -4,8 +4,10 @@
 
 import pytest
 
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
-from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
+from ur_cartesian_driver.sim.simulator_config import HOME, SimulatorConfig
 
 STILL = (0.0, 0.0, 0.0)
 
@@ -34,6 +36,33 @@ def test_friction_is_against_the_motion_along_the_surface():
     table = ContactBody.parse('plane 0 0 0 0 0 1 stiffness=1000 friction=0.5')
     assert table.force((0.0, 0.0, -0.01), (0.1, 0.0, 0.0)) == pytest.approx((-5.0, 0.0, 10.0))
     assert table.force((0.0, 0.0, -0.01), (0.0, 5e-4, 0.0)) == pytest.approx((0.0, -2.5, 10.0))
+
+
+@pytest.mark.parametrize(
+    'change',
+    [
+        'zero_ftsensor()',
+        'set_payload(1, [0, 0, 0.1])',
+        'set_payload_mass(1)',
+        'set_payload_cog([0, 0, 0.1])',
+        'set_target_payload(1, [0, 0, 0.1])',
+    ],
+)
+@pytest.mark.parametrize(('model', 'zeroes'), [('ur5e', True), ('ur5', False)])
+def test_a_new_payload_zeroes_the_force_sensor_of_arms_that_have_one(
+    make_bench, change, model, zeroes
+):
+    # The script manual of 5.x says so of each function.
+    height = Arm(robot_model(model)).forward(HOME).position[2]
+    log = make_bench(model=model, contacts=[f'plane 0 0 {height - 0.005} 0 0 1']).run(f"""
+        target = get_target_tcp_pose()
+        target[2] = target[2] - 0.007
+        movel(target)
+        sleep(0.1)
+        textmsg(force() > 10)
+        {change}
+        textmsg(force() < 0.1)""")
+    assert log == ['True', str(zeroes or change == 'zero_ftsensor()')]
 
 
 @pytest.mark.parametrize(

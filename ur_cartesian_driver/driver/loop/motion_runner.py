@@ -312,7 +312,7 @@ class MotionRunner:
 
     def _open_inputs(self, exchange: RegisterExchange) -> None:
         """Open a connection that claims the RTDE inputs which the running motion writes."""
-        self._inputs = RegisterConnection(exchange)
+        self._inputs = RegisterConnection(exchange, lower_registers=self._config.lower_registers)
         self._spawn(
             self._inputs.run(
                 self._config.robot_ip,

@@ -31,6 +31,10 @@ does not know. On the reverse socket only the stream actions differ. It is not r
 library version introduced which script command, and a program skips unknown commands, too. So only
 the newest dialect sets a temporary TCP for a goal.
 
+The library discusses a 22nd word, the number of a move (``move_id``, its change 552). It will be
+one more row: a dialect then also has the number of its words, which :mod:`~.trajectory_points` and
+the robot program (``POINT_FIELDS``) take from it. It is not built before the library has it.
+
 Three modules ask a :class:`Dialect` for more than whether the program is our own:
 :mod:`~.trajectory_points` for the points,
 :mod:`~ur_cartesian_driver.robot.program.program_sockets` for the actions, and

@@ -36,6 +36,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+import re
 from typing import TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
@@ -63,6 +64,9 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import (
 )
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe, RtdeValues
 
+#: The controller reserves this many int and double registers for fieldbuses: the first ones.
+LOWER_REGISTERS = 24
+_REGISTER = re.compile(r'(?:in|out)put_(?:int|double)_register_(\d+)')
 #: Number of unexpected packages that are tolerated in each state of the handshake.
 MAX_UNEXPECTED_PACKAGES = 5
 
@@ -84,11 +88,29 @@ class InputsInUse(RemoteProtocolError):
 
     def __init__(self, names: Sequence[str]) -> None:
         """Build the error text from the names."""
+        numbers = [int(match[1]) for name in names if (match := _REGISTER.fullmatch(name))]
+        is_lower = bool(numbers) and min(numbers) < LOWER_REGISTERS
+        owner = 'the fieldbus, or another client' if is_lower else 'another client'
         super().__init__(
-            f'The RTDE inputs {", ".join(names)} are in use by another client; end it, or disable '
-            'EtherNet/IP, PROFINET or MODBUS in the installation of the robot.'
+            f'The RTDE inputs {", ".join(names)} are in use by {owner}; end it, or disable '
+            'EtherNet/IP, PROFINET or MODBUS in the installation of the robot'
+            f'{_other_half(is_lower) if numbers else ""}.'
         )
         self.names = tuple(names)
+
+
+def _other_half(is_lower: bool) -> str:
+    if is_lower:
+        return ', or take the registers from 24 on (lower_registers: false)'
+    return ', or take the registers 0 to 23 (lower_registers: true) if no fieldbus has them'
+
+
+def in_lower_half(name: str) -> str:
+    """Return a field's name with its register, 24 to 47, moved to 0 to 23."""
+    match = _REGISTER.fullmatch(name)
+    if match is None:
+        return name
+    return f'{name[: match.start(1)]}{int(match[1]) - LOWER_REGISTERS}'
 
 
 class RtdeState(Enum):
@@ -155,6 +177,8 @@ class RtdeClientCodec:
         frequency: float = 0.0,
         optional_outputs: Iterable[str] = (),
         input_groups: Sequence[Sequence[str]] = (),
+        *,
+        lower_registers: bool = False,
     ) -> None:
         """
         Choose outputs and inputs.
@@ -164,6 +188,8 @@ class RtdeClientCodec:
         :param frequency: rate of the packages [Hz]; 0 = the controller's highest.
         :param optional_outputs: outputs that the controller may lack.
         :param input_groups: further groups of inputs, each written in its own package.
+        :param lower_registers: whether the int and double registers from 24 on stand for those
+            from 0 on, which the robot is asked for.
         :raises LocalProtocolError: no outputs, a duplicate name, or an impossible frequency.
         """
         self._groups = [tuple(group) for group in (inputs, *input_groups) if group]
@@ -177,6 +203,7 @@ class RtdeClientCodec:
                 f'{len(outputs)} outputs and {frequency!r} Hz were requested.'
             )
         self.state = RtdeState.NEW
+        self._wire_names = in_lower_half if lower_registers else str
         self._outputs = tuple(outputs)
         self._optional = frozenset(optional_outputs)
         self._missing: tuple[str, ...] = ()
@@ -324,7 +351,8 @@ class RtdeClientCodec:
     def _request_outputs(self) -> list[RtdeEvent]:
         frequency = None if self._version == 1 else self._frequency
         return self._send_request(
-            RtdeState.OUTPUTS, SetupOutputs(names=self._outputs, frequency=frequency)
+            RtdeState.OUTPUTS,
+            SetupOutputs(names=tuple(map(self._wire_names, self._outputs)), frequency=frequency),
         )
 
     def _on_outputs(self, reply: RtdeReply) -> list[RtdeEvent]:
@@ -334,7 +362,8 @@ class RtdeClientCodec:
         missing = [n for n, text in zip(names, reply.types, strict=True) if text == NOT_FOUND]
         needed = [name for name in missing if name not in self._optional]
         if needed or len(missing) == len(names):
-            raise FieldsNotFound('outputs', needed or missing, self._controller)
+            lacking = list(map(self._wire_names, needed or missing))
+            raise FieldsNotFound('outputs', lacking, self._controller)
         if missing:
             self._missing += tuple(missing)
             self._outputs = tuple(name for name in names if name not in missing)
@@ -350,7 +379,8 @@ class RtdeClientCodec:
         """Request the next group of inputs, or start the data when all groups are agreed."""
         if len(self._inputs) < len(self._groups):
             return self._send_request(
-                RtdeState.INPUTS, SetupInputs(names=self._groups[len(self._inputs)])
+                RtdeState.INPUTS,
+                SetupInputs(names=tuple(map(self._wire_names, self._groups[len(self._inputs)]))),
             )
         return self._send_request(RtdeState.START, StartStreaming())
 
@@ -360,9 +390,9 @@ class RtdeClientCodec:
         _check_count(reply.types, names)
         answers = list(zip(names, reply.types, strict=True))
         if missing := [name for name, text in answers if text == NOT_FOUND]:
-            raise FieldsNotFound('inputs', missing, self._controller)
+            raise FieldsNotFound('inputs', list(map(self._wire_names, missing)), self._controller)
         if taken := [name for name, text in answers if text == IN_USE]:
-            raise InputsInUse(taken)
+            raise InputsInUse(list(map(self._wire_names, taken)))
         types = [_type(name, text, INPUT_TYPES.get(name)) for name, text in answers]
         self._inputs.append(Recipe(names, types, reply.recipe_id))
         return self._request_inputs()

@@ -155,8 +155,11 @@ class RtdeServerCodec:
             case SetupInputs():
                 return self._set_up_inputs(request)
             case StartStreaming():
-                self.streaming = True
-                return Acknowledgement(type=PackageType.CONTROL_PACKAGE_START, accepted=True)
+                # A robot does not start without outputs, even if the client only writes inputs.
+                self.streaming = self.output is not None
+                return Acknowledgement(
+                    type=PackageType.CONTROL_PACKAGE_START, accepted=self.streaming
+                )
             case PauseStreaming():
                 self.streaming = False
                 return Acknowledgement(type=PackageType.CONTROL_PACKAGE_PAUSE, accepted=True)

@@ -32,11 +32,11 @@ MIN_VERSIONS = {3: (3, 14, 3), 5: (5, 9, 4)}
 #: Outputs to record in addition to the driver's own recipe.
 EXTRA_OUTPUTS = ('target_speed_fraction', 'payload', 'payload_cog', 'payload_inertia')
 #: Inputs that the driver writes, by purpose.
+REGISTERS = ('SERVO registers', 'path offset registers')
 INPUT_GROUPS: Mapping[str, tuple[str, ...]] = {
     'speed slider': ('speed_slider_mask', 'speed_slider_fraction'),
     'outputs': ('standard_digital_output_mask', 'standard_digital_output'),
-    'SERVO registers': tuple(SERVO_INPUTS),
-    'path offset registers': tuple(OFFSET_INPUTS),
+    **dict(zip(REGISTERS, (SERVO_INPUTS, OFFSET_INPUTS), strict=True)),
 }
 #: How long this check tries to get the inputs of a closed connection [s]; a goal tries for 0.2 s.
 RELEASE_TIMEOUT = 2.0
@@ -180,11 +180,14 @@ async def observe_inputs(address: RobotAddress) -> AsyncIterator[Finding]:
         except OSError as error:
             taken[purpose] = str(error)
     if taken:
+        lower_is_free = await _has_free_lower_registers(address)
         yield note(
             'rtde_inputs',
             f'The driver cannot write what it needs for {", ".join(taken)}: '
-            f'{next(iter(taken.values()))}',
+            f'{next(iter(taken.values()))} The registers 0 to 23 are '
+            f'{"free" if lower_is_free else "taken, too"}.',
             refused=sorted(taken),
+            lower_registers_free=lower_is_free,
         )
         return
     yield ok('rtde_inputs', 'No other client holds the RTDE inputs that the driver writes.')
@@ -211,10 +214,20 @@ async def observe_inputs(address: RobotAddress) -> AsyncIterator[Finding]:
     )
 
 
-async def _request_inputs(address: RobotAddress, names: tuple[str, ...]) -> None:
-    connection = RtdeConnection(
-        RtdeClientCodec(outputs=('timestamp',), inputs=names), lambda *_: None
-    )
+async def _has_free_lower_registers(address: RobotAddress) -> bool:
+    try:
+        for purpose in REGISTERS:
+            await _request_inputs(address, INPUT_GROUPS[purpose], lower_registers=True)
+    except OSError:
+        return False
+    return True
+
+
+async def _request_inputs(
+    address: RobotAddress, names: tuple[str, ...], *, lower_registers: bool = False
+) -> None:
+    codec = RtdeClientCodec(('timestamp',), names, lower_registers=lower_registers)
+    connection = RtdeConnection(codec, lambda *_: None)
     try:
         await connection.open(address.host, address.rtde_port)
     finally:

@@ -146,6 +146,7 @@ class ProgramSockets:
                 servoj_lookahead_time=s.servoj_lookahead_time,
                 servo_buffer_depth=s.servo_buffer_depth,
                 allow_freedrive=s.allow_freedrive,
+                lower_registers=s.lower_registers,
                 prelude=s.prelude,
             )
         )

@@ -57,9 +57,13 @@ class RegisterExchange:
 class RegisterConnection:
     """A connection for one goal, used from one event loop: run it, write to it, close it."""
 
-    def __init__(self, exchange: RegisterExchange) -> None:
-        """Prepare a connection."""
-        self._exchange = exchange
+    def __init__(self, exchange: RegisterExchange, *, lower_registers: bool) -> None:
+        """
+        Prepare a connection.
+
+        :param lower_registers: whether the robot program uses the registers from 0 on.
+        """
+        self._exchange, self._lower_registers = exchange, lower_registers
         self._is_open = True
         self._attempt: _Attempt | None = None
 
@@ -73,7 +77,7 @@ class RegisterConnection:
         loop = asyncio.get_running_loop()
         give_up, reason = loop.time() + OPEN_TIMEOUT, ''
         while self._is_open:
-            self._attempt = attempt = _Attempt(self._exchange, self._on_row)
+            self._attempt = attempt = _Attempt(self._exchange, self._on_row, self._lower_registers)
             reason = await attempt.serve(host, port)
             if attempt.has_inputs or loop.time() >= give_up:
                 break
@@ -105,8 +109,9 @@ class _Attempt(RtdeConnection):
         self,
         exchange: RegisterExchange,
         on_values: Callable[[Sequence[str], RtdeValues], None],
+        lower_registers: bool,
     ) -> None:
-        codec = RtdeClientCodec(outputs=exchange.outputs, inputs=exchange.inputs)
+        codec = RtdeClientCodec(exchange.outputs, exchange.inputs, lower_registers=lower_registers)
         super().__init__(codec, on_values)
         self._is_wanted = True
 

@@ -26,7 +26,12 @@ class StateStream(RtdeConnection):
     """A connection that is used once, from one event loop: open it, wait for its end, close it."""
 
     def __init__(
-        self, frequency: float, max_age: float, on_state: Callable[[RobotState], None]
+        self,
+        frequency: float,
+        max_age: float,
+        on_state: Callable[[RobotState], None],
+        *,
+        lower_registers: bool = False,
     ) -> None:
         """
         Prepare a stream.
@@ -34,10 +39,14 @@ class StateStream(RtdeConnection):
         :param frequency: rate of the packets [Hz]; 0 = one in every step of the controller.
         :param max_age: the connection ends when its states stay older than this [s]; 0 = never.
         :param on_state: called for each packet, possibly before :meth:`open` returns.
+        :param lower_registers: whether the robot program reports in the registers from 0 on.
         """
         super().__init__(
             RtdeClientCodec(
-                outputs=STATE_FIELDS, optional_outputs=OPTIONAL_FIELDS, frequency=frequency
+                outputs=STATE_FIELDS,
+                optional_outputs=OPTIONAL_FIELDS,
+                frequency=frequency,
+                lower_registers=lower_registers,
             ),
             self._on_row,
         )

@@ -35,6 +35,12 @@ from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
 #: How long the dashboard may take to greet, and to answer [s].
 ANSWER_TIMEOUT = 5.0
+#: The same for reports, which a robot answers when they are written [s]: the bounds of Universal
+#: Robots' client library.
+REPORT_TIMEOUTS: Mapping[str, float] = {
+    'generate flight report': 180.0,
+    'generate support file': 600.0,
+}
 #: The first software without a dashboard.
 POLYSCOPE_X = 10
 #: What to do if the Robot API lacks a command; commands without an entry: use the pendant.
@@ -76,6 +82,7 @@ class DashboardConnection:
                 event for event in codec.feed(data) if not isinstance(event, DashboardGreeting)
             ),
             lambda: bool(replies),
+            REPORT_TIMEOUTS.get(command, ANSWER_TIMEOUT),
         )
         return replies[0]
 
@@ -94,7 +101,11 @@ class DashboardConnection:
         return lines[1]  # the first one is the greeting
 
     async def _exchange(
-        self, request: bytes, feed: Callable[[bytes], None], answered: Callable[[], bool]
+        self,
+        request: bytes,
+        feed: Callable[[bytes], None],
+        answered: Callable[[], bool],
+        within: float = ANSWER_TIMEOUT,
     ) -> None:
         """Send a request and feed the bytes that come back until the request is answered."""
         ended: asyncio.Future[str] = asyncio.get_running_loop().create_future()
@@ -117,10 +128,10 @@ class DashboardConnection:
         try:
             await dial(connection, self._host, self._port)
             connection.send(request)
-            async with asyncio.timeout(ANSWER_TIMEOUT):
+            async with asyncio.timeout(within):
                 reason = await ended
         except TimeoutError:
-            raise OSError(f'{where} does not answer within {ANSWER_TIMEOUT:g} s') from None
+            raise OSError(f'{where} does not answer within {within:g} s') from None
         finally:
             connection.close()
         if errors:

@@ -11,6 +11,9 @@ a restart of the robot would fail.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Mapping
+from dataclasses import replace
+from urllib.parse import quote
 
 import urllib3
 
@@ -24,15 +27,18 @@ from ur_cartesian_driver.protocol.robot_api import (
     RESUME,
 )
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
+from ur_cartesian_driver.robot.services.dashboard_connection import REPORT_TIMEOUTS
 from ur_cartesian_driver.robot.transport import CONNECT_TIMEOUT, error_reason
 
 #: How long the robot may take to answer [s].
 ANSWER_TIMEOUT = 10.0
-#: The same for SLOW_COMMANDS, which the robot answers after their effect [s].
-SLOW_ANSWER_TIMEOUT = 30.0
-SLOW_COMMANDS = frozenset({'power on', 'brake release', 'restart safety'})
-#: Longest answer that is read [bytes].
-MAX_ANSWER_SIZE = 65536
+#: The same for commands that the robot answers after a slow effect [s].
+SLOW_ANSWER_TIMEOUTS: Mapping[str, float] = {
+    **dict.fromkeys(('power on', 'brake release', 'restart safety'), 30.0),
+    **REPORT_TIMEOUTS,
+}
+#: Longest answer that is read [bytes]; programs have some 100 kB.
+MAX_ANSWER_SIZE = 1 << 22
 #: Largest number of redirects: paths have moved between versions, and old paths redirect to new.
 MAX_REDIRECTS = 3
 #: How long the robot may take to report a program as loaded [s]; the period of the queries [s].
@@ -73,12 +79,33 @@ class RobotApiConnection:
             self._exchange,
             api_command,
             encode_body(api_command, argument),
-            SLOW_ANSWER_TIMEOUT if command in SLOW_COMMANDS else ANSWER_TIMEOUT,
+            timeout=SLOW_ANSWER_TIMEOUTS.get(command, ANSWER_TIMEOUT),
         )
         reply = parse_answer(request, api_command, status, body)
         if command == 'load' and reply.ok and self._version >= NAMES_LOADED_PROGRAM:
             await self._wait_until_loaded(argument)
         return reply
+
+    async def get(self, command: ApiCommand, name: str = '') -> tuple[int, bytes]:
+        """
+        Send a request without a body, and return status and body of the answer.
+
+        :param name: the name of a program, for a path that contains one.
+        :raises OSError: the Robot API does not answer, or sends more than MAX_ANSWER_SIZE.
+        """
+        path = command.path.replace('{}', quote(name, safe=''))
+        return await asyncio.to_thread(self._exchange, replace(command, path=path))
+
+    async def send_program(self, command: ApiCommand, program: str) -> tuple[int, bytes]:
+        """
+        Send a program as the file of a form, and return status and body of the answer.
+
+        :raises OSError: the Robot API does not answer.
+        """
+        form, content_type = urllib3.encode_multipart_formdata(
+            {'file': (f'program{PROGRAM_SUFFIX}', program.encode(), 'application/json')}
+        )
+        return await asyncio.to_thread(self._exchange, command, form, content_type)
 
     async def _wait_until_loaded(self, program: str) -> None:
         """
@@ -97,7 +124,13 @@ class RobotApiConnection:
                 )
             await asyncio.sleep(LOAD_POLL_PERIOD)
 
-    def _exchange(self, command: ApiCommand, body: bytes, timeout: float) -> tuple[int, bytes]:
+    def _exchange(
+        self,
+        command: ApiCommand,
+        body: bytes = b'',
+        content_type: str = 'application/json',
+        timeout: float = ANSWER_TIMEOUT,
+    ) -> tuple[int, bytes]:
         """Send a request and return status and body of the answer; called in a thread."""
         try:
             # The pool connects only to the robot: no proxy, and no redirection to another host.
@@ -112,16 +145,19 @@ class RobotApiConnection:
                     BASE_PATH + command.path,
                     body=body or None,
                     headers={'Accept': 'application/json'}
-                    | ({'Content-Type': 'application/json'} if body else {}),
+                    | ({'Content-Type': content_type} if body else {}),
                     preload_content=False,
                 )
                 try:
-                    return response.status, response.read(MAX_ANSWER_SIZE)
+                    answer = response.read(MAX_ANSWER_SIZE + 1)
                 finally:
                     response.close()
         except urllib3.exceptions.HTTPError as error:
             where = f'{self._host} port {self._port} (Robot API)'
             raise OSError(f'{where}: {_reason(error, timeout)}') from error
+        if len(answer) > MAX_ANSWER_SIZE:
+            raise OSError(f'The answer of the Robot API is longer than {MAX_ANSWER_SIZE} bytes')
+        return response.status, answer
 
 
 def _reason(error: urllib3.exceptions.HTTPError, timeout: float) -> str:

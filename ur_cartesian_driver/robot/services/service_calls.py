@@ -33,6 +33,8 @@ PINS = {
 SCRIPT_TIMEOUT, MAX_SCRIPT_TIMEOUT = 30.0, 600.0
 #: Length [characters] above which a script must be a mistake.
 MAX_SCRIPT_LENGTH = 200_000
+#: Longest program [characters].
+MAX_PROGRAM_LENGTH = 2_000_000
 #: Longest text for the dashboard [characters]; its UTF-8 bytes fit into a line of the server.
 MAX_TEXT_LENGTH = 1000
 #: A length that no tool has [m]; a mass that no payload has [kg].
@@ -84,6 +86,49 @@ class DashboardLineCall:
                 f'A request to the dashboard is one line of text, not {self.line!r:.100}.'
             )
         _check_length(self.line)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ListProgramsCall:
+    """Ask for the names of the robot's programs, one on each line; PolyScope X only."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UploadProgramCall:
+    """
+    Send a program to the robot; PolyScope X only.
+
+    :param program: the content of a `.urpx` file, which also names the program.
+    :param replaces: the program takes the place of one that the robot has; else it is a new one.
+    """
+
+    program: str
+    replaces: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the length of the program."""
+        _declare_types(self)
+        if not self.program.strip():
+            raise LocalProtocolError('The program is empty; give the content of a .urpx file.')
+        if len(self.program) > MAX_PROGRAM_LENGTH:
+            raise LocalProtocolError(
+                f'The program has {len(self.program)} characters, more than '
+                f'{MAX_PROGRAM_LENGTH}; upload it on the pendant.'
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DownloadProgramCall:
+    """Ask for a program of the robot, the content of a `.urpx` file; PolyScope X only."""
+
+    program_name: str
+
+    def __post_init__(self) -> None:
+        """Check that there is a name."""
+        _declare_types(self)
+        if not self.program_name.strip():
+            raise LocalProtocolError('program_name is empty; get_programs lists the names.')
+        _check_length(self.program_name)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -306,6 +351,9 @@ def _check_length(text: str) -> None:
 ServiceCall: TypeAlias = (
     DashboardCall
     | DashboardLineCall
+    | ListProgramsCall
+    | UploadProgramCall
+    | DownloadProgramCall
     | SettingCall
     | ZeroFtSensorCall
     | SetOutputCall

@@ -6,7 +6,7 @@ Carries out the service calls of a driver's owner.
 A call uses the dashboard, a single command to the robot program, the primary interface, or RTDE
 inputs. It succeeds once the robot reports the effect, if the robot can report it. A call ends
 within :data:`CALL_TIMEOUT`, a recovery within :data:`RECOVERY_TIMEOUT`, a script within
-:data:`CALL_TIMEOUT` plus its timeout.
+:data:`CALL_TIMEOUT` plus its timeout, and so does a report (:data:`REPORT_TIMEOUTS`).
 """
 
 from __future__ import annotations
@@ -26,18 +26,22 @@ from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.services import rtde_input_writer
+from ur_cartesian_driver.robot.services.dashboard_connection import REPORT_TIMEOUTS
 from ur_cartesian_driver.robot.services.dashboard_service import (
     DashboardPorts,
     DashboardService,
     EFFECT_TIMEOUT,
 )
 from ur_cartesian_driver.robot.services.polling import wait_for_state
+from ur_cartesian_driver.robot.services.program_files import ProgramFiles
 from ur_cartesian_driver.robot.services.recovery import RecoveryRunner
 from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,
+    DownloadProgramCall,
     failed,
     HandBackCall,
+    ListProgramsCall,
     RecoverCall,
     RunScriptCall,
     SendProgramCall,
@@ -50,6 +54,7 @@ from ur_cartesian_driver.robot.services.service_calls import (
     SetTcpCall,
     SettingCall,
     succeeded,
+    UploadProgramCall,
     ZeroFtSensorCall,
 )
 
@@ -90,7 +95,15 @@ QUERY_COMMANDS = frozenset(
 )
 
 #: Dashboard commands that disturb a running goal.
-INTERFERING_COMMANDS = frozenset({'load', 'load installation', 'restart safety'})
+INTERFERING_COMMANDS = frozenset(
+    {
+        'load',
+        'load installation',
+        'restart safety',
+        'set operational mode',
+        'clear operational mode',
+    }
+)
 
 
 class ServiceDispatcher:
@@ -101,6 +114,7 @@ class ServiceDispatcher:
         self._settings = settings
         self._link = link
         self._dashboard = DashboardService(settings.robot_ip, ports, link)
+        self._program_files = ProgramFiles(settings.robot_ip, ports.robot_api, link)
         self._recovery = RecoveryRunner(
             link, self._dashboard, self._send_program, headless=settings.headless_mode
         )
@@ -122,6 +136,8 @@ class ServiceDispatcher:
         bound = RECOVERY_TIMEOUT if isinstance(call, RecoverCall) else CALL_TIMEOUT
         if isinstance(call, RunScriptCall):
             bound += call.timeout
+        elif isinstance(call, DashboardCall):
+            bound += REPORT_TIMEOUTS.get(call.command, 0.0)
         try:
             async with asyncio.timeout(bound):
                 return self._refusal(call) or await self._execute(call)
@@ -139,6 +155,8 @@ class ServiceDispatcher:
                 return await self._dashboard.request(call)
             case DashboardLineCall():
                 return await self._dashboard.request_raw(call)
+            case ListProgramsCall() | UploadProgramCall() | DownloadProgramCall():
+                return await self._program_files.carry_out(call)
             case SetTcpCall() | SetPayloadCall() | SetGravityCall():
                 return await self._set(call)
             case ZeroFtSensorCall():
@@ -166,7 +184,9 @@ class ServiceDispatcher:
     def _refusal(self, call: ServiceCall) -> ServiceAnswer | None:
         """Return the refusal of a call that is not allowed now; None = it is allowed."""
         status = self._link.status
-        if isinstance(call, DashboardCall) and call.command in QUERY_COMMANDS:
+        if isinstance(call, ListProgramsCall | DownloadProgramCall) or (
+            isinstance(call, DashboardCall) and call.command in QUERY_COMMANDS
+        ):
             return None
         if status.state is ConnectionState.REFUSED:
             return failed(status.message)

@@ -24,7 +24,9 @@ from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,
+    DownloadProgramCall,
     HandBackCall,
+    ListProgramsCall,
     RecoverCall,
     RunScriptCall,
     SCRIPT_TIMEOUT,
@@ -37,19 +39,26 @@ from ur_cartesian_driver.robot.services.service_calls import (
     SetSpeedSliderCall,
     SetTcpCall,
     SettingCall,
+    UploadProgramCall,
     ZeroFtSensorCall,
 )
 from ur_cartesian_driver.ros.message_fields import pose_from_message
 from ur_cartesian_driver.ros.services.deferred_service import completed_answer, DeferredService
 from ur_cartesian_driver.srv import (
+    DownloadProgram,
+    GenerateFlightReport,
+    GenerateSupportFile,
     Load,
     Popup,
     RawRequest,
     Recover,
     RunScript,
     SetIO,
+    SetOperationalMode,
     SetSpeedSliderFraction,
     SetTCP,
+    SetUserRole,
+    UploadProgram,
 )
 from ur_cartesian_driver.srv import (
     SetGravity as SetGravityService,
@@ -63,6 +72,7 @@ TRIGGER_SERVICES: Mapping[str, ServiceCall] = {
     'resend_robot_program': SendProgramCall(),
     'hand_back_control': HandBackCall(),
     'zero_ftsensor': ZeroFtSensorCall(),
+    'dashboard/get_programs': ListProgramsCall(),
     **{
         f'dashboard/{name}': DashboardCall(command=command)
         for name, command in {
@@ -78,6 +88,10 @@ TRIGGER_SERVICES: Mapping[str, ServiceCall] = {
             'stop': 'stop',
             'get_robot_mode': 'robotmode',
             'get_safety_mode': 'safetymode',
+            'get_safety_status': 'safetystatus',
+            'get_operational_mode': 'get operational mode',
+            'clear_operational_mode': 'clear operational mode',
+            'get_user_role': 'getUserRole',
             'get_loaded_program': 'get loaded program',
             'program_state': 'programState',
             'program_running': 'running',
@@ -150,6 +164,38 @@ REQUEST_SERVICES: Mapping[str, tuple[Any, Callable[[Any], ServiceCall]]] = {
     'dashboard/popup': (
         Popup,
         lambda request: DashboardCall(command='popup', argument=request.message),
+    ),
+    'dashboard/set_operational_mode': (
+        SetOperationalMode,
+        lambda request: DashboardCall(
+            command='set operational mode', argument=request.operational_mode
+        ),
+    ),
+    'dashboard/set_user_role': (
+        SetUserRole,
+        lambda request: DashboardCall(command='setUserRole', argument=request.user_role),
+    ),
+    'dashboard/generate_flight_report': (
+        GenerateFlightReport,
+        lambda request: DashboardCall(
+            command='generate flight report', argument=request.report_type
+        ),
+    ),
+    'dashboard/generate_support_file': (
+        GenerateSupportFile,
+        lambda request: DashboardCall(command='generate support file', argument=request.dir_path),
+    ),
+    'dashboard/upload_program': (
+        UploadProgram,
+        lambda request: UploadProgramCall(program=request.program),
+    ),
+    'dashboard/update_program': (
+        UploadProgram,
+        lambda request: UploadProgramCall(program=request.program, replaces=True),
+    ),
+    'dashboard/download_program': (
+        DownloadProgram,
+        lambda request: DownloadProgramCall(program_name=request.program_name),
     ),
     'dashboard/raw_request': (RawRequest, lambda request: DashboardLineCall(line=request.query)),
 }

@@ -56,6 +56,14 @@ def whole(value: Value, name: str) -> int:
     return int(result)
 
 
+def whole_within(value: Value, name: str, low: int, high: int) -> int:
+    """Return the value as an integer from ``low`` to ``high``."""
+    result = whole(value, name)
+    if not low <= result <= high:
+        raise RuntimeException(f'{name} is {result}; it must be within {low}..{high}')
+    return result
+
+
 def int32(value: Value, name: str) -> int:
     """Return the value as an integer that fits into 32 bits."""
     result = whole(value, name)
@@ -83,10 +91,7 @@ def one_of(value: Value, name: str, choices: tuple[int, ...]) -> int:
 
 def index(value: Value, name: str, count: int) -> int:
     """Return the value as an integer from 0 to ``count`` - 1."""
-    result = whole(value, name)
-    if not 0 <= result < count:
-        raise RuntimeException(f'{name} is {result}; it must be within 0..{count - 1}')
-    return result
+    return whole_within(value, name, 0, count - 1)
 
 
 def six(value: Value, name: str) -> Vector6:

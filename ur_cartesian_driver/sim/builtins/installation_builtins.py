@@ -23,9 +23,9 @@ INPUT_ACTIONS = ('default', 'freedrive')
 EUROMAP_PINS = 33
 
 
-#: Program states to which an output can be tied; from 6 on they follow the power of the arm.
-RUN_STATES = (0, 1, 2, 3, 4, 5, 6, 7)
-EUROMAP_RUN_STATES = RUN_STATES[:4]
+#: Number of program states to which an output can be tied; 6 and 7 follow the power of the arm.
+RUN_STATES = 8
+EUROMAP_RUN_STATES = 4
 
 
 def _input_action(count: int) -> Callable[[Any, Value, Value], None]:
@@ -40,13 +40,13 @@ def _input_action(count: int) -> Callable[[Any, Value, Value], None]:
     return choose
 
 
-def _runstate(count: int, states: int = 8) -> Callable[[Any, Value, Value], None]:
+def _runstate(count: int, states: int = RUN_STATES) -> Callable[[Any, Value, Value], None]:
     """Return the script function that ties one of ``count`` outputs to one of the states."""
 
     @without_effect
     def choose(_: Any, outputId: Value, state: Value) -> None:
         index(outputId, 'outputId', count)
-        one_of(state, 'state', RUN_STATES[:states])
+        index(state, 'state', states)
 
     return choose
 
@@ -189,4 +189,4 @@ class EuromapBuiltins(BuiltinGroup):
     ) -> None:
         """Tie an output to the program state."""
         index(port_number, 'port_number', EUROMAP_PINS)
-        one_of(runstate_choice, 'runstate_choice', EUROMAP_RUN_STATES)
+        index(runstate_choice, 'runstate_choice', EUROMAP_RUN_STATES)

@@ -12,7 +12,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from ur_cartesian_driver.sim.builtins.arguments import index, int32, number, whole, within
+from ur_cartesian_driver.sim.builtins.arguments import (
+    index,
+    int32,
+    number,
+    whole,
+    whole_within,
+)
 from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup, without_effect
 from ur_cartesian_driver.sim.state.controller_io import ControllerIo
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
@@ -76,7 +82,7 @@ def _truth(value: Value, _: str) -> bool:
 
 def _word(value: Value, name: str) -> int:
     """Return the 16 bits of a word, which programs write with or without a sign."""
-    return round(within(int32(value, name), name, -(2**15), 2**16 - 1)) & 0xFFFF
+    return whole_within(value, name, -(2**15), 2**16 - 1) & 0xFFFF
 
 
 class DigitalBuiltins(_IoGroup):

@@ -11,7 +11,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ur_cartesian_driver.sim.builtins.arguments import index, one_of, text, whole, within
+from ur_cartesian_driver.sim.builtins.arguments import (
+    index,
+    one_of,
+    text,
+    whole_within,
+    within,
+)
 from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup, without_effect
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
@@ -188,7 +194,7 @@ class ModbusBuiltins(BuiltinGroup):
     ) -> None:
         """Tie an output to the program state."""
         self._signal(signal_name)
-        one_of(runstate_choice, 'runstate_choice', (0, 1, 2, 3, 4, 5))
+        index(runstate_choice, 'runstate_choice', 6)
 
     @without_effect
     def modbus_set_signal_update_frequency(
@@ -200,10 +206,7 @@ class ModbusBuiltins(BuiltinGroup):
 
 
 def _count(value: Value, name: str) -> int:
-    count = whole(value, name)
-    if not 1 <= count <= MAX_REGISTERS:
-        raise RuntimeException(f'{name} is {count}; it must be within 1..{MAX_REGISTERS}')
-    return count
+    return whole_within(value, name, 1, MAX_REGISTERS)
 
 
 def _given(

@@ -171,17 +171,17 @@ class RobotBuiltins(BuiltinGroup):
         """Set mass [kg] and centre of gravity [m] (default: the TCP); no inertia remains."""
         tcp = self._controller.motion.T_flange_tcp.position
         centre = tcp if cog is None else three(cog, 'cog')
-        self._controller.payload = Payload(mass=not_negative(m, 'm'), cog=centre)
+        self._change_payload(Payload(mass=not_negative(m, 'm'), cog=centre))
 
     def set_payload_mass(self, m: Value) -> None:
         """Set the mass [kg] alone; the inertia becomes zero."""
         payload = self._controller.payload
-        self._controller.payload = Payload(mass=not_negative(m, 'm'), cog=payload.cog)
+        self._change_payload(Payload(mass=not_negative(m, 'm'), cog=payload.cog))
 
     def set_payload_cog(self, CoG: Value) -> None:
         """Set the centre of gravity [m] alone; the inertia becomes zero."""
         payload = self._controller.payload
-        self._controller.payload = Payload(mass=payload.mass, cog=three(CoG, 'CoG'))
+        self._change_payload(Payload(mass=payload.mass, cog=three(CoG, 'CoG')))
 
     def set_target_payload(
         self, m: Value, cog: Value, inertia: Value = None, transition_time: Value = 0
@@ -193,9 +193,15 @@ class RobotBuiltins(BuiltinGroup):
             raise RuntimeException(
                 'inertia must lie within -133..133, and its first three items not below 0'
             )
-        self._controller.payload = Payload(
-            mass=not_negative(m, 'm'), cog=three(cog, 'cog'), inertia=matrix
+        self._change_payload(
+            Payload(mass=not_negative(m, 'm'), cog=three(cog, 'cog'), inertia=matrix)
         )
+
+    def _change_payload(self, payload: Payload) -> None:
+        """Set the payload; this zeroes the force sensor too, which CB3 arms do not have."""
+        self._controller.payload = payload
+        if self._controller.config.robot_model.series != 'CB3':
+            self._controller.contact.zero()
 
     def get_target_payload(self) -> float:
         """Return the mass of the payload [kg]."""

@@ -153,12 +153,12 @@ class DashboardHandlers:
         word = mode.upper()
         if word not in ('MANUAL', 'AUTOMATIC'):
             return f'could not understand: "set operational mode {mode}"'
-        self.pendant.operational_mode = word
+        self.controller.set_operational_mode(word)
         return None
 
     def clear_operational_mode(self, _: str) -> None:
         """Give back control of the operational mode."""
-        self.pendant.operational_mode = 'NONE'
+        self.controller.set_operational_mode('NONE')
 
 
 #: Command -> function that carries it out; the command fails if the function returns a reason.
@@ -204,7 +204,8 @@ _VALUES: Mapping[str, str] = MappingProxyType(
         'getUserRole': '{0.pendant.user_role}',
         'set operational mode': '"{1}" is set',
         'get operational mode': '{0.pendant.operational_mode}',
-        'clear operational mode': 'Current operational mode: NONE',
+        # The words of URSim, with a full stop.
+        'clear operational mode': "Current operational mode: 'NONE'.",
         'is in remote control': '{0.remote_control}',
         'get serial number': '20000000000',
         'get robot model': '{0.robot_model}',

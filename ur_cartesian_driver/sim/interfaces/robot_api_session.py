@@ -15,13 +15,28 @@ from http import HTTPStatus
 from http.client import HTTPException, parse_headers
 from io import BytesIO
 import json
-from pathlib import PurePosixPath
 from types import MappingProxyType
 from typing import Any
+from urllib.parse import unquote
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.interfaces.robot_api_fields import (
+    Body,
+    Fields,
+    read_body,
+    Refused,
+    text_field,
+)
+from ur_cartesian_driver.sim.interfaces.robot_api_programs import (
+    download_program,
+    list_programs,
+    load_program,
+    loaded_program,
+    update_program,
+    upload_program,
+)
 from ur_cartesian_driver.sim.interfaces.tcp_server import ClientSession, HangUp
 from ur_cartesian_driver.sim.state.controller_state import Popup
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
@@ -29,8 +44,8 @@ from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 BASE_PATH = '/universal-robots/robot-api'
 #: The first software version that has the Robot API.
 FIRST_VERSION = (10, 11)
-#: Largest request [bytes].
-_MAX_REQUEST_SIZE = 65536
+#: Largest head of a request [bytes]; largest request, which may contain a program.
+_MAX_HEAD_SIZE, _MAX_REQUEST_SIZE = 65536, 1 << 22
 #: Time after which an unfinished action is answered with 504 [s].
 _ACTION_TIMEOUT = 10.0
 
@@ -54,15 +69,6 @@ _FORBIDDEN = {
 }
 
 
-class Refused(Exception):
-    """Raised for a request that is not carried out."""
-
-    def __init__(self, status: HTTPStatus, message: str, **fields: Any) -> None:
-        """Take the status and the fields of the answer."""
-        super().__init__(message)
-        self.status, self.fields = status, {'message': message, **fields}
-
-
 @dataclass(frozen=True, slots=True)
 class Waiting:
     """A request whose answer is due when the robot has carried it out."""
@@ -71,8 +77,6 @@ class Waiting:
     message: str
 
 
-Body = Mapping[str, Any]
-Fields = dict[str, Any]
 Handler = Callable[[Controller, Body], 'Fields | Waiting']
 
 
@@ -153,29 +157,12 @@ def _act(
     controller: Controller,
     body: Body,
 ) -> Waiting:
-    action = _text(body, 'action')
+    action = text_field(body, 'action')
     if action not in actions:
         raise ValueError(f'action is {action!r}')
     act, is_done = actions[action]
     act(controller)
     return Waiting(is_done, f'{action} carried out')
-
-
-def _load(field: str) -> Handler:
-    def load(controller: Controller, body: Body) -> Fields:
-        name = _text(body, field)
-        for file, text in controller.config.programs.items():
-            if PurePosixPath(file).stem == name:
-                if error := controller.programs.load(file, text):
-                    raise Refused(HTTPStatus.INTERNAL_SERVER_ERROR, 'Error', details=error)
-                return {'message': 'Program loaded'}
-        raise Refused(HTTPStatus.INTERNAL_SERVER_ERROR, 'Error', details=f'No program {name!r}')
-
-    return load
-
-
-def _loaded(controller: Controller, _: Body) -> Fields:
-    return {'name': PurePosixPath(controller.programs.loaded).stem or 'Default program'}
 
 
 def _program_state(controller: Controller, _: Body) -> Fields:
@@ -198,7 +185,7 @@ def _versions(controller: Controller, _: Body) -> Fields:
 
 
 def _open_popup(controller: Controller, body: Body) -> Fields:
-    controller.show_popup(Popup(text=_text(body, 'message')))
+    controller.show_popup(Popup(text=text_field(body, 'message')))
     return {'message': 'Popup opened successfully'}
 
 
@@ -214,8 +201,24 @@ def _close_safety_popup(controller: Controller, _: Body) -> Fields:
 
 
 def _log(controller: Controller, body: Body) -> Fields:
-    controller.messages.note(_text(body, 'message'))
+    controller.messages.note(text_field(body, 'message'))
     return {'message': 'Log entry added'}
+
+
+def _operational_mode(controller: Controller, _: Body) -> Fields:
+    mode = controller.pendant.operational_mode
+    return {'mode': 'AUTOMATIC' if mode == 'NONE' else mode}
+
+
+def _shut_down(controller: Controller, _: Body) -> Fields:
+    """Switch off only the arm: without a controller, nothing could be tested afterwards."""
+    controller.power_off()
+    return {'message': None}
+
+
+def _write_flight_report(controller: Controller, _: Body) -> Fields:
+    """Only answer; no file is written."""
+    return {'message': 'Flight report generated successfully.', 'details': None}
 
 
 def _openapi(controller: Controller, _: Body) -> Fields:
@@ -243,16 +246,22 @@ _ROUTES: Mapping[tuple[str, str], tuple[tuple[int, int], Handler]] = MappingProx
             lambda controller, body: _act(_PROGRAM_ACTIONS, controller, body),
         ),
         ('GET', '/program/v1/state'): (FIRST_VERSION, _program_state),
-        ('PUT', '/program/v1/load'): (FIRST_VERSION, _load('programName')),
-        ('PUT', '/program/v1/loaded'): ((10, 12), _load('name')),
-        ('GET', '/program/v1/loaded'): ((10, 12), _loaded),
+        ('PUT', '/program/v1/load'): (FIRST_VERSION, load_program('programName')),
+        ('PUT', '/program/v1/loaded'): ((10, 12), load_program('name')),
+        ('GET', '/program/v1/loaded'): ((10, 12), loaded_program),
+        ('GET', '/programs/v1'): ((10, 12), list_programs),
+        ('POST', '/programs/v1'): ((10, 12), upload_program),
+        ('PUT', '/programs/v1'): ((10, 12), update_program),
+        ('GET', '/programs/v1/{name}'): ((10, 12), download_program),
         ('GET', '/system/v1/controlmode'): (
             (10, 12),
             lambda controller, _: {'mode': 'REMOTE' if controller.remote_control else 'LOCAL'},
         ),
-        ('GET', '/system/v1/operationalmode'): ((10, 12), lambda *_: {'mode': 'AUTOMATIC'}),
+        ('GET', '/system/v1/operationalmode'): ((10, 12), _operational_mode),
         ('GET', '/system/v1/information'): ((10, 14), _information),
         ('POST', '/system/v1/log'): ((10, 14), _log),
+        ('PUT', '/system/v1/shutdown'): ((10, 14), _shut_down),
+        ('POST', '/supportfiles/v1'): ((10, 14), _write_flight_report),
         ('GET', '/versions/v1'): ((10, 14), _versions),
         ('POST', '/popup/v1'): ((10, 14), _open_popup),
         ('DELETE', '/popup/v1'): ((10, 14), _close_popup),
@@ -268,6 +277,8 @@ class RobotApiSession(ClientSession):
         """Wait for requests."""
         self._controller = controller
         self._buffer = bytearray()
+        #: Size of the request whose head has come, so that a long body is not copied each time.
+        self._request_size = 0
         self._waiting: Waiting | None = None
         self._waits_until = 0.0
         self._last_request = False
@@ -307,10 +318,14 @@ class RobotApiSession(ClientSession):
             return _response(HTTPStatus.GATEWAY_TIMEOUT, {'message': 'Gateway Timeout'})
         return b''
 
-    def _next_request(self) -> tuple[str, str, bytes] | None:
-        """Return method, path and body of the next request; None = the request is incomplete."""
+    def _next_request(self) -> tuple[str, str, bytes, str] | None:
+        """Return method, path, body and its type of the next request; None = it is incomplete."""
+        if len(self._buffer) < self._request_size:
+            return None
         head, end, rest = bytes(self._buffer).partition(b'\r\n\r\n')
         if not end:
+            if len(head) > _MAX_HEAD_SIZE:
+                raise RemoteProtocolError(f'the head is longer than {_MAX_HEAD_SIZE} bytes')
             return None
         line, _, lines = head.partition(b'\r\n')
         try:
@@ -321,29 +336,33 @@ class RobotApiSession(ClientSession):
             raise RemoteProtocolError(f'{line!r:.100} does not begin an HTTP request') from error
         if 'Transfer-Encoding' in headers or size < 0:
             raise RemoteProtocolError('a request whose length is not given')
+        self._request_size = len(head) + len(end) + size
         if len(rest) < size:
             return None
-        del self._buffer[: len(head) + len(end) + size]
+        del self._buffer[: self._request_size]
+        self._request_size = 0
         self._last_request = version == 'HTTP/1.0' or headers.get('Connection') == 'close'
-        return method, path, rest[:size]
+        return method, path, rest[:size], headers.get('Content-Type', '')
 
-    def _answer(self, method: str, path: str, body: bytes) -> bytes:
+    def _answer(self, method: str, path: str, body: bytes, content_type: str) -> bytes:
         """Carry out a request and return the answer; empty if the answer comes later."""
-        route = path.removeprefix(BASE_PATH)
+        route, name = path.removeprefix(BASE_PATH), ''
+        if route.startswith('/programs/v1/'):
+            # The list is asked for with and without the slash.
+            name = unquote(route.removeprefix('/programs/v1/'))
+            route = '/programs/v1/{name}' if name else '/programs/v1'
         version = self._controller.config.version[:2]
         methods = {m for (m, p), (since, _) in _ROUTES.items() if p == route and version >= since}
-        if route == path or not methods:
+        if not path.startswith(BASE_PATH) or not methods:
             return self._not_found(path)
         if method not in methods:
             return _response(HTTPStatus.METHOD_NOT_ALLOWED, {'detail': 'Method Not Allowed'})
         if method != 'GET' and not self._controller.remote_control:
             return _response(HTTPStatus.FORBIDDEN, _FORBIDDEN)
         try:
-            fields = json.loads(body or b'{}')
-            if not isinstance(fields, dict):
-                raise ValueError('no object')
+            fields = {'name': name} if name else read_body(body, content_type)
             answer = _ROUTES[method, route][1](self._controller, fields)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             return _response(HTTPStatus.UNPROCESSABLE_ENTITY, {'detail': [{'msg': str(error)}]})
         except Refused as refused:
             return _response(refused.status, refused.fields)
@@ -351,7 +370,8 @@ class RobotApiSession(ClientSession):
             self._waiting = answer
             self._waits_until = self._controller.time + _ACTION_TIMEOUT
             return b''
-        return _response(HTTPStatus.OK, answer)
+        accepted = route == '/system/v1/shutdown'
+        return _response(HTTPStatus.ACCEPTED if accepted else HTTPStatus.OK, answer)
 
     def _not_found(self, path: str) -> bytes:
         """Return the answer to an unknown path; a known path with a last slash is redirected."""
@@ -359,18 +379,6 @@ class RobotApiSession(ClientSession):
         if path in known:
             return _response(HTTPStatus.TEMPORARY_REDIRECT, {}, location=path.rstrip('/'))
         return _response(HTTPStatus.NOT_FOUND, {'detail': 'Not Found'})
-
-
-def _text(body: Body, field: str) -> str:
-    """
-    Return the text in a field of a request.
-
-    :raises ValueError: the field is missing, or not a text.
-    """
-    value = body.get(field)
-    if not isinstance(value, str):
-        raise ValueError(f'{field} is {value!r}')
-    return value
 
 
 def _response(status: HTTPStatus, fields: Mapping[str, Any], location: str = '') -> bytes:

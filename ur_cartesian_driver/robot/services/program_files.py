@@ -1,0 +1,92 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The programs of a robot with PolyScope X: list, upload, update, download.
+
+A call contains a program as text, the content of a `.urpx` file, and never names a file: whoever
+may call a service may not read or write the files of this computer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ur_cartesian_driver.protocol.robot_api import (
+    DOWNLOAD_PROGRAM,
+    LIST_PROGRAMS,
+    parse_program_name,
+    parse_program_names,
+    refusal_text,
+    UPDATE_PROGRAM,
+    UPLOAD_PROGRAM,
+)
+from ur_cartesian_driver.robot.link import RobotLink
+from ur_cartesian_driver.robot.services.robot_api_connection import (
+    PROGRAM_SUFFIX,
+    RobotApiConnection,
+)
+from ur_cartesian_driver.robot.services.service_calls import (
+    DownloadProgramCall,
+    failed,
+    ListProgramsCall,
+    ServiceAnswer,
+    succeeded,
+    UploadProgramCall,
+)
+
+#: What to do about a refusal, by its status.
+REMEDIES: Mapping[int, str] = {
+    400: 'Does it have a program of this name? update_program replaces it.',
+    403: 'It is in local control: switch it to remote control on the pendant.',
+    404: 'get_programs lists the programs that it has.',
+    409: 'The program is loaded: load another one first.',
+    422: 'Is this the content of a .urpx file?',
+}
+
+
+class ProgramFiles:
+    """Carries out the calls, from one event loop."""
+
+    def __init__(self, host: str, port: int, link: RobotLink) -> None:
+        """Prepare; every call opens its own connection to the Robot API."""
+        self._host, self._port, self._link = host, port, link
+
+    async def carry_out(
+        self, call: ListProgramsCall | UploadProgramCall | DownloadProgramCall
+    ) -> ServiceAnswer:
+        """
+        Return the answer to a call.
+
+        :raises OSError: the Robot API does not answer.
+        :raises ProtocolError: the answer is invalid.
+        """
+        version = self._link.version
+        if version is None:
+            return failed(self._link.status.message)
+        if (version.major, version.minor) < LIST_PROGRAMS.since:
+            return failed(
+                'Programs are sent and listed by the Robot API of PolyScope X, from software '
+                f'10.12 on, but the robot runs {version}; use the pendant.'
+            )
+        api = RobotApiConnection(self._host, self._port, version)
+        match call:
+            case ListProgramsCall():
+                status, body = await api.get(LIST_PROGRAMS)
+            case UploadProgramCall():
+                status, body = await api.send_program(
+                    UPDATE_PROGRAM if call.replaces else UPLOAD_PROGRAM, call.program
+                )
+            case DownloadProgramCall():
+                name = call.program_name.removesuffix(PROGRAM_SUFFIX)
+                status, body = await api.get(DOWNLOAD_PROGRAM, name)
+        if not 200 <= status < 300:
+            said = refusal_text(status, body)
+            remedy = REMEDIES.get(status, 'Look at the log of the robot.')
+            return failed(f'The robot refuses this and says: {said.rstrip(".")}. {remedy}')
+        match call:
+            case ListProgramsCall():
+                return succeeded('\n'.join(parse_program_names(body)))
+            case UploadProgramCall():
+                return succeeded(parse_program_name(body))
+            case DownloadProgramCall():
+                return succeeded(body.decode(errors='replace'))

@@ -1,0 +1,87 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The programs of a robot over the Robot API: list, upload, update, download, load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from http import HTTPStatus
+from pathlib import PurePosixPath
+
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.interfaces.robot_api_fields import (
+    Body,
+    Fields,
+    Refused,
+    text_field,
+)
+from ur_cartesian_driver.sim.programs.stored_programs import read_urpx
+
+
+def list_programs(controller: Controller, _: Body) -> Fields:
+    """Return the information about each program."""
+    files = controller.stored_programs
+    return {
+        'programs': [files.urpx(name)['program']['programInformation'] for name in files.names()],
+        'message': None,
+    }
+
+
+def download_program(controller: Controller, body: Body) -> Fields:
+    """Return the content of a program's file."""
+    name = text_field(body, 'name')
+    if name not in controller.stored_programs.names():
+        raise Refused(HTTPStatus.NOT_FOUND, 'Program not found', details=name)
+    return controller.stored_programs.urpx(name)
+
+
+def upload_program(controller: Controller, body: Body) -> Fields:
+    """Add the program in a form's file."""
+    name, content = read_urpx(_file(body))
+    if name in controller.stored_programs.names():
+        raise Refused(
+            HTTPStatus.BAD_REQUEST, 'Program with this name already exists', details=name
+        )
+    controller.stored_programs.put(name, content)
+    return {'programName': name, 'message': 'Program uploaded'}
+
+
+def update_program(controller: Controller, body: Body) -> Fields:
+    """Replace a program by the one in a form's file."""
+    name, content = read_urpx(_file(body))
+    if name not in controller.stored_programs.names():
+        raise Refused(HTTPStatus.NOT_FOUND, 'Program not found', details=name)
+    if name == PurePosixPath(controller.programs.loaded).stem:
+        raise Refused(HTTPStatus.CONFLICT, 'Program is loaded and active', details=name)
+    controller.stored_programs.put(name, content)
+    return {'programName': name, 'message': 'Program updated'}
+
+
+def load_program(field: str) -> Callable[[Controller, Body], Fields]:
+    """Return the handler that loads the program whose name is in a field."""
+
+    def load(controller: Controller, body: Body) -> Fields:
+        name = text_field(body, field)
+        file = controller.stored_programs.names().get(name, '')
+        if error := controller.load_program(file) if file else f'No program {name!r}':
+            raise Refused(HTTPStatus.INTERNAL_SERVER_ERROR, 'Error', details=error)
+        return {'message': 'Program loaded'}
+
+    return load
+
+
+def loaded_program(controller: Controller, _: Body) -> Fields:
+    """Return the name of the loaded program."""
+    return {'name': PurePosixPath(controller.programs.loaded).stem or 'Default program'}
+
+
+def _file(body: Body) -> bytes:
+    """
+    Return the file of a form.
+
+    :raises ValueError: there is none.
+    """
+    data = body.get('file')
+    if not isinstance(data, bytes):
+        raise ValueError('file is missing')
+    return data

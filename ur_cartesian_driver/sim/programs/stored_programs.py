@@ -1,0 +1,97 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The program files of a robot: those that it was configured with, and those that clients upload.
+
+PolyScope X keeps a program as JSON (`.urpx`): its tree, its information, and the URScript that was
+generated from them, which is what runs here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import json
+from pathlib import PurePosixPath
+import re
+from typing import Any
+
+#: Suffix of the programs of PolyScope X.
+URPX_SUFFIX = '.urpx'
+_SCRIPT = ('program', 'urscript', 'script')
+
+
+class StoredPrograms:
+    """The programs on the disk of a robot, as URScript."""
+
+    def __init__(self, scripts: Mapping[str, str]) -> None:
+        """
+        Begin with these files.
+
+        :param scripts: file name -> URScript.
+        """
+        self._scripts = dict(scripts)
+        self._uploaded: dict[str, Mapping[str, Any]] = {}
+
+    def script(self, file: str) -> str | None:
+        """Return the URScript of a file; None = there is no such file."""
+        return self._scripts.get(file)
+
+    def names(self) -> dict[str, str]:
+        """Return the file of each program name; on PolyScope X names have no suffix."""
+        return {PurePosixPath(file).stem: file for file in self._scripts}
+
+    def urpx(self, name: str) -> Mapping[str, Any]:
+        """
+        Return the content of a program's `.urpx` file.
+
+        A program that was not uploaded gets one without a tree.
+        """
+        script = self._scripts[self.names()[name]]
+        return self._uploaded.get(name) or {
+            'application': {},
+            'program': {
+                'programInformation': {
+                    'name': name,
+                    'description': '',
+                    'createdDate': None,
+                    'lastSavedDate': None,
+                    'lastModifiedDate': None,
+                    'programState': 'FINAL',
+                },
+                'urscript': {'script': script, 'nodeIDList': []},
+            },
+        }
+
+    def put(self, name: str, content: Mapping[str, Any]) -> None:
+        """Add or replace a program; the content has been read by :func:`read_urpx`."""
+        self._uploaded[name] = content
+        self._scripts[self.names().get(name, name + URPX_SUFFIX)] = _script_of(name, content)
+
+
+def read_urpx(data: bytes) -> tuple[str, Mapping[str, Any]]:
+    """
+    Return the name of the program in a `.urpx` file, and the content of the file.
+
+    :raises ValueError: the data are not the content of such a file.
+    """
+    content = json.loads(data)
+    name = _text_in(content, 'program', 'programInformation', 'name')
+    if not name or not _text_in(content, *_SCRIPT):
+        raise ValueError('the file lacks the name or the script of a program')
+    return name, content
+
+
+def _text_in(content: object, *keys: str) -> str:
+    """Return a text inside objects; empty if it is not there."""
+    for key in keys:
+        content = content.get(key) if isinstance(content, dict) else None
+    return content if isinstance(content, str) else ''
+
+
+def _script_of(name: str, content: Mapping[str, Any]) -> str:
+    """Return the URScript of a program, as one function, behind the application's script."""
+    script = _text_in(content, *_SCRIPT)
+    if script.lstrip().startswith('def '):
+        return script
+    application = _text_in(content, 'application', 'urscript', 'script')
+    return f'def {re.sub(r"[^A-Za-z0-9_]", "_", f"p_{name}")}():\n{application}\n{script}\nend\n'
