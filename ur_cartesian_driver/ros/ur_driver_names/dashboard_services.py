@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 import re
-from typing import Any, NamedTuple
+from typing import Any
 
 from std_srvs.srv import Trigger
 
@@ -27,23 +27,33 @@ from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
 from ur_cartesian_driver.ros.message_fields import Message
 from ur_cartesian_driver.ros.services.deferred_service import completed_answer
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
-from ur_cartesian_driver.ros.ur_driver_names.offered_name import same_request, Service, UrName
-from ur_cartesian_driver.srv import Load, Popup, RawRequest
+from ur_cartesian_driver.ros.ur_driver_names.offered_name import (
+    Call,
+    same_request,
+    Service,
+    UrName,
+)
+from ur_cartesian_driver.srv import (
+    GenerateFlightReport,
+    GenerateSupportFile,
+    Load,
+    Popup,
+    RawRequest,
+    SetOperationalMode,
+    SetUserRole,
+)
 
 DASHBOARD = 'dashboard_client'
 _NO_FIELDS = 'std_srvs/srv/Trigger'
+#: How long the robot may take to write a report, or a file for its manufacturer [s].
+FLIGHT_REPORT_TIMEOUT, SUPPORT_FILE_TIMEOUT = 240.0, 660.0
 
 Fill = Callable[[Message, str], None]
+Argument = Callable[[Message], str]
 
 
-class _Line(NamedTuple):
-    """A command that goes to the dashboard as a line, and its argument for a request."""
-
-    name: str
-    type: str
-    command: str
-    fill: Fill = lambda response, value: None
-    argument: Callable[[Message], str] = lambda request: ''
+def _nothing(response: Message, value: str) -> None:
+    """Fill in nothing: the response has only the words."""
 
 
 def _split(value: str) -> tuple[str, str]:
@@ -156,6 +166,9 @@ _QUERIES: dict[str, tuple[str, str, Fill]] = {
     'program_state': ('GetProgramState', 'programState', _state),
     'program_running': ('IsProgramRunning', 'running', _running),
     'program_saved': ('IsProgramSaved', 'isProgramSaved', _saved),
+    'get_safety_status': ('GetSafetyStatus', 'safetystatus', _safety_status),
+    'get_operational_mode': ('GetOperationalMode', 'get operational mode', _operational_mode),
+    'get_user_role': ('GetUserRole', 'getUserRole', _user_role),
     'get_robot_mode': ('GetRobotMode', 'robotmode', _robot_mode),
     'get_safety_mode': ('GetSafetyMode', 'safetymode', _safety_mode),
     'is_in_remote_control': ('IsInRemoteControl', 'is in remote control', _remote_control),
@@ -163,41 +176,12 @@ _QUERIES: dict[str, tuple[str, str, Fill]] = {
     'get_robot_model': ('GetRobotModel', 'get robot model', _model),
     'get_serial_number': ('GetSerialNumber', 'get serial number', _serial_number),
 }
-_LINES = (
-    _Line('clear_operational_mode', _NO_FIELDS, 'clear operational mode'),
-    _Line('quit', _NO_FIELDS, 'quit'),
-    _Line('shutdown', _NO_FIELDS, 'shutdown'),
-    _Line('get_safety_status', 'GetSafetyStatus', 'safetystatus', _safety_status),
-    _Line('get_operational_mode', 'GetOperationalMode', 'get operational mode', _operational_mode),
-    _Line(
-        'set_operational_mode',
-        'SetOperationalMode',
-        'set operational mode',
-        argument=lambda request: request.operational_mode.mode.lower(),
-    ),
-    _Line('get_user_role', 'GetUserRole', 'getUserRole', _user_role),
-    _Line(
-        'set_user_role',
-        'SetUserRole',
-        'setUserRole',
-        argument=lambda request: request.user_role.role,
-    ),
-    _Line('add_to_log', 'AddToLog', 'addToLog', argument=lambda request: request.message),
-    _Line(
-        'generate_flight_report',
-        'GenerateFlightReport',
-        'generate flight report',
-        _report_id,
-        lambda request: request.report_type,
-    ),
-    _Line(
-        'generate_support_file',
-        'GenerateSupportFile',
-        'generate support file',
-        _file_name,
-        lambda request: request.dir_path,
-    ),
-)
+#: Commands that the driver has no service for, and their argument for a request.
+_LINES: dict[str, tuple[str, str, Argument]] = {
+    'quit': (_NO_FIELDS, 'quit', lambda request: ''),
+    'shutdown': (_NO_FIELDS, 'shutdown', lambda request: ''),
+    'add_to_log': ('AddToLog', 'addToLog', lambda request: request.message),
+}
 
 
 def _type(name: str) -> str:
@@ -208,17 +192,6 @@ def _words(command: str) -> Callable[[str], str]:
     """Return the function that turns the value in a reply into the whole reply."""
     reply = COMMAND_SPECS[command].reply
     return lambda value: reply.replace('{}', value) if '{}' in reply else value
-
-
-def _with_argument(name: str, kind: str, source_type: Any, command: str) -> UrName:
-    return Service(
-        name=f'{DASHBOARD}/{name}',
-        type=_type(kind),
-        source=f'dashboard/{name}',
-        source_type=source_type,
-        call=same_request,
-        words=_words(command),
-    )
 
 
 def _query(name: str, kind: str, command: str, fill: Fill) -> UrName:
@@ -233,36 +206,70 @@ def _query(name: str, kind: str, command: str, fill: Fill) -> UrName:
     )
 
 
-def _line(line: _Line) -> UrName:
-    def call(row: Service, driver: DriverNode, request: Message) -> Future[ServiceAnswer]:
-        try:
-            sent = DashboardRequest(name=line.command, argument=line.argument(request))
-        except LocalProtocolError as error:
-            return completed_answer(str(error))
-        query = RawRequest.Request(query=sent.encode().decode().rstrip('\n'))
-        return _value(driver.call(row.source_type, row.source, query), sent)
-
+def _with_argument(
+    source_type: Any,
+    name: str,
+    command: str,
+    *,
+    call: Call = same_request,
+    fill: Fill = _nothing,
+) -> UrName:
+    """Return the row of a command with an argument, which the driver has too."""
     return Service(
-        name=f'{DASHBOARD}/{line.name}',
-        type=_type(line.type),
-        source='dashboard/raw_request',
-        source_type=RawRequest,
+        name=f'{DASHBOARD}/{name}',
+        type=_type(source_type.__name__),
+        source=f'dashboard/{name}',
+        source_type=source_type,
         call=call,
-        fill=line.fill,
-        words=_words(line.command),
+        fill=fill,
+        words=_words(command),
     )
 
 
-def _value(answer: Future[ServiceAnswer], sent: DashboardRequest) -> Future[ServiceAnswer]:
-    """Return the future of the value in a reply, or of the reply to a refused command."""
+def _slow_request(timeout: float) -> Call:
+    """Return the call of a command that may take some minutes more than the others."""
+    return lambda row, driver, request: same_request(row, driver, request, timeout)
+
+
+def _set_operational_mode(
+    row: Service, driver: DriverNode, request: Message
+) -> Future[ServiceAnswer]:
+    mode = request.operational_mode.mode
+    return driver.call(
+        row.source_type, row.source, SetOperationalMode.Request(operational_mode=mode)
+    )
+
+
+def _set_user_role(row: Service, driver: DriverNode, request: Message) -> Future[ServiceAnswer]:
+    role = request.user_role.role
+    return driver.call(row.source_type, row.source, SetUserRole.Request(user_role=role))
+
+
+def _line(name: str, kind: str, command: str, argument: Argument) -> UrName:
+    def call(row: Service, driver: DriverNode, request: Message) -> Future[ServiceAnswer]:
+        try:
+            sent = DashboardRequest(name=command, argument=argument(request))
+        except LocalProtocolError as error:
+            return completed_answer(str(error))
+        query = RawRequest.Request(query=sent.encode().decode().rstrip('\n'))
+        return _judged(driver.call(row.source_type, row.source, query), sent)
+
+    return Service(
+        name=f'{DASHBOARD}/{name}',
+        type=_type(kind),
+        source='dashboard/raw_request',
+        source_type=RawRequest,
+        call=call,
+    )
+
+
+def _judged(answer: Future[ServiceAnswer], sent: DashboardRequest) -> Future[ServiceAnswer]:
+    """Return the future of an answer that is a success only if the reply says so."""
     result: Future[ServiceAnswer] = Future()
 
     def judge(done: Future[ServiceAnswer]) -> None:
         ok, text = done.result().ok, done.result().text
-        reply = parse_reply(sent, text)
-        result.set_result(
-            ServiceAnswer(ok=ok and reply.ok, text=(reply.value if ok and reply.value else text))
-        )
+        result.set_result(ServiceAnswer(ok=ok and parse_reply(sent, text).ok, text=text))
 
     answer.add_done_callback(judge)
     return result
@@ -277,9 +284,31 @@ def _services() -> Iterable[UrName]:
             source_type=Trigger,
             call=same_request,
         )
-    yield _with_argument('load_program', 'Load', Load, 'load')
-    yield _with_argument('load_installation', 'Load', Load, 'load installation')
-    yield _with_argument('popup', 'Popup', Popup, 'popup')
+    yield _query('clear_operational_mode', _NO_FIELDS, 'clear operational mode', _nothing)
+    yield _with_argument(Load, 'load_program', 'load')
+    yield _with_argument(Load, 'load_installation', 'load installation')
+    yield _with_argument(Popup, 'popup', 'popup')
+    yield _with_argument(
+        SetOperationalMode,
+        'set_operational_mode',
+        'set operational mode',
+        call=_set_operational_mode,
+    )
+    yield _with_argument(SetUserRole, 'set_user_role', 'setUserRole', call=_set_user_role)
+    yield _with_argument(
+        GenerateFlightReport,
+        'generate_flight_report',
+        'generate flight report',
+        call=_slow_request(FLIGHT_REPORT_TIMEOUT),
+        fill=_report_id,
+    )
+    yield _with_argument(
+        GenerateSupportFile,
+        'generate_support_file',
+        'generate support file',
+        call=_slow_request(SUPPORT_FILE_TIMEOUT),
+        fill=_file_name,
+    )
     yield Service(
         name=f'{DASHBOARD}/raw_request',
         type=_type('RawRequest'),
@@ -298,8 +327,8 @@ def _services() -> Iterable[UrName]:
     )
     for name, (kind, command, fill) in _QUERIES.items():
         yield _query(name, kind, command, fill)
-    for line in _LINES:
-        yield _line(line)
+    for name, (kind, command, argument) in _LINES.items():
+        yield _line(name, kind, command, argument)
 
 
 DASHBOARD_SERVICES = tuple(_services())

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
 import importlib
-from typing import Any
+from typing import Any, TypeAlias
 
 from rclpy.qos import QoSProfile
 
@@ -21,8 +21,11 @@ from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
 from ur_cartesian_driver.ros.message_fields import Message
 from ur_cartesian_driver.ros.services.deferred_service import DeferredService
 from ur_cartesian_driver.ros.state.state_publisher import LATCHED_QOS, STATE_QOS
-from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
+from ur_cartesian_driver.ros.ur_driver_names.driver_node import ANSWER_TIMEOUT, DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
+
+#: Starts the driver's call for a request, and returns the future of its answer.
+Call: TypeAlias = Callable[['Service', DriverNode, Message], Future[ServiceAnswer]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,7 +149,7 @@ class Service(UrName):
     source: str
     source_type: Any
     #: Starts the driver's call for a request; gets the row, too.
-    call: Callable[[Service, DriverNode, Message], Future[ServiceAnswer]]
+    call: Call
     #: Writes the text of an answer into the fields of the response.
     #:
     #: :raises ValueError: the text is not what the response can say.
@@ -193,12 +196,14 @@ class Service(UrName):
         return response
 
 
-def same_request(row: Service, driver: DriverNode, request: Message) -> Future[ServiceAnswer]:
+def same_request(
+    row: Service, driver: DriverNode, request: Message, timeout: float = ANSWER_TIMEOUT
+) -> Future[ServiceAnswer]:
     """Call the driver's service with the values of the fields that both requests have."""
     ours = row.source_type.Request()
     for field in ours.get_fields_and_field_types().keys() & request.get_fields_and_field_types():
         setattr(ours, field, getattr(request, field))
-    return driver.call(row.source_type, row.source, ours)
+    return driver.call(row.source_type, row.source, ours, timeout)
 
 
 def class_of(type_name: str) -> Any:
