@@ -23,6 +23,7 @@ from types import ModuleType
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 DEFINITIONS = CHECKOUT / 'test' / 'interfaces'
+ROS_WHEELS = CHECKOUT / 'cmake' / 'ros_wheels.cmake'
 BUILD = CHECKOUT / 'build' / f'test-interfaces-{sys.implementation.cache_tag}'
 
 _COMMON = ('action_msgs', 'builtin_interfaces', 'geometry_msgs', 'std_msgs')
@@ -48,11 +49,21 @@ _PACKAGE_XML = """<package format="3">
 """
 
 
+class CannotBuild(Exception):
+    """There is nothing to build the packages with: only a checkout has it."""
+
+
 def built_interfaces() -> Path | None:
-    """Return the prefix with the packages that are not installed; None = all are installed."""
+    """
+    Return the prefix with the packages that are not installed; None = all are installed.
+
+    :raises CannotBuild: some are missing, and there is no CMake or no checkout.
+    """
     missing = [package for package in DEPENDENCIES if find_spec(package) is None]
     if not missing:
         return None
+    if not ROS_WHEELS.is_file() or shutil.which('cmake', path=_search_path()) is None:
+        raise CannotBuild(f'{", ".join(missing)} cannot be built here.')
     BUILD.mkdir(parents=True, exist_ok=True)
     prefix, stamp = BUILD / 'prefix', BUILD / 'stamp'
     digest = _digest(missing)
@@ -108,6 +119,10 @@ def importable(prefix: Path | None) -> Iterator[None]:
 _imported: dict[str, ModuleType] = {}
 
 
+def _search_path() -> str:
+    return _joined(Path(sys.prefix, 'bin'), os.environ.get('PATH'))
+
+
 def _joined(path: Path, others: str | None) -> str:
     return str(path) if not others else f'{path}{os.pathsep}{others}'
 
@@ -135,7 +150,7 @@ def _build(package: str, prefix: Path) -> None:
         **os.environ,
         'AMENT_PREFIX_PATH': prefixes,
         'CMAKE_PREFIX_PATH': prefixes,
-        'PATH': _joined(Path(sys.prefix, 'bin'), os.environ.get('PATH')),
+        'PATH': _search_path(),
     }
     configure = [
         'cmake',
@@ -146,7 +161,7 @@ def _build(package: str, prefix: Path) -> None:
         f'-DPACKAGE={package}',
         f'-DDEPENDENCIES={";".join(dependencies)}',
         f'-DCMAKE_INSTALL_PREFIX={prefix}',
-        f'-DCMAKE_PROJECT_INCLUDE={CHECKOUT / "cmake" / "ros_wheels.cmake"}',
+        f'-DCMAKE_PROJECT_INCLUDE={ROS_WHEELS}',
         f'-DPython3_EXECUTABLE={sys.executable}',
         '-DCMAKE_BUILD_TYPE=None',
         '-DBUILD_TESTING=OFF',
@@ -161,3 +176,7 @@ def _build(package: str, prefix: Path) -> None:
         )
         if done.returncode:
             raise RuntimeError(f'{" ".join(command)}\n{done.stdout}\n{done.stderr}')
+
+
+if __name__ == '__main__':
+    built_interfaces()

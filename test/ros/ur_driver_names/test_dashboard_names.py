@@ -3,14 +3,18 @@
 """The dashboard client's services, called as the UR driver's integration tests call them."""
 
 import pytest
-from ur_driver_client import kind
+from ur_driver_client import kind, LATCHED
 
 pytestmark = pytest.mark.slow
 
 
-def test_the_arm_starts_as_in_the_integration_tests(ur):
-    from ur_driver_client import LATCHED
+CB3 = {'model': 'ur5', 'polyscope': '3.15'}
 
+
+@pytest.mark.parametrize('sim', [{}, CB3], indirect=True)
+def test_the_arm_starts_as_in_the_integration_tests(make_ur, sim):
+    ur = make_ur(ur_type=sim.config.model)
+    ur.cell.wait_ready()
     running = ur.listen(
         '/io_and_status_controller/robot_program_running', 'std_msgs/msg/Bool', LATCHED
     )
@@ -118,3 +122,67 @@ def test_a_command_that_the_software_lacks_is_no_success(ur):
     answer = ur.dashboard('get_user_role', 'GetUserRole')
     assert not answer.success
     assert answer.answer
+
+
+@pytest.mark.parametrize('sim', [CB3], indirect=True)
+def test_the_role_of_the_user_is_read_and_set_where_robots_have_one(make_ur):
+    ur = make_ur(ur_type='ur5')
+    ur.cell.wait_ready()
+    message = kind('ur_dashboard_msgs/msg/UserRole')
+    role = message(role=message.LOCKED)
+    assert ur.dashboard('set_user_role', 'SetUserRole', user_role=role).success
+    answer = ur.dashboard('get_user_role', 'GetUserRole')
+    assert (answer.success, answer.user_role.role) == (True, message.LOCKED)
+
+
+POLYSCOPE_X = {'polyscope': '10.12', 'programs': {'one.urpx': 'def one():\n  sleep(9)\nend\n'}}
+
+
+@pytest.fixture
+def polyscope_x(make_ur, sim, tmp_path):
+    """Return a client of a robot with PolyScope X, which may use the files in a folder."""
+    ur = make_ur({'program_directory': str(tmp_path)}, robot_api_port=sim.ports.robot_api)
+    ur.cell.wait_ready()
+    return ur
+
+
+@pytest.mark.parametrize('sim', [POLYSCOPE_X], indirect=True)
+def test_programs_of_polyscope_x_are_moved_as_files(polyscope_x, tmp_path):
+    ur = polyscope_x
+    (only,) = ur.dashboard('get_programs', 'GetPrograms').programs
+    assert only.name == 'one'
+    fields = {'program_name': 'one', 'target_path': 'here.urpx'}
+    answer = ur.dashboard('download_program', 'DownloadProgram', **fields)
+    assert answer.success, answer.answer
+    path = tmp_path / 'here.urpx'
+    path.write_text(path.read_text().replace('"one"', '"two"'))
+    answer = ur.dashboard('upload_program', 'UploadProgram', file_path=str(path))
+    assert (answer.success, answer.program_name) == (True, 'two'), answer.answer
+    assert not ur.dashboard('upload_program', 'UploadProgram', file_path='here.urpx').success
+    assert ur.dashboard('update_program', 'UploadProgram', file_path='here.urpx').success
+    programs = ur.dashboard('get_programs', 'GetPrograms').programs
+    assert sorted(program.name for program in programs) == ['one', 'two']
+
+
+@pytest.mark.parametrize('sim', [POLYSCOPE_X], indirect=True)
+def test_files_elsewhere_are_neither_read_nor_written(polyscope_x, tmp_path):
+    outside = tmp_path.parent / 'outside.urpx'
+    for name in ('../outside.urpx', str(outside), '/etc/hostname'):
+        answer = polyscope_x.dashboard('upload_program', 'UploadProgram', file_path=name)
+        assert (answer.success, 'is not in program_directory' in answer.answer) == (False, True)
+        fields = {'program_name': 'one', 'target_path': name}
+        assert not polyscope_x.dashboard('download_program', 'DownloadProgram', **fields).success
+    assert not outside.exists()
+
+
+def test_without_a_directory_no_file_is_used(ur):
+    answer = ur.dashboard('upload_program', 'UploadProgram', file_path='here.urpx')
+    assert (answer.success, 'program_directory' in answer.answer) == (False, True)
+
+
+@pytest.mark.parametrize('sim', [POLYSCOPE_X], indirect=True)
+def test_modes_come_from_the_robot_api(polyscope_x):
+    mode = polyscope_x.dashboard('get_operational_mode', 'GetOperationalMode')
+    assert mode.success, mode.answer
+    robot = polyscope_x.dashboard('get_robot_mode', 'GetRobotMode')
+    assert robot.robot_mode.mode == kind('ur_dashboard_msgs/msg/RobotMode').RUNNING

@@ -4,18 +4,12 @@
 
 from __future__ import annotations
 
-from ur_cartesian_driver.ros.ur_driver_names.dashboard_services import DASHBOARD
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import Absent
 
-_FILES = 'the driver moves no program files; use the pendant, or the Robot API of PolyScope X'
 _FORCE = 'forces act along a path here: `presses` of a goal'
 
 #: Kind, name, type, reason.
 _ROWS = (
-    ('service', f'{DASHBOARD}/get_programs', 'ur_dashboard_msgs/srv/GetPrograms', _FILES),
-    ('service', f'{DASHBOARD}/upload_program', 'ur_dashboard_msgs/srv/UploadProgram', _FILES),
-    ('service', f'{DASHBOARD}/update_program', 'ur_dashboard_msgs/srv/UploadProgram', _FILES),
-    ('service', f'{DASHBOARD}/download_program', 'ur_dashboard_msgs/srv/DownloadProgram', _FILES),
     ('service', 'force_mode_controller/start_force_mode', 'ur_msgs/srv/SetForceMode', _FORCE),
     ('service', 'force_mode_controller/stop_force_mode', 'std_srvs/srv/Trigger', _FORCE),
     (

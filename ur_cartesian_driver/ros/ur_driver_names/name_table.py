@@ -14,6 +14,7 @@ from ur_cartesian_driver.ros.ur_driver_names.dashboard_services import DASHBOARD
 from ur_cartesian_driver.ros.ur_driver_names.io_services import IO_SERVICES
 from ur_cartesian_driver.ros.ur_driver_names.mode_action import MODE_ACTION
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import UrName
+from ur_cartesian_driver.ros.ur_driver_names.program_services import PROGRAM_SERVICES
 from ur_cartesian_driver.ros.ur_driver_names.state_topics import STATE_TOPICS
 from ur_cartesian_driver.ros.ur_driver_names.trajectory_actions import TRAJECTORY_ACTIONS
 
@@ -21,6 +22,7 @@ NAMES: tuple[UrName, ...] = (
     *STATE_TOPICS,
     *COMMAND_TOPICS,
     *DASHBOARD_SERVICES,
+    *PROGRAM_SERVICES,
     *IO_SERVICES,
     *TRAJECTORY_ACTIONS,
     MODE_ACTION,

@@ -26,6 +26,9 @@ class NamesSettings:
     #: true: set_mode unlocks a protective stop. Whoever sets this sees to it that somebody has
     #: looked for the cause of each stop: the manufacturer forbids to reset them automatically.
     unlock_protective_stop: bool = False
+    #: Folder of this computer whose files upload_program and update_program may read, and
+    #: download_program may write; empty: none.
+    program_directory: str = ''
     #: How long freedrive goes on after the last message that asks for it [s].
     freedrive_timeout: Annotated[float, Range(0.1, 60.0)] = 10.0
 
