@@ -197,6 +197,17 @@ def test_tolerances_that_a_goal_lacks_are_those_of_the_configuration(ur_interfac
     assert list(message.path_tolerance) == given
 
 
+def test_a_goal_ends_when_its_driver_is_gone(ur):
+    handle = ur.send(follow_client := follow(ur), goal(follow_client, (10.0, beside(ur, 0.2))))
+    ur.cell.spin_until(lambda: any(ur.cell.sim.state().qd))
+    ur.cell.executor.remove_node(ur.cell.node)
+    ur.cell.node.destroy_node()
+    status, result = ur.result(handle)
+    assert status == GoalStatus.STATUS_ABORTED
+    assert result.error_code == result.PATH_TOLERANCE_VIOLATED
+    assert 'The driver is gone' in result.error_string
+
+
 def test_without_the_driver_goals_are_rejected(ur):
     client = follow(ur)
     ur.cell.node.destroy_node()

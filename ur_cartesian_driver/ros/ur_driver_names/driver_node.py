@@ -25,6 +25,8 @@ from ur_cartesian_driver.ros.state.state_publisher import LATCHED_QOS
 ANSWER_TIMEOUT = 60.0
 #: How long a call waits for the discovery of the driver's service [s].
 DISCOVERY_TIMEOUT = 5.0
+#: Age from which on a status says nothing more; the driver publishes it once a second [s].
+STATUS_TIMEOUT = 5.0
 #: Period in which waiting calls are looked at [s].
 CHECK_PERIOD = 0.1
 
@@ -50,7 +52,7 @@ class DriverNode:
     """
     Calls the services of a driver's node, from any thread; nothing blocks.
 
-    ``status`` and ``io_states`` are the last messages of these topics; None = none so far.
+    ``io_states`` is the last message of this topic; None = none so far.
     """
 
     def __init__(self, node: Node, name: str) -> None:
@@ -62,7 +64,8 @@ class DriverNode:
             namespace of ``node``.
         """
         self.node, self.name = node, name
-        self.status: DriverStatus | None = None
+        self._status: DriverStatus | None = None
+        self._status_time = 0.0
         self.io_states: IOStates | None = None
         self._on_status: list[Callable[[DriverStatus], None]] = []
         self.subscribe(DriverStatus, 'status', self._keep_status, LATCHED_QOS)
@@ -78,6 +81,17 @@ class DriverNode:
             callback_group=self._group,
             clock=Clock(clock_type=ClockType.STEADY_TIME),
         )
+
+    @property
+    def status(self) -> DriverStatus | None:
+        """The driver's status; None = there is no driver, or none any more."""
+        return None if monotonic() - self._status_time > STATUS_TIMEOUT else self._status
+
+    @property
+    def is_reporting(self) -> bool:
+        """Whether the driver reports the state of a robot."""
+        status = self.status
+        return status is not None and status.robot_mode != DriverStatus.ROBOT_MODE_UNKNOWN
 
     def own_name(self, name: str) -> str:
         """Return the name of a topic, service or action of the driver's node."""
@@ -146,7 +160,7 @@ class DriverNode:
         self.node.get_logger().warning(text)
 
     def _keep_status(self, message: DriverStatus) -> None:
-        self.status = message
+        self._status, self._status_time = message, monotonic()
         for callback in self._on_status:
             callback(message)
 

@@ -93,8 +93,7 @@ class _ModeServer:
         self._server.destroy()
 
     def _judge(self, goal: Message) -> GoalResponse:
-        status = self._driver.status
-        if status is None or status.robot_mode == DriverStatus.ROBOT_MODE_UNKNOWN:
+        if not self._driver.is_reporting:
             reason = 'the mode of the robot is not known: is the driver connected to it'
         elif self._run is not None:
             reason = 'another goal changes the mode'
@@ -194,7 +193,8 @@ class _ModeRun:
     @property
     def _status(self) -> DriverStatus:
         status = self._driver.status
-        assert status is not None  # else the goal was rejected
+        if status is None or not self._driver.is_reporting:
+            raise _Ended('The driver does not report the mode of the robot any more.')
         return status
 
     @property

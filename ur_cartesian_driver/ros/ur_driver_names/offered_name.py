@@ -15,6 +15,8 @@ from dataclasses import dataclass
 import importlib
 from typing import Any, TypeAlias
 
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.qos import QoSProfile
 
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
@@ -128,13 +130,17 @@ class Topic(UrName):
                 publisher.publish(converted)
 
         def repeat() -> None:
-            for message in last:
-                publisher.publish(message)
+            if last and driver.is_reporting:
+                publisher.publish(last[0])
 
         qos: QoSProfile = LATCHED_QOS if self.latched or self.repeated else STATE_QOS
         driver.subscribe(self.source_type, self.source, receive, qos)
         if self.repeated:
-            driver.node.create_timer(1.0 / settings.io_publish_rate, repeat)
+            driver.node.create_timer(
+                1.0 / settings.io_publish_rate,
+                repeat,
+                clock=Clock(clock_type=ClockType.STEADY_TIME),
+            )
         return publisher
 
 
