@@ -48,7 +48,7 @@ def page(text: str) -> str:
     for mark, lines in (('names', names()), ('parameters', parameters())):
         begin, end = f'<!-- {mark} -->', f'<!-- end of {mark} -->'
         before, _, rest = text.partition(begin)
-        text = '\n'.join([before + begin, *lines, end + rest.partition(end)[2]])
+        text = '\n'.join([before + begin, '', *lines, '', end + rest.partition(end)[2]])
     return text
 
 

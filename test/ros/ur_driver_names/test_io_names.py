@@ -2,7 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Inputs, outputs, payload and slider by the UR driver's names; the simulator is the judge."""
 
+from types import SimpleNamespace
+from typing import Any
+
+from builtin_interfaces.msg import Duration
 import pytest
+
+from ur_cartesian_driver.ros.ur_driver_names.io_services import IO_SERVICES
+from ur_cartesian_driver.ros.ur_driver_names.offered_name import Service
 
 pytestmark = pytest.mark.slow
 
@@ -93,6 +100,23 @@ def test_the_payload_is_a_mass_and_its_centre(ur):
     assert payload.mass == pytest.approx(1.25)
     assert payload.cog == pytest.approx((0.01, -0.02, 0.05))
     assert not ur.io('set_payload', 'SetPayload', mass=-1.0, center_of_gravity=centre).success
+
+
+def test_a_newer_definition_has_an_inertia_and_a_transition():
+    from geometry_msgs.msg import Inertia, Vector3
+
+    services = [row for row in IO_SERVICES if isinstance(row, Service)]
+    (row,) = [row for row in services if row.name.endswith('set_payload')]
+    sent = []
+    driver: Any = SimpleNamespace(call=lambda kind, name, request: sent.append(request))
+    load = Inertia(m=1.5, com=Vector3(z=0.04), ixx=0.1, iyy=0.2, izz=0.3, ixy=0.01)
+    for time in (2.5, Duration(sec=2, nanosec=500_000_000)):
+        row.call(row, driver, SimpleNamespace(payload=load, transition_time=time))
+    for request in sent:
+        assert (request.mass, request.center_of_gravity.z) == (1.5, 0.04)
+        assert list(request.inertia) == [0.1, 0.2, 0.3, 0.01, 0.0, 0.0]
+        assert request.transition_time == 2.5
+    assert len(sent) == 2
 
 
 @pytest.mark.parametrize(

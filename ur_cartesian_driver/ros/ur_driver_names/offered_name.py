@@ -187,7 +187,7 @@ class Service(UrName):
         if ok:
             try:
                 self.fill(response, text)
-            except ValueError:
+            except (ValueError, AssertionError):  # the latter: a number that a field cannot hold
                 ok = False
             text = self.words(text)
         if hasattr(response, 'success'):

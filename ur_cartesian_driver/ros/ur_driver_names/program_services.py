@@ -66,6 +66,7 @@ class _FileService(UrName):
     #:
     #: :raises _Refused: the file may not be used.
     #: :raises OSError: the file cannot be read.
+    #: :raises ValueError: it is no text, or its name is none.
     start: Callable[[DriverNode, str, Message, str], Future[ServiceAnswer]]
 
     @property
@@ -80,7 +81,7 @@ class _FileService(UrName):
             response: Future[Message] = Future()
             try:
                 answer = self.start(driver, self.source, request, settings.program_directory)
-            except (_Refused, OSError, UnicodeDecodeError) as error:
+            except (_Refused, OSError, ValueError) as error:
                 response.set_result(kind.Response(success=False, answer=str(error)))
                 return response
             answer.add_done_callback(
