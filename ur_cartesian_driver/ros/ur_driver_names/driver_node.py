@@ -28,7 +28,7 @@ DISCOVERY_TIMEOUT = 5.0
 #: Age from which on a status says nothing more; the driver publishes it once a second [s].
 STATUS_TIMEOUT = 5.0
 #: Period in which waiting calls are looked at [s].
-CHECK_PERIOD = 0.1
+CHECK_PERIOD = 0.2
 
 
 class DriverSilent(Exception):
@@ -99,9 +99,9 @@ class DriverNode:
 
     def subscribe(
         self, kind: Any, name: str, callback: Callable[[Message], None], qos: Any
-    ) -> None:
-        """Listen to a topic of the driver's node."""
-        self.node.create_subscription(kind, self.own_name(name), callback, qos)
+    ) -> Any:
+        """Listen to a topic of the driver's node, and return the subscription."""
+        return self.node.create_subscription(kind, self.own_name(name), callback, qos)
 
     def on_status(self, callback: Callable[[DriverStatus], None]) -> None:
         """Call a function with each message of the status, once a second and on change."""

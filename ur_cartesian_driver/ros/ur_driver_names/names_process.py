@@ -32,6 +32,8 @@ class NamesProcess:
         self._process = subprocess.Popen(
             [sys.executable, '-m', module, '--with-parent', *own, *arguments],
             stdin=subprocess.PIPE,  # its end, whatever causes it, ends the process
+            # Ctrl-C reaches the driver alone, whose goals still get their results.
+            start_new_session=True,
         )
 
     def close(self) -> None:

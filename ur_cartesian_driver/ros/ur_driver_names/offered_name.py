@@ -118,30 +118,54 @@ class Topic(UrName):
 
     def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
         """Publish what the driver publishes."""
-        publisher = driver.node.create_publisher(
-            kind, self.name, LATCHED_QOS if self.latched else STATE_QOS
+        return _Relay(self, driver, settings, kind)
+
+
+class _Relay:
+    """Publishes the messages of one of the driver's topics under another name."""
+
+    def __init__(self, row: Topic, driver: DriverNode, settings: NamesSettings, kind: Any) -> None:
+        self._row, self._driver, self._settings, self._kind = row, driver, settings, kind
+        self._publisher = driver.node.create_publisher(
+            kind, row.name, LATCHED_QOS if row.latched else STATE_QOS
         )
-        last: list[Message] = []
-
-        def receive(message: Message) -> None:
-            converted = self.convert(kind, message, settings)
-            if converted is not None:
-                last[:] = [converted]
-                publisher.publish(converted)
-
-        def repeat() -> None:
-            if last and driver.is_reporting:
-                publisher.publish(last[0])
-
-        qos: QoSProfile = LATCHED_QOS if self.latched or self.repeated else STATE_QOS
-        driver.subscribe(self.source_type, self.source, receive, qos)
-        if self.repeated:
+        self._subscription: Any = None
+        self._last: Message | None = None
+        if row.latched or row.repeated:
+            self._listen(LATCHED_QOS)
+        else:
+            driver.on_status(lambda _: self._listen_if_heard())
+        if row.repeated:
             driver.node.create_timer(
                 1.0 / settings.io_publish_rate,
-                repeat,
+                self._repeat,
                 clock=Clock(clock_type=ClockType.STEADY_TIME),
             )
-        return publisher
+
+    def _listen(self, qos: QoSProfile) -> None:
+        self._subscription = self._driver.subscribe(
+            self._row.source_type, self._row.source, self._receive, qos
+        )
+
+    def _listen_if_heard(self) -> None:
+        """Take messages only while somebody wants them: each costs a millisecond."""
+        is_heard = self._publisher.get_subscription_count() > 0
+        if is_heard and self._subscription is None:
+            self._listen(STATE_QOS)
+        elif not is_heard and self._subscription is not None:
+            self._driver.node.destroy_subscription(self._subscription)
+            self._subscription = None
+
+    def _receive(self, message: Message) -> None:
+        converted = self._row.convert(self._kind, message, self._settings)
+        if converted is not None:
+            self._last = converted
+            self._publisher.publish(converted)
+
+    def _repeat(self) -> None:
+        is_heard = self._publisher.get_subscription_count() > 0
+        if is_heard and self._last is not None and self._driver.is_reporting:
+            self._publisher.publish(self._last)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
