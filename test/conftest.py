@@ -35,6 +35,14 @@ def closed_port():
         yield bound.getsockname()[1]
 
 
+@pytest.fixture
+def free_port():
+    """Return a port that nobody has opened; the kernel gives it to nobody else soon."""
+    with socket.create_server(('127.0.0.1', 0)) as listener:
+        port = listener.getsockname()[1]
+    return port
+
+
 def pytest_addoption(parser):
     parser.addoption(
         '--no-skips',

@@ -47,6 +47,7 @@ SOURCES = [
     PACKAGE / 'motion' / 'state' / 'state_age.py',
     PACKAGE / 'protocol' / 'rtde' / 'rtde_client.py',
     PACKAGE / 'ros' / 'node.py',
+    PACKAGE / 'ros' / 'state' / 'joint_states_check.py',
     *tracked_files(PACKAGE, 'sim/**/*.py'),
 ]
 ROBOT_PROGRAM = PACKAGE / 'program' / 'driver.script'

@@ -13,10 +13,14 @@ if TYPE_CHECKING:
     from ur_cartesian_driver.sim import (
         assemble,
         Controller,
+        ExternalControlNode,
         HOME,
         MemorySockets,
         Ports,
+        ProgramTree,
+        read_urp,
         RobotSnapshot,
+        ScriptText,
         SimulatedRobot,
         SimulatorConfig,
     )
@@ -24,12 +28,16 @@ if TYPE_CHECKING:
 __all__ = [
     'HOME',
     'Controller',
+    'ExternalControlNode',
     'MemorySockets',
     'Ports',
+    'ProgramTree',
     'RobotSnapshot',
+    'ScriptText',
     'SimulatedRobot',
     'SimulatorConfig',
     'assemble',
+    'read_urp',
 ]
 
 

@@ -7,7 +7,7 @@ The foreign program is the newest of the saved programs. Everything runs in virt
 """
 
 import pytest
-from robot_cell import PENDANT_PROGRAM, run_cell
+from robot_cell import CABLE, PENDANT_PROGRAM, run_cell
 from saved_program import saved_program
 from virtual_network import HOST
 
@@ -114,3 +114,22 @@ def test_our_program_of_another_driver_is_foreign(register):
         await check_refusal(cell, 'outputs (io_commands)', io_commands=(OUTPUT,))
 
     run_cell(scenario, headless=False)
+
+
+def test_a_program_that_started_while_the_cable_was_cut_is_not_replaced():
+    """The robot sent no state in which no program ran, and our sockets look connected."""
+
+    async def scenario(cell):
+        cell.loop.cut_cable(CABLE)
+        await cell.until(lambda: not cell.robot.controller.programs.running)
+        cell.robot.run_script('def other():\n  while True:\n    sync()\n  end\nend\n')
+        await cell.until(lambda: cell.status.state is ConnectionState.DISCONNECTED)
+        cell.loop.cut_cable(())
+        await cell.until(lambda: cell.status.message.startswith('Another program runs'), 5.0)
+        cell.resend()
+        await cell.until(lambda: any('another program runs' in line for line in cell.owner.log))
+        await cell.sleep(0.5)
+        assert cell.robot.state().program == 'other'
+        assert cell.robot.controller.programs.running
+
+    run_cell(scenario)

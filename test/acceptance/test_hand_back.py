@@ -14,6 +14,11 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.robot.services.service_calls import HandBackCall
+from ur_cartesian_driver.sim.pendant_programs.program_tree import (
+    ExternalControlNode,
+    ProgramTree,
+    ScriptText,
+)
 
 pytestmark = [pytest.mark.acceptance]
 
@@ -48,17 +53,13 @@ async def call(cell):
 class LoopingCell(RobotCell):
     """The pendant's program has a node of ours, and goes on behind it with a motion of its own."""
 
-    async def load_pendant_program(self):
-        begin, _, rest = (await self.fetch_program()).partition('# NODE_CONTROL_LOOP_BEGINS\n')
-        node, _, end = rest.partition('# NODE_CONTROL_LOOP_ENDS\n')
-        loop = (
-            f'while True:\n{node}'
+    async def start_robot(self, config):
+        motion = ScriptText(
             'set_standard_digital_out(3, True)\n'
-            'movej(get_target_joint_positions() + [0.1, 0, 0, 0, 0, 0], a=5, v=2)\n'
-            'end\n'
+            'movej(get_target_joint_positions() + [0.1, 0, 0, 0, 0, 0], a=5, v=2)'
         )
-        assert node
-        assert not self.robot.controller.programs.load(PENDANT_PROGRAM, begin + loop + end)
+        tree = ProgramTree((ExternalControlNode(), motion), loops=True)
+        await super().start_robot(replace(config, programs={PENDANT_PROGRAM: tree}))
 
 
 def test_the_pendants_program_goes_on_and_brings_the_arm_back():

@@ -33,6 +33,9 @@ for module in ('rtde_control', 'rtde_receive', 'rtde_io', 'dashboard_client'):
 TIMEOUT = 50.0
 #: A tool in the flange, as a pose with a rotation vector.
 TOOL = [0.01, 0.0, 0.1, 0.0, 0.0, pi / 2]
+#: Not a scene: no interface of the package is connected before.
+SERVE = 'serve'
+PENDANT_TARGET = [0.3, -1.6, 1.7, -1.4, -1.5, 0.2]
 HOME = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
 
 
@@ -274,6 +277,16 @@ def power(client: Client) -> None:
     client.note('ended', ended=client.until(lambda: not control.isProgramRunning()))
 
 
+def serve_external_control(host: str, port: str) -> None:
+    """Serve the package's own program to a node that fetches it, and move by it."""
+    from rtde_control import RTDEControlInterface
+
+    flags = RTDEControlInterface.FLAG_USE_EXT_UR_CAP
+    control = RTDEControlInterface(host, 500.0, flags, int(port))
+    assert control.moveJ(PENDANT_TARGET, 1.05, 3.0)
+    control.stopScript()
+
+
 SCENES = {scene.__name__: scene for scene in (moves, streams, signals, power)}
 
 
@@ -297,12 +310,14 @@ def play(scene: str) -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def simulator() -> Iterator[Any]:
+def simulator(**settings: Any) -> Iterator[Any]:
     """Yield a simulated robot with the ports of a real one, on an address that is free."""
     from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
     for last in range(1, 255):
-        robot = SimulatedRobot(SimulatorConfig(host=f'127.0.17.{last}', unlock_delay=1.0))
+        robot = SimulatedRobot(
+            SimulatorConfig(host=f'127.0.17.{last}', unlock_delay=1.0, **settings)
+        )
         try:
             robot.start()
         except OSError:  # another run has it
@@ -536,7 +551,35 @@ def test_the_page_for_those_who_come_from_it_does_one_job_on_both_sides():
     assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 0.004
 
 
+@pytest.mark.acceptance
+@pytest.mark.slow
+@pytest.mark.parametrize(('model', 'polyscope'), [('ur5e', '5.21'), ('ur5', '3.15')])
+def test_its_program_is_fetched_by_external_control(model, polyscope, free_port):
+    """Somebody plays, and plays again as long as the package is not listening yet."""
+    settings = {'program': 'external_control.urp', 'external_control_port': free_port}
+    with simulator(model=model, polyscope=polyscope, **settings) as robot:
+        words = sys.executable, str(Path(__file__)), SERVE, robot.config.host, str(free_port)
+        with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as client:
+            give_up = time.monotonic() + TIMEOUT
+            while client.poll() is None and time.monotonic() < give_up:
+                state = robot.state()
+                if state.popups:
+                    robot.close_popups()
+                    robot.stop_program()
+                elif state.runtime_state.name == 'STOPPED' and state.q[0] != PENDANT_TARGET[0]:
+                    robot.play_program()
+                time.sleep(0.05)
+            client.kill()
+            assert client.stdout is not None
+            said = client.stdout.read().decode()
+        assert client.returncode == 0, f'{said}\n{robot.state().messages[-20:]}'
+        assert robot.state().q == pytest.approx(PENDANT_TARGET, abs=1e-9)
+
+
 if __name__ == '__main__':
-    it = Client(sys.argv[2])
-    SCENES[sys.argv[1]](it)
-    print(json.dumps(it.readings))
+    if sys.argv[1] == SERVE:
+        serve_external_control(*sys.argv[2:])
+    else:
+        it = Client(sys.argv[2])
+        SCENES[sys.argv[1]](it)
+        print(json.dumps(it.readings))

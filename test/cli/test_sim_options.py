@@ -7,6 +7,7 @@ from __future__ import annotations
 import contextlib
 
 import pytest
+from urp_text import script_line, urp_text
 
 from ur_cartesian_driver.cli import main, parser
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -19,6 +20,7 @@ from ur_cartesian_driver.sim.faults.fault_values import (
     EventFault,
     FaultEvent,
 )
+from ur_cartesian_driver.sim.pendant_programs.program_tree import ScriptText
 
 
 def test_a_fault_that_is_not_understood_is_one_sentence_with_the_word(capsys):
@@ -126,6 +128,34 @@ def test_programs_of_a_directory_and_the_loaded_one_have_the_names_of_the_dashbo
     }
     assert config.program == 'glue.urp'
     assert not config.has_remote_control
+
+
+def test_programs_of_polyscope_are_loaded_with_the_host_of_external_control(tmp_path):
+    """A file wins over the script and the built-in program of its name."""
+    for name in 'external_control', 'seam':
+        (tmp_path / f'{name}.urp').write_text(urp_text(script_line(f'textmsg("{name}")')))
+        (tmp_path / f'{name}.script').write_text('def p():\nend\n')
+    words = ['--external-control-host', '10.0.0.1', '--external-control-port', '50012']
+    arguments = parser().parse_args(['sim', '--programs', str(tmp_path), *words])
+    config = simulator_config(arguments)
+    assert (config.external_control_host, config.external_control_port) == ('10.0.0.1', 50012)
+    assert {name: tree.nodes for name, tree in config.saved_programs.items()} == {
+        f'{name}.urp': (ScriptText(f'textmsg("{name}")'),) for name in ('external_control', 'seam')
+    }
+
+
+def test_every_simulated_robot_has_external_control():
+    arguments = parser().parse_args(['sim', '--program', 'external_control.urp'])
+    config = simulator_config(arguments)
+    assert config.program == 'external_control.urp'
+    assert config.saved_programs[config.program].has_external_control
+
+
+def test_a_program_of_polyscope_with_other_nodes_is_refused_in_one_sentence(tmp_path, capsys):
+    file = tmp_path / 'seam.urp'
+    file.write_text(urp_text('<MoveJ/>'))
+    assert main(['sim', '--program', str(file)]) == 1
+    assert f'{file} has a node <MoveJ>, which' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize('option', ['--program', '--programs'])

@@ -185,7 +185,10 @@ def send_program(user, method, program):
 
 def test_programs_are_listed_uploaded_updated_downloaded_and_played():
     user = ApiUser()
-    assert [each['name'] for each in user.value('/programs/v1/')['programs']] == ['a']
+    assert [each['name'] for each in user.value('/programs/v1/')['programs']] == [
+        'a',
+        'external_control',
+    ]
     assert user.ask('GET', '/programs/v1/weld%20it')[0] == 404
     # The script of a program has labels, and uses functions that the application defines.
     preamble = {'script': 'def twice(x):\n  return 2 * x\nend', 'nodeIDList': []}
@@ -194,7 +197,11 @@ def test_programs_are_listed_uploaded_updated_downloaded_and_played():
     status, answer = send_program(user, 'POST', program)
     assert (status, answer['programName']) == (200, 'weld it')
     assert send_program(user, 'POST', program)[0] == 400  # it exists
-    assert [each['name'] for each in user.value('/programs/v1')['programs']] == ['a', 'weld it']
+    assert [each['name'] for each in user.value('/programs/v1')['programs']] == [
+        'a',
+        'external_control',
+        'weld it',
+    ]
     assert user.value('/programs/v1/weld%20it') == program
     assert user.ask('PUT', '/program/v1/loaded', {'name': 'weld it'})[0] == 200
     assert user.act('play') == 200

@@ -30,6 +30,7 @@ COMPUTING = (
     'test/acceptance/test_joint_trajectories.py',
     'test/acceptance/test_live_sessions.py',
     'test/acceptance/test_path_offsets.py',
+    'test/acceptance/test_played_on_the_pendant.py',
     'test/acceptance/test_proportional_outputs.py',
     'test/acceptance/test_replaced_tails.py',
     'test/acceptance/test_prints_with_rounded_corners.py',

@@ -63,6 +63,8 @@ OWNER_PORT = 1
 REST_SPEED = 1e-4
 REVERSE, SENDER, TRAJECTORY, COMMANDS = 50001, 50002, 50003, 50004
 RTDE, PRIMARY, DASHBOARD = 30004, 30001, 29999
+#: The ports of the cable between robot and driver.
+CABLE = (REVERSE, SENDER, TRAJECTORY, COMMANDS, RTDE, PRIMARY, DASHBOARD)
 #: Program on the pendant that contains the External Control node.
 PENDANT_PROGRAM = 'external_control.urp'
 
@@ -190,15 +192,7 @@ class RobotCell:
             }
             | self._settings
         )
-        await asyncio.start_server(self.owner.serve, HOST, OWNER_PORT)
-        reader, self._pipe = await asyncio.open_connection(HOST, OWNER_PORT)
-        descriptor = state_memory.create()
-        self.memory = state_memory.StateMemory(descriptor)
-        os.close(descriptor)
-        robot_loop = RobotLoop(Configure(config=self.config), self.memory, self._pipe)
-        # Not drawn, so that the robots of all cells get the same program, which is parsed once.
-        robot_loop._link.program.program_number = 1
-        self.loop_task = asyncio.create_task(robot_loop.run(reader))
+        await self.start_driver()
         if not self.headless:
             await self.until(lambda: self.status.state is ConnectionState.CONNECTED)
             await self.load_pendant_program()
@@ -206,6 +200,33 @@ class RobotCell:
         await self.until(self.is_ready, 3.0)
         await self.until(self.control_messages)
         await self.sleep(2.0 * CYCLE)  # the program has read it, and waits for the next in time
+
+    async def start_driver(self, number=1):
+        """
+        Start the robot loop, with an owner that knows nothing yet.
+
+        :param number: by which the driver knows its program again. Not drawn, so that the robots
+            of all cells get the same program, which is parsed once.
+        """
+        self.owner = Owner()
+        server = await asyncio.start_server(self.owner.serve, HOST, OWNER_PORT)
+        reader, self._pipe = await asyncio.open_connection(HOST, OWNER_PORT)
+        server.close()
+        descriptor = state_memory.create()
+        self.memory = state_memory.StateMemory(descriptor)
+        os.close(descriptor)
+        robot_loop = RobotLoop(Configure(config=self.config), self.memory, self._pipe)
+        robot_loop._link.program.program_number = number
+        self.loop_task = asyncio.create_task(robot_loop.run(reader))
+
+    async def end_driver(self):
+        """End the robot loop as its owner does."""
+        self.owner.hang_up()
+        await asyncio.wait({self.loop_task}, timeout=5.0)
+        self.loop_task.cancel()
+        await asyncio.gather(self.loop_task, return_exceptions=True)
+        self._pipe.close()
+        self.memory.close()
 
     async def start_robot(self, config):
         """Start the controller, or another one in the place of one that has crashed."""
@@ -237,18 +258,12 @@ class RobotCell:
         return f'def external_control():\n{text.decode()}\nend\n'
 
     async def load_pendant_program(self):
-        """Load the program that the External Control node fetches."""
-        text = await self.fetch_program()
-        assert not self.robot.controller.programs.load(PENDANT_PROGRAM, text)
+        """Load a program whose External Control node fetches that of the driver."""
+        assert not self.robot.controller.load_program(PENDANT_PROGRAM)
 
     async def close(self):
-        self.owner.hang_up()
-        await asyncio.wait({self.loop_task}, timeout=5.0)
-        self.loop_task.cancel()
-        await asyncio.gather(self.loop_task, return_exceptions=True)
-        self._pipe.close()
+        await self.end_driver()
         await self.crash_robot()
-        self.memory.close()
 
     # ---- observations -------------------------------------------------------------------------
 

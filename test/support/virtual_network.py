@@ -49,6 +49,8 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         self.servers = {}
         #: Client ends of all connections that were made.
         self.ends = []
+        #: Ports to which the cable is cut.
+        self.unreachable = frozenset()
 
     def time(self):
         return self.now
@@ -85,7 +87,10 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         Connect at once.
 
         :raises ConnectionRefusedError: nobody listens.
+        :raises OSError: the port is unreachable.
         """
+        if port in self.unreachable:
+            raise OSError(errno.EHOSTUNREACH, 'No route to host')
         if port not in self.servers:
             raise ConnectionRefusedError(errno.ECONNREFUSED, 'Connection refused')
         local = _FIRST_CLIENT_PORT + len(self.ends)
@@ -112,6 +117,18 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         """Deliver nothing more on the connections to a port, not even that they close."""
         for end in self.open_ends(port):
             end.frozen = end.peer.frozen = True
+
+    def cut_cable(self, ports):
+        """
+        Deliver nothing to and from some ports, and refuse new connections to them.
+
+        When the cable to a port is whole again (it is not in ``ports``), all that was sent
+        arrives, as TCP repeats it.
+        """
+        self.unreachable = frozenset(ports)
+        for end in self.ends:
+            for one in (end, end.peer):
+                one.schedule()
 
     def inject_data(self, port, data):
         """Send data to a port as if its client had sent it."""
@@ -177,7 +194,7 @@ class _End(asyncio.Transport):
             self.peer._receive(bytes(data))
 
     def get_write_buffer_size(self):
-        return sum(map(len, self.peer._inbox)) if self.peer._paused else 0
+        return sum(map(len, self.peer._inbox)) if self.peer._is_held() else 0
 
     def pause_reading(self):
         self._paused = True
@@ -185,7 +202,7 @@ class _End(asyncio.Transport):
     def resume_reading(self):
         if self._paused:
             self._paused = False
-            self._schedule()
+            self.schedule()
 
     def is_reading(self):
         return not self._paused and not self._closing
@@ -203,16 +220,21 @@ class _End(asyncio.Transport):
         if self.frozen or self._closing:
             return
         self._inbox.append(data)
-        self._schedule()
+        self.schedule()
 
-    def _schedule(self):
-        if self._inbox and not self._is_due and not self._paused:
+    def _is_held(self):
+        ports = self.address[1], self.peer.address[1]
+        return self._paused or not self.loop.unreachable.isdisjoint(ports)
+
+    def schedule(self):
+        """Deliver what has been sent, if it can arrive."""
+        if self._inbox and not self._is_due and not self._is_held():
             self._is_due = True
             self.loop.call_soon(self._deliver)
 
     def _deliver(self):
         self._is_due = False
-        while self._inbox and not self._paused and not self._closing:
+        while self._inbox and not self._is_held() and not self._closing:
             data = self._inbox.popleft()
             if data:
                 self.received += data
@@ -258,7 +280,7 @@ class ProgramNetwork:
     def open(self, name, address, port):
         self.close(name)
         protocol = _ProgramSocket()
-        with contextlib.suppress(ConnectionRefusedError):
+        with contextlib.suppress(OSError):
             self._sockets[name] = self._loop.connect(protocol, port), protocol
 
     def state(self, name):

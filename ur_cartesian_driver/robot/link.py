@@ -380,6 +380,7 @@ class RobotLink:
         before, self.robot, self.signals = self.robot, None, None
         self._state_time = inf
         self.program.is_paused = False  # unknown; too many keepalives are better than none
+        self.control.tracker.robot_lost()
         self._status.apply(
             ConnectionEvent.ROBOT_LOST,
             calibration_known=False,

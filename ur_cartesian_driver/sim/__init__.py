@@ -14,6 +14,12 @@ from ur_cartesian_driver.lazy_names import lazy_names
 if TYPE_CHECKING:
     from ur_cartesian_driver.sim.controller import Controller
     from ur_cartesian_driver.sim.controller_assembly import assemble
+    from ur_cartesian_driver.sim.pendant_programs.program_tree import (
+        ExternalControlNode,
+        ProgramTree,
+        ScriptText,
+    )
+    from ur_cartesian_driver.sim.pendant_programs.urp_file import read_urp
     from ur_cartesian_driver.sim.simulated_robot import Ports, RobotSnapshot, SimulatedRobot
     from ur_cartesian_driver.sim.simulator_config import HOME, SimulatorConfig
     from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets
@@ -21,12 +27,16 @@ if TYPE_CHECKING:
 __all__ = [
     'HOME',
     'Controller',
+    'ExternalControlNode',
     'MemorySockets',
     'Ports',
+    'ProgramTree',
     'RobotSnapshot',
+    'ScriptText',
     'SimulatedRobot',
     'SimulatorConfig',
     'assemble',
+    'read_urp',
 ]
 
 # Lazy, because every command imports the simulator's options but few need the simulator.
@@ -35,6 +45,10 @@ __getattr__ = lazy_names(
     {
         'ur_cartesian_driver.sim.controller': 'Controller',
         'ur_cartesian_driver.sim.controller_assembly': 'assemble',
+        'ur_cartesian_driver.sim.pendant_programs.program_tree': (
+            'ExternalControlNode ProgramTree ScriptText'
+        ),
+        'ur_cartesian_driver.sim.pendant_programs.urp_file': 'read_urp',
         'ur_cartesian_driver.sim.simulated_robot': 'Ports RobotSnapshot SimulatedRobot',
         'ur_cartesian_driver.sim.simulator_config': 'HOME SimulatorConfig',
         'ur_cartesian_driver.sim.sockets.script_sockets': 'MemorySockets',

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Hashable
+from functools import partial
 from math import inf
 from pathlib import PurePosixPath
 from typing import Protocol
@@ -31,6 +32,12 @@ from ur_cartesian_driver.sim.motion.actual_motion import ActualMotion
 from ur_cartesian_driver.sim.motion.contact.contact_motion import ArmState, ContactMotion
 from ur_cartesian_driver.sim.motion.kinematics.point_motion import point_motion
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState, MotionOwnership
+from ur_cartesian_driver.sim.pendant_programs.external_control import (
+    ExternalControl,
+    UrCap,
+    UrCapX,
+)
+from ur_cartesian_driver.sim.pendant_programs.program_tree import ProgramTree
 from ur_cartesian_driver.sim.programs.interpreter_mode import InterpreterMode
 from ur_cartesian_driver.sim.programs.program_runner import ProgramRunner
 from ur_cartesian_driver.sim.programs.rtde_watchdog import Watchdogs
@@ -72,6 +79,8 @@ _HELD_STATES = (RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING
 #: Number of past cycles whose joint positions programs can ask for.
 MAX_HISTORY = 100
 _MAX_POPUPS = 100
+#: The first major version of PolyScope X.
+POLYSCOPE_X = 10
 #: Error code of a protective stop (C209).
 _PROTECTIVE_STOP_CODE = 209
 #: Delay [s] of the unlocking of a protective stop after a client's `set unlock protective stop`.
@@ -158,9 +167,13 @@ class Controller:
             thread_delay=config.thread_delay,
             interleaving_seed=config.interleaving_seed,
         )
-        self.stored_programs = StoredPrograms(config.programs)
+        self.stored_programs = StoredPrograms(config.saved_programs)
         self.interpreter_mode = InterpreterMode(self.programs, self.ownership)
         self.programs.on_end = self.sockets.close_all
+        urcap = (UrCap if config.version[0] < POLYSCOPE_X else UrCapX)(
+            config.external_control_host, config.external_control_port
+        )
+        self.external_control = ExternalControl(urcap, self.messages.note)
         if config.program and (refusal := self.load_program(config.program)):
             raise ValueError(f'program is {config.program}, which cannot be loaded: {refusal}')
         self.messages.on_error = self._pause_if_wanted
@@ -397,8 +410,14 @@ class Controller:
 
         Directories in the name are ignored.
         """
-        text = self.stored_programs.script(file := PurePosixPath(name).name)
-        return f'File not found: {name}' if text is None else self.programs.load(file, text)
+        program = self.stored_programs.program(file := PurePosixPath(name).name)
+        if program is None:
+            return f'File not found: {name}'
+        if isinstance(program, ProgramTree):
+            return self.programs.load_generated(
+                file, partial(self.external_control.generate, program, file)
+            )
+        return self.programs.load(file, program)
 
     def power_on(self) -> str:
         """Power up to IDLE; return the reason of a refusal, else an empty string."""

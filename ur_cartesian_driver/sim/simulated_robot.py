@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.sim.clock import Clock, Lateness, RealClock, VirtualClock
-from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.controller import Controller, POLYSCOPE_X
 from ur_cartesian_driver.sim.controller_assembly import assemble
 from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
 from ur_cartesian_driver.sim.faults.fault_values import Fault
@@ -38,6 +38,7 @@ from ur_cartesian_driver.sim.interfaces.realtime_stream import RealtimeStream
 from ur_cartesian_driver.sim.interfaces.robot_api_session import FIRST_VERSION, RobotApiSession
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
 from ur_cartesian_driver.sim.interfaces.tcp_server import TcpServer
+from ur_cartesian_driver.sim.pendant_programs.script_requests import ScriptRequests
 from ur_cartesian_driver.sim.programs.compile_thread import CompileThread
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets
@@ -50,8 +51,6 @@ _CALL_TIMEOUT = 10.0
 _COMPILE_TIMEOUT = 120.0
 #: Difference between the ports of a script interface (30001) and of its read-only twin (30011).
 READ_ONLY_DISTANCE = 10
-#: The first major version without a dashboard.
-POLYSCOPE_X = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,6 +156,12 @@ class SimulatedRobot:
         self._running: asyncio.Task[None] | None = None
         self._ports: Ports | None = None
         self._compiler: CompileThread | None = None
+        self._script_requests = ScriptRequests(
+            self.config.external_control_host,
+            self.config.external_control_port,
+            self.controller.external_control.limits,
+            self.config.host,
+        )
 
     def _read_only_twin(
         self, name: str, greet: Callable[[Controller], bytes]
@@ -230,10 +235,12 @@ class SimulatedRobot:
             if isinstance(self._clock, RealClock | VirtualClock):
                 self._compiler = CompileThread(self._loop)
                 self.controller.programs.compile_aside = self._compiler.compile
+            self.controller.external_control.request = self._script_requests.request
             listening.set_result(None)
             await self._cycles()
         finally:
             self._loop = None
+            await self._script_requests.close()
             if self._compiler is not None:
                 self._compiler.close()
             self.controller.sockets.close_all()

@@ -20,6 +20,7 @@ from ur_cartesian_driver.motion.goal.declared_types import declare_types
 from ur_cartesian_driver.sim.faults.fault_values import Fault
 from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
+from ur_cartesian_driver.sim.pendant_programs.program_tree import BUILT_IN_PROGRAMS, ProgramTree
 from ur_cartesian_driver.sim.state.controller_io import DigitalPort
 
 #: Joint positions with room to move in all directions, away from every singularity [rad].
@@ -115,10 +116,15 @@ class SimulatorConfig:
     #: Seed of random switches between the threads of a program; None = no random switches, so
     #: threads switch only when the running thread calls a function that takes time.
     interleaving_seed: int | None = None
-    #: Programs that the dashboard can load: file name -> URScript.
-    programs: Mapping[str, str] = field(default_factory=dict)
+    #: Programs that can be loaded: file name -> URScript, or the tree of a program on the pendant.
+    #: Without one of that name, `external_control.urp` has a node of External Control.
+    programs: Mapping[str, str | ProgramTree] = field(default_factory=dict)
     #: Name of the program that is loaded from the start; empty = an empty, unnamed program.
     program: str = ''
+    #: Host and port of External Control in the installation: from there its node fetches its
+    #: program when it is played.
+    external_control_host: str = '127.0.0.1'
+    external_control_port: int = 50002
 
     def __post_init__(self) -> None:
         """Refuse values that cannot be simulated; the error names the field."""
@@ -140,8 +146,8 @@ class SimulatorConfig:
             raise ValueError(f"power is {self.power!r}; use 'running' or 'off'.")
         if self.when_late not in ('skip', 'wait'):
             raise ValueError(f"when_late is {self.when_late!r}; use 'skip' or 'wait'.")
-        if self.program and self.program not in self.programs:
-            known = ', '.join(self.programs) or 'none'
+        if self.program and self.program not in self.saved_programs:
+            known = ', '.join(self.saved_programs)
             raise ValueError(f'program is {self.program!r}; programs has {known}.')
         if self.frequency is not None and not 1.0 <= self.frequency <= 1000.0:
             raise ValueError(f'frequency is {self.frequency} Hz; use 1 to 1000 Hz.')
@@ -160,6 +166,7 @@ class SimulatorConfig:
             'realtime_port',
             'interpreter_port',
             'robot_api_port',
+            'external_control_port',
         ):
             port = getattr(self, name)
             if port is not None and not 0 <= port <= 65535:
@@ -190,6 +197,12 @@ class SimulatorConfig:
             raise ValueError(f'polyscope is {text!r}; write it like 5.21 or 5.21.0.')
         major, minor, bugfix, build = [int(part) for part in parts] + [0] * (4 - len(parts))
         return major, minor, bugfix, build
+
+    @property
+    def saved_programs(self) -> Mapping[str, str | ProgramTree]:
+        """Return the programs that can be loaded: file name -> URScript or tree."""
+        built_in = {n: tree for n, tree in BUILT_IN_PROGRAMS.items() if n not in self.programs}
+        return {**self.programs, **built_in}
 
     @property
     def listening_secondary_port(self) -> int:

@@ -28,6 +28,9 @@ class ProgramTracker:
         self.is_ending = False
         #: Whether the running program has connected to us, even if it has hung up since.
         self._has_called = False
+        #: Whether the connected program may have ended while the robot sent no states. Its sockets
+        #: may still look connected then, and another program may run.
+        self._may_have_ended = False
         #: The robot's time [s] of its first report that no program runs although one is connected;
         #: inf = it does not report this now.
         self._dead_since = inf
@@ -45,10 +48,14 @@ class ProgramTracker:
 
     def program_connected(self) -> None:
         """Require a new proof of identity, which a program has to give on each connection."""
-        self.is_ending = self._has_shown_itself = False
+        self.is_ending = self._has_shown_itself = self._may_have_ended = False
         self._run_at_connection = self._run
         self._connected_at = asyncio.get_running_loop().time()
         self._identity.clear()
+
+    def robot_lost(self) -> None:
+        """Forget which program runs, because another one can start unseen."""
+        self._has_called, self._may_have_ended = False, True
 
     async def wait_for_identity(self) -> bool:
         """Return whether the connected program is ours, as soon as that is known."""
@@ -72,7 +79,7 @@ class ProgramTracker:
         if ended:
             self._has_called = False
         elif sockets.connected:
-            self._has_called = True
+            self._has_called = not self._may_have_ended
         self._run = robot.program_run
         if (
             sockets.connected

@@ -45,9 +45,10 @@ class JointStatesCheck:
             f'{info.node_namespace.rstrip("/")}/{info.node_name}'
             for info in self._node.get_publishers_info_by_topic('joint_states')
         } - {own}
+        named = ' and '.join(sorted(others)) or 'Another node'
         self._node.get_logger().warning(
-            f'{" and ".join(sorted(others)) or "Another node"} publishes joint_states with '
-            f'{joint}, too: subscribers get both. Give the driver a namespace or a tf_prefix, or '
-            'remap its topic (-r joint_states:=/driver_joint_states). A PolyScope X robot with '
-            'its ROS 2 interface in the same domain publishes this topic by itself.'
+            f'{named} publishes joint_states with {joint}, too: subscribers get both. Give the '
+            'driver a namespace or a tf_prefix, or remap its topic '
+            '(-r joint_states:=/driver_joint_states). A PolyScope X robot with its ROS 2 '
+            'interface in the same domain publishes this topic by itself.'
         )

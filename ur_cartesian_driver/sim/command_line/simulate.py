@@ -6,12 +6,16 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+from collections.abc import Callable, Mapping
 from pathlib import Path
 import sys
+from types import MappingProxyType
 
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model, RobotModel
 from ur_cartesian_driver.sim.calibration import random_calibration, read_calibration
 from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections, typical_imperfections
+from ur_cartesian_driver.sim.pendant_programs.program_tree import BUILT_IN_PROGRAMS, ProgramTree
+from ur_cartesian_driver.sim.pendant_programs.urp_file import read_urp
 from ur_cartesian_driver.sim.simulated_robot import SimulatedRobot
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 
@@ -30,9 +34,13 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
     :raises ValueError: an option has an impossible value, or the calibration has a mistake.
     :raises OSError: the calibration or a program cannot be read.
     """
-    files = [arguments.program] if arguments.program else []
+    files = []
     if arguments.programs:
-        files += [file for file in arguments.programs.iterdir() if file.suffix == '.script']
+        found = [file for file in arguments.programs.iterdir() if file.suffix in _READERS]
+        # Of two files with one name the last one counts: PolyScope writes a .script beside a .urp.
+        files += sorted(found, key=lambda file: file.suffix)
+    if arguments.program and not _is_built_in(arguments.program):
+        files.append(arguments.program)
     return SimulatorConfig(
         model=arguments.model,
         host=arguments.host,
@@ -54,14 +62,33 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
         answers=arguments.answers,
         imperfections=imperfections(arguments),
         geometry=calibration(arguments, robot_model(arguments.model)),
-        programs={_program_name(file): file.read_text() for file in files},
+        programs=dict(map(_read_program, files)),
         program=_program_name(arguments.program) if arguments.program else '',
+        external_control_host=arguments.external_control_host,
+        external_control_port=arguments.external_control_port,
         **({'q': arguments.joints} if arguments.joints else {}),
     )
 
 
+def _is_built_in(file: Path) -> bool:
+    """Return whether a name means a program that every simulated robot has."""
+    return str(file) in BUILT_IN_PROGRAMS and not file.exists()
+
+
+def _read_program(file: Path) -> tuple[str, str | ProgramTree]:
+    """Return the name by which a program file is loaded, and the program."""
+    read = _READERS.get(file.suffix, Path.read_text)
+    return _program_name(file), read(file)
+
+
+#: Suffix of a program file -> its reader.
+_READERS: Mapping[str, Callable[[Path], str | ProgramTree]] = MappingProxyType(
+    {'.script': Path.read_text, '.urp': lambda file: read_urp(file.read_bytes(), str(file))}
+)
+
+
 def _program_name(file: Path) -> str:
-    """Return the name by which the dashboard loads a file of URScript."""
+    """Return the name by which the dashboard loads a file."""
     return f'{file.stem}.urp'
 
 

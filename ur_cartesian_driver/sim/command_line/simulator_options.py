@@ -110,7 +110,8 @@ def _add_start(command: argparse.ArgumentParser) -> None:
         '--program',
         type=Path,
         metavar='FILE',
-        help='URScript that is loaded for the dashboard from the start; NAME.script is NAME.urp',
+        help='program that is loaded from the start: URScript (NAME.script is NAME.urp), a file '
+        'of PolyScope 3 or 5 (NAME.urp), or external_control.urp, which every robot has',
     )
     command.add_argument(
         '--programs',
@@ -118,6 +119,13 @@ def _add_start(command: argparse.ArgumentParser) -> None:
         metavar='DIR',
         help='directory of such files, which the dashboard can load',
     )
+    command.add_argument(
+        '--external-control-host',
+        default='127.0.0.1',
+        metavar='HOST',
+        help='from where a node of External Control fetches its program when it is played',
+    )
+    add_ports(command, 'port of that host', external_control=50002)
 
 
 def take_negative_numbers(command: argparse.ArgumentParser) -> None:

@@ -134,7 +134,7 @@ _PROGRAM_ACTIONS: Mapping[
     {
         'play': (
             lambda c: _play(c, RuntimeState.STOPPED),
-            lambda c: c.programs.state is RuntimeState.PLAYING,
+            lambda c: not c.programs.starting,  # a short program may have ended
         ),
         'resume': (
             lambda c: _play(c, RuntimeState.PAUSED),

@@ -21,7 +21,7 @@ from collections.abc import Callable, Hashable
 from functools import lru_cache
 import logging
 from random import Random
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeAlias, TypeVar
 
 from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.sim.programs.timed_function_guard import Builtins, refuse_timed_functions
@@ -38,6 +38,8 @@ from ur_cartesian_driver.urscript.compiling.scopes import Scope
 _log = logging.getLogger(__name__)
 
 T = TypeVar('T')
+#: Generates the URScript of a program; calls its argument with the text, at once or later.
+GenerateScript: TypeAlias = Callable[[Callable[[str], None]], None]
 
 #: A cache, because clients send the same program again and again; syntax trees are immutable.
 _parse_cached = lru_cache(maxsize=8)(parse)
@@ -124,7 +126,9 @@ class ProgramRunner:
         self._stepping: ScriptInterpreter | None = None
         self._queued: tuple[str, ScriptInterpreter] | None = None
         self._secondaries: list[ScriptInterpreter] = []
-        self._loaded: ScriptProgram | None = None
+        self._loaded: ScriptProgram | GenerateScript | None = None
+        #: Marks the start that waits for its generated program; None = no start does.
+        self._awaited: object | None = None
         #: Names of the program that was compiled last, for reuse if the same program follows.
         self._newest_scope: Scope | None = None
         #: Name of the program that was loaded for `play`, empty if none was.
@@ -157,6 +161,11 @@ class ProgramRunner:
         """Whether there is a program that has not ended; it may be paused."""
         return self.state in RUNNING
 
+    @property
+    def starting(self) -> bool:
+        """Whether a start waits: for the text of the program, or until the arm stands."""
+        return self._awaited is not None or self._queued is not None
+
     def submit(self, text: str, line_offset: int = 0) -> None:
         """
         Compile a program and start it; a `sec` runs in parallel with the primary program.
@@ -173,7 +182,7 @@ class ProgramRunner:
             elif compiled.program.kind == 'sec':
                 self._secondaries.append(compiled.interpreter)
             elif stops == self._stops:
-                self._start_submitted(*compiled)
+                self._start_compiled(compiled.program.name, compiled.interpreter)
 
         self.compile_aside(lambda: self._compile_text(text), start)
 
@@ -189,12 +198,12 @@ class ProgramRunner:
             return error
         return CompiledProgram(program, interpreter)
 
-    def _start_submitted(self, program: ScriptProgram, interpreter: ScriptInterpreter) -> None:
+    def _start_compiled(self, name: str, interpreter: ScriptInterpreter) -> None:
         reason = self._arm.start_refusal()
         if reason:
-            self._messages.text(f'Program {program.name} was not started: {reason}.')
+            self._messages.text(f'Program {name} was not started: {reason}.')
             return
-        self._queue_start(program.name, interpreter)
+        self._queue_start(name, interpreter)
 
     def load(self, name: str, text: str) -> str:
         """
@@ -206,12 +215,38 @@ class ProgramRunner:
         if self.running:
             return 'a program is running'
         try:
-            self._loaded = _parse_cached(text)
-            self._compile(self._loaded)
+            program = _parse_cached(text)
+            self._compile(program)
         except CompileError as error:
             return str(error)
-        self.loaded = name
+        self.loaded, self._loaded, self._awaited = name, program, None
         return ''
+
+    def load_generated(self, name: str, generate: GenerateScript) -> str:
+        """
+        Load a program whose URScript is generated when `play` starts it; return as `load` does.
+
+        Mistakes in it are found when it is played.
+        """
+        if self.running:
+            return 'a program is running'
+        self.loaded, self._loaded, self._awaited = name, generate, None
+        return ''
+
+    def _start_generated(self, name: str, generate: GenerateScript) -> None:
+        """Start a program when it is generated, unless it is stopped or replaced by then."""
+        start = self._awaited = object()
+
+        def end_wait(compiled: CompiledProgram | CompileError) -> None:
+            if self._awaited is not start:
+                return
+            self._awaited = None
+            if isinstance(compiled, CompileError):
+                self._messages.exception(compiled.line, compiled.column, compiled.text)
+            else:
+                self._start_compiled(name, compiled.interpreter)
+
+        generate(lambda text: self.compile_aside(lambda: self._compile_text(text), end_wait))
 
     def _compile(self, program: ScriptProgram) -> ScriptInterpreter:
         known = self._newest_scope
@@ -228,6 +263,7 @@ class ProgramRunner:
         return interpreter
 
     def _queue_start(self, name: str, interpreter: ScriptInterpreter) -> None:
+        self._awaited = None
         if self.running:
             self._end()
         self._queued = (name, interpreter)
@@ -261,10 +297,13 @@ class ProgramRunner:
             self.state = RuntimeState.RESUMING
             if self._interpreter is not None:
                 self._interpreter.resume()
-        elif self.state is RuntimeState.STOPPED:
+        elif not self.running:
             if self._loaded is None:
                 return 'no program is loaded'
-            self._queue_start(self.loaded, self._compile(self._loaded))
+            if isinstance(self._loaded, ScriptProgram):
+                self._queue_start(self.loaded, self._compile(self._loaded))
+            elif self._awaited is None:
+                self._start_generated(self.loaded, self._loaded)
         return ''
 
     def pause(self) -> str:
@@ -277,7 +316,7 @@ class ProgramRunner:
     def stop(self) -> None:
         """End the program, even if it is still being compiled; the arm brakes."""
         self._stops += 1
-        self._queued = None
+        self._queued = self._awaited = None
         self._end()
 
     def _end(self) -> None:

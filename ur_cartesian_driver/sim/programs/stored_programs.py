@@ -15,38 +15,42 @@ from pathlib import PurePosixPath
 import re
 from typing import Any
 
+from ur_cartesian_driver.sim.pendant_programs.program_tree import FetchedScript, ProgramTree
+
 #: Suffix of the programs of PolyScope X.
 URPX_SUFFIX = '.urpx'
 _SCRIPT = ('program', 'urscript', 'script')
 
 
 class StoredPrograms:
-    """The programs on the disk of a robot, as URScript."""
+    """The programs on the disk of a robot, as URScript or as trees."""
 
-    def __init__(self, scripts: Mapping[str, str]) -> None:
+    def __init__(self, programs: Mapping[str, str | ProgramTree]) -> None:
         """
         Begin with these files.
 
-        :param scripts: file name -> URScript.
+        :param programs: file name -> URScript or tree.
         """
-        self._scripts = dict(scripts)
+        self._programs = dict(programs)
         self._uploaded: dict[str, Mapping[str, Any]] = {}
 
-    def script(self, file: str) -> str | None:
-        """Return the URScript of a file; None = there is no such file."""
-        return self._scripts.get(file)
+    def program(self, file: str) -> str | ProgramTree | None:
+        """Return the program of a file; None = there is no such file."""
+        return self._programs.get(file)
 
     def names(self) -> dict[str, str]:
         """Return the file of each program name; on PolyScope X names have no suffix."""
-        return {PurePosixPath(file).stem: file for file in self._scripts}
+        return {PurePosixPath(file).stem: file for file in self._programs}
 
     def urpx(self, name: str) -> Mapping[str, Any]:
         """
         Return the content of a program's `.urpx` file.
 
-        A program that was not uploaded gets one without a tree.
+        A program that was not uploaded gets one without a tree, and with nothing at its nodes of
+        External Control.
         """
-        script = self._scripts[self.names()[name]]
+        program = self._programs[self.names()[name]]
+        script = program if isinstance(program, str) else program.script(name, FetchedScript())
         return self._uploaded.get(name) or {
             'application': {},
             'program': {
@@ -65,7 +69,7 @@ class StoredPrograms:
     def put(self, name: str, content: Mapping[str, Any]) -> None:
         """Add or replace a program; the content has been read by :func:`read_urpx`."""
         self._uploaded[name] = content
-        self._scripts[self.names().get(name, name + URPX_SUFFIX)] = _script_of(name, content)
+        self._programs[self.names().get(name, name + URPX_SUFFIX)] = _script_of(name, content)
 
 
 def read_urpx(data: bytes) -> tuple[str, Mapping[str, Any]]:

@@ -1,0 +1,87 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The tree of a program on the pendant, and the URScript that PolyScope generates from the tree.
+
+URScript is generated anew whenever the program is played. The URCap External Control (CB3,
+PolyScope 5) puts its header in front of its first node, even inside the loop of the program; the
+URCapX (PolyScope X) puts it in front of the program.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import re
+from types import MappingProxyType
+from typing import TypeAlias
+
+
+@dataclass(frozen=True, slots=True)
+class ScriptText:
+    """A node that is URScript: one or more lines."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class ExternalControlNode:
+    """A node that fetches its URScript from another computer."""
+
+
+TreeNode: TypeAlias = ScriptText | ExternalControlNode
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FetchedScript:
+    """The program that External Control has fetched, in its two parts; each may be empty."""
+
+    #: Functions and variables, once in a program.
+    header: str = ''
+    #: The text at each node.
+    control_loop: str = ''
+    #: Whether the header stands in front of the program, rather than in front of the first node.
+    header_first: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramTree:
+    """The nodes of a program, in the order in which they run."""
+
+    nodes: tuple[TreeNode, ...]
+    #: Whether the program begins again after its last node.
+    loops: bool = False
+
+    @property
+    def has_external_control(self) -> bool:
+        """Whether a node has to be fetched."""
+        return any(isinstance(node, ExternalControlNode) for node in self.nodes)
+
+    def script(self, name: str, fetched: FetchedScript) -> str:
+        """
+        Return the program as URScript.
+
+        :param name: the name of the file; the function gets the same, as far as URScript allows.
+        """
+        function = re.sub(r'\W', '_', name.removesuffix('.urp'), flags=re.ASCII) or 'program'
+        lines = [f'def {"" if function[0].isalpha() else "_"}{function}():']
+        header = fetched.header
+        if fetched.header_first:
+            lines.append(header)
+            header = ''
+        if self.loops:
+            lines.append('while (True):')
+        for node in self.nodes:
+            if isinstance(node, ScriptText):
+                lines.append(node.text)
+            else:
+                lines += [header, fetched.control_loop]
+                header = ''
+        if self.loops:
+            lines.append('end')
+        return '\n'.join([*lines, 'end', ''])
+
+
+#: The programs that every simulated robot has saved: file name -> tree.
+BUILT_IN_PROGRAMS = MappingProxyType(
+    {'external_control.urp': ProgramTree((ExternalControlNode(),))}
+)
