@@ -233,7 +233,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     names = None
     try:
         if UR_DRIVER_NAMES in given:
-            names = NamesProcess(node.get_fully_qualified_name(), own_arguments[1:])
+            names = NamesProcess(node.get_fully_qualified_name(), own_arguments)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         was_idle = True

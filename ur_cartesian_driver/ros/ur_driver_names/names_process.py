@@ -24,8 +24,8 @@ class NamesProcess:
         Start the process.
 
         :param driver: the full name of the driver's node.
-        :param arguments: of the driver's command, without its name: remappings and parameters,
-            of which those of the driver mean nothing here.
+        :param arguments: of the driver's command: remappings and parameters. Parameters of the
+            driver mean nothing here.
         """
         own = ['--ros-args', '-r', '__node:=ur_driver_names', '-p', f'driver:={driver}', '--']
         module = f'{__package__}.names_node'
