@@ -2,10 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """SetMode: power, brakes and program, from every state."""
 
+from types import SimpleNamespace
+from typing import Any
+
 from action_msgs.msg import GoalStatus
 import pytest
 
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode, SafetyMode
+from ur_cartesian_driver.msg import DriverStatus
+from ur_cartesian_driver.ros.ur_driver_names.mode_action import ModeRun
+from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 
 pytestmark = pytest.mark.slow
 
@@ -152,3 +158,21 @@ def test_a_goal_is_cancelled(helper):
     helper.ur.cell.await_(handle.cancel_goal_async())
     status, result = helper.ur.result(handle)
     assert (status, result.success) == (GoalStatus.STATUS_CANCELED, False)
+
+
+@pytest.mark.parametrize('mode', [mode for mode in RobotMode if mode not in MODES])
+def test_out_of_other_modes_only_time_or_a_person_leads(mode):
+    goal = SimpleNamespace(
+        target_robot_mode=int(RobotMode.RUNNING), stop_program=False, play_program=False
+    )
+    status = DriverStatus(robot_mode=int(mode), safety_mode=int(SafetyMode.NORMAL))
+    driver: Any = SimpleNamespace(status=status, is_reporting=True)
+    ends = []
+    run = ModeRun(
+        SimpleNamespace(request=goal), driver, NamesSettings(), lambda *end: ends.append(end)
+    )
+    run.thread.start()
+    run.thread.join(10.0)
+    ((success, text),) = ends
+    assert not success
+    assert text.startswith(f'The robot is in mode {mode.name}, ')

@@ -72,7 +72,7 @@ class _ModeServer:
         self, name: str, driver: DriverNode, settings: NamesSettings, action: Any
     ) -> None:
         self._name, self._driver, self._settings, self._action = name, driver, settings, action
-        self._run: _ModeRun | None = None
+        self._run: ModeRun | None = None
         self._reported: tuple[int, int] | None = None
         self._server = DeferredActionServer(  # type: ignore[no-untyped-call]  # rclpy's
             driver.node,
@@ -104,7 +104,7 @@ class _ModeServer:
 
     def _begin(self, handle: Any) -> None:
         finish = partial(self._finish, handle)
-        self._run, self._reported = _ModeRun(handle, self._driver, self._settings, finish), None
+        self._run, self._reported = ModeRun(handle, self._driver, self._settings, finish), None
         self._run.thread.start()
 
     def _cancel(self, handle: Any) -> CancelResponse:
@@ -141,7 +141,7 @@ class _ModeServer:
             )
 
 
-class _ModeRun:
+class ModeRun:
     """What one goal does, in a thread of its own."""
 
     def __init__(
