@@ -44,6 +44,7 @@ demo-two: $(stamp)  ## The same with two arms at once, each with a goal of its o
 	$(bin)/ur-cartesian demo --arms 2
 
 test: lint  ## Lint, then all tests (PYTEST_ARGS='-k name' chooses)
+	$(bin)/python test/support/ur_interfaces.py  # once, two minutes: longer than a test may take
 	$(bin)/pytest --no-skips $(PYTEST_ARGS)
 
 random: $(stamp)  ## The random tests with all their cases (RANDOM_SEED=N draws others)

@@ -91,6 +91,13 @@ ARGUMENTS = [
         description='Start RViz with the arm and its plan; the driver then publishes the frames '
         'of the links, so that no robot_state_publisher is needed.',
     ),
+    DeclareLaunchArgument(
+        'ur_driver_names',
+        default_value='false',
+        choices=['true', 'false'],
+        description='Serve the topics, services and actions of the UR ROS 2 driver too, by a '
+        'node of its own.',
+    ),
 ]
 STRINGS = ['ur_type', 'robot_ip', 'reverse_ip', 'tf_prefix']
 PORTS = ['reverse_port', 'script_sender_port', 'trajectory_port', 'script_command_port']
@@ -115,6 +122,16 @@ def generate_launch_description():
         output='screen',
         emulate_tty=True,
     )
+    names = Node(
+        package=PACKAGE,
+        executable='ur_driver_names',
+        namespace=LaunchConfiguration('namespace'),
+        # A section ur_driver_names of the file has its parameters.
+        parameters=[LaunchConfiguration('config_file')],
+        output='screen',
+        emulate_tty=True,
+        condition=IfCondition(LaunchConfiguration('ur_driver_names')),
+    )
     rviz = Node(
         package='rviz2',
         executable='rviz2',
@@ -127,4 +144,4 @@ def generate_launch_description():
         ],
         condition=IfCondition(LaunchConfiguration('launch_rviz')),
     )
-    return LaunchDescription([*ARGUMENTS, driver, rviz])
+    return LaunchDescription([*ARGUMENTS, driver, names, rviz])

@@ -37,6 +37,12 @@ ARGUMENTS = [
         choices=['true', 'false'],
         description='Start RViz with the arm and its plan.',
     ),
+    DeclareLaunchArgument(
+        'ur_driver_names',
+        default_value='false',
+        choices=['true', 'false'],
+        description='Serve the topics, services and actions of the UR ROS 2 driver too.',
+    ),
 ]
 
 
@@ -63,7 +69,14 @@ def generate_launch_description():
         launch_arguments={
             **{
                 name: LaunchConfiguration(name)
-                for name in ('ur_type', 'robot_ip', 'tf_prefix', 'namespace', 'launch_rviz')
+                for name in (
+                    'ur_type',
+                    'robot_ip',
+                    'tf_prefix',
+                    'namespace',
+                    'launch_rviz',
+                    'ur_driver_names',
+                )
             },
             'headless_mode': 'true',
             **dict.fromkeys(ports, '0'),  # any free ports: no client needs to know them

@@ -27,7 +27,8 @@ needs_checkout = pytest.mark.skipif(
     not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has this file'
 )
 
-EXECUTABLES = ['driver', 'demo', 'send', 'show', 'sim', 'validate', 'where']
+COMMANDS = ['demo', 'send', 'show', 'sim', 'validate', 'where']
+EXECUTABLES = ['driver', 'ur_driver_names', *COMMANDS]
 LAUNCH_ARGUMENTS = {
     'driver.launch.py': {
         'ur_type',
@@ -42,6 +43,7 @@ LAUNCH_ARGUMENTS = {
         'namespace',
         'config_file',
         'launch_rviz',
+        'ur_driver_names',
     },
     'two_arms.launch.py': {
         'left_robot_ip',
@@ -59,6 +61,7 @@ LAUNCH_ARGUMENTS = {
         'tf_prefix',
         'namespace',
         'launch_rviz',
+        'ur_driver_names',
     },
 }
 
@@ -117,7 +120,7 @@ def test_an_executable_calls_a_function_that_exists(name):
     assert callable(getattr(importlib.import_module(imported.module), imported.names[0].name))
 
 
-@pytest.mark.parametrize('command', EXECUTABLES[1:])
+@pytest.mark.parametrize('command', COMMANDS)
 def test_the_command_line_has_the_command_of_an_executable(command, capsys):
     main = importlib.import_module(f'{NAME}.cli').main
     with pytest.raises(SystemExit) as exit_:

@@ -356,11 +356,12 @@ def test_commands_exist(document):
 
 
 def check_parameters(words):
+    from ur_cartesian_driver.ros.node import UR_DRIVER_NAMES
     from ur_cartesian_driver.ros.parameters.parameter_table import DECLARATIONS
 
     known = {declaration.name for declaration in DECLARATIONS}
     given = {word.split(':=')[0] for word in words if ':=' in word}
-    assert words[1] == '--ros-args'
+    assert [word for word in words if word != UR_DRIVER_NAMES][1] == '--ros-args'
     assert given <= known
 
 
@@ -447,6 +448,8 @@ def test_every_error_code_is_described_with_its_number():
 
 def test_every_parameter_that_is_named_as_one_exists():
     from ur_cartesian_driver.ros.parameters.node_parameters import defaults
+    from ur_cartesian_driver.ros.parameters.parameter_table import declarations_of
+    from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 
     named = [
         name
@@ -460,7 +463,8 @@ def test_every_parameter_that_is_named_as_one_exists():
         for name in re.findall(r'`(\w+)`', line.split('|')[1])
     ]
     assert {'robot_ip', 'ur_type', 'max_tool_speed'} <= set(named)
-    assert set(named) <= set(defaults())
+    of_names = {declaration.name for declaration in declarations_of(NamesSettings)}
+    assert set(named) <= set(defaults()) | of_names
 
 
 def test_every_imperfection_is_described():

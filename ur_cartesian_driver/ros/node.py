@@ -36,6 +36,7 @@ from ur_cartesian_driver.ros.services.append_service import AppendService
 from ur_cartesian_driver.ros.services.command_services import CommandServices
 from ur_cartesian_driver.ros.state.joint_states_check import JointStatesCheck
 from ur_cartesian_driver.ros.state.state_publisher import StatePublisher
+from ur_cartesian_driver.ros.ur_driver_names.names_process import NamesProcess
 
 #: Longest period of the heartbeat, which reports that the node's executor is alive [s].
 HEARTBEAT_PERIOD = 0.5
@@ -45,6 +46,8 @@ DISCOVERY_TIME = 2.0
 SHUTDOWN_TIMEOUT = 5.0
 #: Arrays of at least this size give their memory back to the system when they are freed [bytes].
 LARGE_ARRAY = 4 * 2**20
+#: The option of :func:`main` that starts the node with the UR driver's names.
+UR_DRIVER_NAMES = '--ur-driver-names'
 #: Parameters of mallopt, from malloc.h.
 _M_MMAP_THRESHOLD, _M_ARENA_MAX = -3, -8
 
@@ -206,13 +209,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Run the node until SIGINT or SIGTERM.
 
     The first signal stops the arm, and the node waits until running goals have ended with a
-    result; a second signal ends this wait.
+    result; a second signal ends this wait. With ``--ur-driver-names`` another process serves the
+    names of the UR ROS 2 driver.
     """
     _share_freed_memory()
+    given = list(sys.argv if arguments is None else arguments)
+    own_arguments = [argument for argument in given if argument != UR_DRIVER_NAMES]
     # rclpy's own handlers would shut ROS down at once, and no goal could end with a result.
     try:
         rclpy.init(
-            args=list(sys.argv if arguments is None else arguments),
+            args=own_arguments,
             signal_handler_options=SignalHandlerOptions.NO,
         )
     except RuntimeError as error:
@@ -224,7 +230,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except ParameterError as error:
         rclpy.shutdown()
         sys.exit(f'ur_cartesian_driver: {error}')
+    names = None
     try:
+        if UR_DRIVER_NAMES in given:
+            names = NamesProcess(node.get_fully_qualified_name(), own_arguments)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         was_idle = True
@@ -236,6 +245,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             was_idle = idle
         _end_goals(node, executor, signals)
     finally:
+        if names is not None:
+            names.close()
         node.destroy_node()
         rclpy.shutdown()
 

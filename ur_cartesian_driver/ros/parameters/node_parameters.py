@@ -25,6 +25,7 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.ros.parameters.node_settings import NodeSettings
 from ur_cartesian_driver.ros.parameters.parameter_table import (
     DECLARATIONS,
+    ParameterDeclaration,
     ParameterError,
     ParameterValue,
     plain_value,
@@ -62,9 +63,20 @@ def declare_parameters(node: Node) -> Settings:
         unknown names visible, for example mistyped ones.
     :raises ParameterError: a name is unknown or a value invalid.
     """
-    values = defaults()
-    _refuse_unknown(node.list_parameters([], 0).names, values)
-    for declaration in DECLARATIONS:
+    _refuse_unknown(node.list_parameters([], 0).names, defaults())
+    return settings(declared_values(node, DECLARATIONS))
+
+
+def declared_values(
+    node: Node, declarations: Iterable[ParameterDeclaration]
+) -> dict[str, ParameterValue]:
+    """
+    Declare parameters of a node and return their values.
+
+    :raises ParameterError: a value is invalid.
+    """
+    values = {}
+    for declaration in declarations:
         if node.has_parameter(declaration.name):
             declaration.check(plain_value(node.get_parameter(declaration.name).value))
             node.undeclare_parameter(declaration.name)
@@ -76,7 +88,7 @@ def declare_parameters(node: Node) -> Settings:
         except (InvalidParameterException, InvalidParameterTypeException) as error:
             raise ParameterError(f'Parameter {declaration.name}: {error}.') from None
         values[declaration.name] = plain_value(parameter.value)
-    return settings(values)
+    return values
 
 
 def settings_from(given: Mapping[str, ParameterValue]) -> Settings:

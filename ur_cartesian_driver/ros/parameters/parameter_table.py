@@ -129,8 +129,9 @@ def _comments(kind: type) -> Iterator[tuple[str, str]]:
             comment = []
 
 
-def _declarations() -> Iterator[ParameterDeclaration]:
-    for kind in (DriverConfig, PlanningOptions, NodeSettings):
+def declarations_of(*kinds: type) -> Iterator[ParameterDeclaration]:
+    """Yield the parameters that dataclasses declare as their fields."""
+    for kind in kinds:
         comments = {
             name: comment for each in kind.__mro__[-2::-1] for name, comment in _comments(each)
         }
@@ -138,4 +139,4 @@ def _declarations() -> Iterator[ParameterDeclaration]:
             yield ParameterDeclaration(field, comments.get(field.name, ''))
 
 
-DECLARATIONS = tuple(_declarations())
+DECLARATIONS = tuple(declarations_of(DriverConfig, PlanningOptions, NodeSettings))

@@ -1,0 +1,334 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The services of the dashboard client.
+
+Where the driver has a service of the same name it is called, and answers when the robot reports
+the effect. For the other commands the line goes to the dashboard as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future
+import re
+from typing import Any
+
+from std_srvs.srv import Trigger
+
+from ur_cartesian_driver.motion.errors import LocalProtocolError
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, SafetyMode
+from ur_cartesian_driver.protocol.dashboard import (
+    COMMAND_SPECS,
+    DashboardRequest,
+    parse_reply,
+)
+from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
+from ur_cartesian_driver.ros.message_fields import Message
+from ur_cartesian_driver.ros.services.deferred_service import completed_answer
+from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
+from ur_cartesian_driver.ros.ur_driver_names.offered_name import (
+    Call,
+    same_request,
+    Service,
+    UrName,
+)
+from ur_cartesian_driver.srv import (
+    GenerateFlightReport,
+    GenerateSupportFile,
+    Load,
+    Popup,
+    RawRequest,
+    SetOperationalMode,
+    SetUserRole,
+)
+
+DASHBOARD = 'dashboard_client'
+_NO_FIELDS = 'std_srvs/srv/Trigger'
+#: How long the robot may take to write a report, or a file for its manufacturer [s].
+FLIGHT_REPORT_TIMEOUT, SUPPORT_FILE_TIMEOUT = 240.0, 660.0
+
+Fill = Callable[[Message, str], None]
+Argument = Callable[[Message], str]
+
+
+def _nothing(response: Message, value: str) -> None:
+    """Fill in nothing: the response has only the words."""
+
+
+def _split(value: str) -> tuple[str, str]:
+    """Return the first word and the rest; both may be empty."""
+    first, _, rest = value.partition(' ')
+    return first, rest
+
+
+def _robot_mode(response: Message, value: str) -> None:
+    response.robot_mode.mode = int(_member(RobotMode, value))
+
+
+def _safety_mode(response: Message, value: str) -> None:
+    response.safety_mode.mode = int(_member(SafetyMode, value))
+
+
+def _safety_status(response: Message, value: str) -> None:
+    constant = getattr(type(response.safety_status), value, None)
+    if constant is None:
+        raise ValueError(value)
+    response.safety_status.status = constant
+
+
+def _member(modes: Any, word: str) -> Any:
+    if word not in modes.__members__:
+        raise ValueError(word)
+    return modes[word]
+
+
+def _loaded(response: Message, value: str) -> None:
+    response.program_name = value
+
+
+def _state(response: Message, value: str) -> None:
+    response.state.state, response.program_name = _split(value)
+
+
+def _running(response: Message, value: str) -> None:
+    response.program_running = value == 'true'
+
+
+def _saved(response: Message, value: str) -> None:
+    saved, response.program_name = _split(value)
+    response.program_saved = saved == 'true'
+
+
+def _remote_control(response: Message, value: str) -> None:
+    response.remote_control = value == 'true'
+
+
+def _version(response: Message, value: str) -> None:
+    numbers = version_numbers(value)
+    response.version.major, response.version.minor = numbers[:2]
+    response.version.bugfix, response.version.build = numbers[2:]
+
+
+def version_numbers(text: str) -> tuple[int, int, int, int]:
+    """
+    Return major, minor, bugfix and build of a text like ``5.21.0.1``; missing ones are 0.
+
+    :raises ValueError: the text has no version.
+    """
+    found = re.search(r'(\d+)\.(\d+)(?:\.(\d+))?(?:\.(\d+))?', text)
+    if found is None:
+        raise ValueError(text)
+    major, minor, bugfix, build = (int(number or 0) for number in found.groups())
+    return major, minor, bugfix, build
+
+
+def _model(response: Message, value: str) -> None:
+    response.robot_model = value
+
+
+def _serial_number(response: Message, value: str) -> None:
+    response.serial_number = int(value)
+
+
+def _operational_mode(response: Message, value: str) -> None:
+    response.operational_mode.mode = value
+
+
+def _user_role(response: Message, value: str) -> None:
+    response.user_role.role = value
+
+
+def _report_id(response: Message, value: str) -> None:
+    response.report_id = value
+
+
+def _file_name(response: Message, value: str) -> None:
+    response.generated_file_name = value
+
+
+#: Services without fields in the request, which the driver has too.
+_COMMANDS = (
+    'power_on',
+    'power_off',
+    'brake_release',
+    'unlock_protective_stop',
+    'restart_safety',
+    'play',
+    'pause',
+    'stop',
+    'close_popup',
+    'close_safety_popup',
+)
+#: Queries that the driver has too: type, command of the dashboard, and the fields of the response.
+_QUERIES: dict[str, tuple[str, str, Fill]] = {
+    'get_loaded_program': ('GetLoadedProgram', 'get loaded program', _loaded),
+    'program_state': ('GetProgramState', 'programState', _state),
+    'program_running': ('IsProgramRunning', 'running', _running),
+    'program_saved': ('IsProgramSaved', 'isProgramSaved', _saved),
+    'get_safety_status': ('GetSafetyStatus', 'safetystatus', _safety_status),
+    'get_operational_mode': ('GetOperationalMode', 'get operational mode', _operational_mode),
+    'get_user_role': ('GetUserRole', 'getUserRole', _user_role),
+    'get_robot_mode': ('GetRobotMode', 'robotmode', _robot_mode),
+    'get_safety_mode': ('GetSafetyMode', 'safetymode', _safety_mode),
+    'is_in_remote_control': ('IsInRemoteControl', 'is in remote control', _remote_control),
+    'get_polyscope_version': ('GetPolyScopeVersion', 'PolyscopeVersion', _version),
+    'get_robot_model': ('GetRobotModel', 'get robot model', _model),
+    'get_serial_number': ('GetSerialNumber', 'get serial number', _serial_number),
+}
+#: Commands that the driver has no service for, and their argument for a request.
+_LINES: dict[str, tuple[str, str, Argument]] = {
+    'quit': (_NO_FIELDS, 'quit', lambda request: ''),
+    'shutdown': (_NO_FIELDS, 'shutdown', lambda request: ''),
+    'add_to_log': ('AddToLog', 'addToLog', lambda request: request.message),
+}
+
+
+def _type(name: str) -> str:
+    return name if '/' in name else f'ur_dashboard_msgs/srv/{name}'
+
+
+def _words(command: str) -> Callable[[str], str]:
+    """Return the function that turns the value in a reply into the whole reply."""
+    reply = COMMAND_SPECS[command].reply
+    return lambda value: reply.replace('{}', value) if '{}' in reply else value
+
+
+def _query(name: str, kind: str, command: str, fill: Fill) -> UrName:
+    return Service(
+        name=f'{DASHBOARD}/{name}',
+        type=_type(kind),
+        source=f'dashboard/{name}',
+        source_type=Trigger,
+        call=same_request,
+        fill=fill,
+        words=_words(command),
+    )
+
+
+def _with_argument(
+    source_type: Any,
+    name: str,
+    command: str,
+    *,
+    call: Call = same_request,
+    fill: Fill = _nothing,
+) -> UrName:
+    """Return the row of a command with an argument, which the driver has too."""
+    return Service(
+        name=f'{DASHBOARD}/{name}',
+        type=_type(source_type.__name__),
+        source=f'dashboard/{name}',
+        source_type=source_type,
+        call=call,
+        fill=fill,
+        words=_words(command),
+    )
+
+
+def _slow_request(timeout: float) -> Call:
+    """Return the call of a command that may take some minutes more than the others."""
+    return lambda row, driver, request: same_request(row, driver, request, timeout)
+
+
+def _set_operational_mode(
+    row: Service, driver: DriverNode, request: Message
+) -> Future[ServiceAnswer]:
+    mode = request.operational_mode.mode
+    return driver.call(
+        row.source_type, row.source, SetOperationalMode.Request(operational_mode=mode)
+    )
+
+
+def _set_user_role(row: Service, driver: DriverNode, request: Message) -> Future[ServiceAnswer]:
+    role = request.user_role.role
+    return driver.call(row.source_type, row.source, SetUserRole.Request(user_role=role))
+
+
+def _line(name: str, kind: str, command: str, argument: Argument) -> UrName:
+    def call(row: Service, driver: DriverNode, request: Message) -> Future[ServiceAnswer]:
+        try:
+            sent = DashboardRequest(name=command, argument=argument(request))
+        except LocalProtocolError as error:
+            return completed_answer(str(error))
+        query = RawRequest.Request(query=sent.encode().decode().rstrip('\n'))
+        return _judged(driver.call(row.source_type, row.source, query), sent)
+
+    return Service(
+        name=f'{DASHBOARD}/{name}',
+        type=_type(kind),
+        source='dashboard/raw_request',
+        source_type=RawRequest,
+        call=call,
+    )
+
+
+def _judged(answer: Future[ServiceAnswer], sent: DashboardRequest) -> Future[ServiceAnswer]:
+    """Return the future of an answer that is a success only if the reply says so."""
+    result: Future[ServiceAnswer] = Future()
+
+    def judge(done: Future[ServiceAnswer]) -> None:
+        ok, text = done.result().ok, done.result().text
+        result.set_result(ServiceAnswer(ok=ok and parse_reply(sent, text).ok, text=text))
+
+    answer.add_done_callback(judge)
+    return result
+
+
+def _services() -> Iterable[UrName]:
+    for name in _COMMANDS:
+        yield Service(
+            name=f'{DASHBOARD}/{name}',
+            type=_NO_FIELDS,
+            source=f'dashboard/{name}',
+            source_type=Trigger,
+            call=same_request,
+        )
+    yield _query('clear_operational_mode', _NO_FIELDS, 'clear operational mode', _nothing)
+    yield _with_argument(Load, 'load_program', 'load')
+    yield _with_argument(Load, 'load_installation', 'load installation')
+    yield _with_argument(Popup, 'popup', 'popup')
+    yield _with_argument(
+        SetOperationalMode,
+        'set_operational_mode',
+        'set operational mode',
+        call=_set_operational_mode,
+    )
+    yield _with_argument(SetUserRole, 'set_user_role', 'setUserRole', call=_set_user_role)
+    yield _with_argument(
+        GenerateFlightReport,
+        'generate_flight_report',
+        'generate flight report',
+        call=_slow_request(FLIGHT_REPORT_TIMEOUT),
+        fill=_report_id,
+    )
+    yield _with_argument(
+        GenerateSupportFile,
+        'generate_support_file',
+        'generate support file',
+        call=_slow_request(SUPPORT_FILE_TIMEOUT),
+        fill=_file_name,
+    )
+    yield Service(
+        name=f'{DASHBOARD}/raw_request',
+        type=_type('RawRequest'),
+        source='dashboard/raw_request',
+        source_type=RawRequest,
+        call=same_request,
+    )
+    yield Service(
+        name=f'{DASHBOARD}/connect',
+        type=_NO_FIELDS,
+        # The driver dials for each request: this one shows that the robot answers.
+        source='dashboard/program_running',
+        source_type=Trigger,
+        call=same_request,
+        words=lambda value: 'The robot answers.',
+    )
+    for name, (kind, command, fill) in _QUERIES.items():
+        yield _query(name, kind, command, fill)
+    for name, (kind, command, argument) in _LINES.items():
+        yield _line(name, kind, command, argument)
+
+
+DASHBOARD_SERVICES = tuple(_services())

@@ -1,0 +1,47 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The node with the UR driver's names as a process that ends with the driver's.
+
+In a process of its own it takes no time from the driver's executor, and its defects stop no arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import subprocess
+import sys
+
+#: How long the process may take to end [s].
+END_TIMEOUT = 5.0
+
+
+class NamesProcess:
+    """The process, from its construction to :meth:`close`."""
+
+    def __init__(self, driver: str, arguments: Sequence[str]) -> None:
+        """
+        Start the process.
+
+        :param driver: the full name of the driver's node.
+        :param arguments: of the driver's command: remappings and parameters. Parameters of the
+            driver mean nothing here.
+        """
+        own = ['--ros-args', '-r', '__node:=ur_driver_names', '-p', f'driver:={driver}', '--']
+        module = f'{__package__}.names_node'
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', module, '--with-parent', *own, *arguments],
+            stdin=subprocess.PIPE,  # its end, whatever causes it, ends the process
+            # Ctrl-C reaches the driver alone, whose goals still get their results.
+            start_new_session=True,
+        )
+
+    def close(self) -> None:
+        """End the process."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        try:
+            self._process.wait(END_TIMEOUT)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()

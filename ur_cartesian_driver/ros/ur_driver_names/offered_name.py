@@ -1,0 +1,252 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The rows of the table of names: what each one is called, and how it is offered.
+
+Types are texts, ``ur_msgs/srv/SetIO``: the packages of most of them are not on PyPI.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+import importlib
+from typing import Any, TypeAlias
+
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.qos import QoSProfile
+
+from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
+from ur_cartesian_driver.ros.message_fields import Message
+from ur_cartesian_driver.ros.services.deferred_service import DeferredService
+from ur_cartesian_driver.ros.state.state_publisher import LATCHED_QOS, STATE_QOS
+from ur_cartesian_driver.ros.ur_driver_names.driver_node import ANSWER_TIMEOUT, DriverNode
+from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
+
+#: Starts the driver's call for a request, and returns the future of its answer.
+Call: TypeAlias = Callable[['Service', DriverNode, Message], Future[ServiceAnswer]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UrName(ABC):
+    """One name of the UR ROS 2 driver."""
+
+    #: topic, service or action.
+    kind: str
+    #: Relative to the namespace of the node.
+    name: str
+    #: Package, kind and name of the type.
+    type: str
+    #: The only release that has it; empty = all have.
+    release: str = ''
+
+    def is_in(self, release: str) -> bool:
+        """Return whether a release of the UR driver has the name."""
+        return self.release in ('', release)
+
+    @property
+    @abstractmethod
+    def served_by(self) -> str:
+        """What of the driver serves it; empty = nothing does."""
+
+    @abstractmethod
+    def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
+        """
+        Start to serve.
+
+        :param kind: the class of the type.
+        :returns: what the node has to keep, and to ``close()`` if it can be.
+        """
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Absent(UrName):
+    """A name that is not served."""
+
+    #: Why not, in a sentence.
+    reason: str
+
+    @property
+    def served_by(self) -> str:
+        """Nothing serves it."""
+        return ''
+
+    def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
+        """Offer nothing."""
+        return None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ByDriver(UrName):
+    """A topic that the driver itself publishes under this name."""
+
+    kind: str = 'topic'
+
+    @property
+    def served_by(self) -> str:
+        """The driver."""
+        return f'`{self.name}`'
+
+    def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
+        """Offer nothing more."""
+        return None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Topic(UrName):
+    """A topic that is published with each message of one of the driver's."""
+
+    kind: str = 'topic'
+
+    #: The driver's topic, and the class of its messages.
+    source: str
+    source_type: Any
+    #: Returns the message for one of the driver's; None = nothing is published.
+    convert: Callable[[Any, Message, NamesSettings], Message | None]
+    #: Late subscribers get the last message.
+    latched: bool = False
+    #: The driver publishes on change, but subscribers of this name expect a stream.
+    repeated: bool = False
+
+    @property
+    def served_by(self) -> str:
+        """The driver's topic."""
+        return f'`~/{self.source}`'
+
+    def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
+        """Publish what the driver publishes."""
+        return _Relay(self, driver, settings, kind)
+
+
+class _Relay:
+    """Publishes the messages of one of the driver's topics under another name."""
+
+    def __init__(self, row: Topic, driver: DriverNode, settings: NamesSettings, kind: Any) -> None:
+        self._row, self._driver, self._settings, self._kind = row, driver, settings, kind
+        self._publisher = driver.node.create_publisher(
+            kind, row.name, LATCHED_QOS if row.latched else STATE_QOS
+        )
+        self._subscription: Any = None
+        self._last: Message | None = None
+        if row.latched or row.repeated:
+            self._listen(LATCHED_QOS)
+        else:
+            driver.on_status(lambda _: self._listen_if_heard())
+        if row.repeated:
+            driver.node.create_timer(
+                1.0 / settings.io_publish_rate,
+                self._repeat,
+                clock=Clock(clock_type=ClockType.STEADY_TIME),
+            )
+
+    def _listen(self, qos: QoSProfile) -> None:
+        self._subscription = self._driver.subscribe(
+            self._row.source_type, self._row.source, self._receive, qos
+        )
+
+    def _listen_if_heard(self) -> None:
+        """Take messages only while somebody wants them: each costs a millisecond."""
+        is_heard = self._publisher.get_subscription_count() > 0
+        if is_heard and self._subscription is None:
+            self._listen(STATE_QOS)
+        elif not is_heard and self._subscription is not None:
+            self._driver.node.destroy_subscription(self._subscription)
+            self._subscription = None
+
+    def _receive(self, message: Message) -> None:
+        converted = self._row.convert(self._kind, message, self._settings)
+        if converted is not None:
+            self._last = converted
+            self._publisher.publish(converted)
+
+    def _repeat(self) -> None:
+        is_heard = self._publisher.get_subscription_count() > 0
+        if is_heard and self._last is not None and self._driver.is_reporting:
+            self._publisher.publish(self._last)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Service(UrName):
+    """A service that calls one of the driver's, and responds when that has answered."""
+
+    kind: str = 'service'
+
+    #: The driver's service and its class, or a topic of which the node keeps the last message,
+    #: and None.
+    source: str
+    source_type: Any
+    #: Starts the driver's call for a request; gets the row, too.
+    call: Call
+    #: Writes the text of an answer into the fields of the response.
+    #:
+    #: :raises ValueError: the text is not what the response can say.
+    fill: Callable[[Message, str], None] = lambda response, text: None
+    #: Returns what the response says for the text of a successful answer.
+    words: Callable[[str], str] = str
+
+    @property
+    def served_by(self) -> str:
+        """The driver's service or topic."""
+        return f'`~/{self.source}`'
+
+    def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
+        """Respond with the driver's answers."""
+        if self.source_type is not None:
+            driver.client(self.source_type, self.source)  # its discovery takes time
+
+        def handle(request: Message) -> Future[Message]:
+            response: Future[Message] = Future()
+            self.call(self, driver, request).add_done_callback(
+                lambda done: response.set_result(self._response(driver, kind, done.result()))
+            )
+            return response
+
+        return DeferredService(driver.node, kind, self.name, handle)
+
+    def _response(self, driver: DriverNode, kind: Any, answer: ServiceAnswer) -> Message:
+        response, ok, text = kind.Response(), answer.ok, answer.text
+        if ok:
+            try:
+                self.fill(response, text)
+            except (ValueError, AssertionError):  # the latter: a number that a field cannot hold
+                ok = False
+            text = self.words(text)
+        if hasattr(response, 'success'):
+            response.success = ok
+        for field in ('message', 'answer', 'status'):
+            if hasattr(response, field):
+                setattr(response, field, text)
+                break
+        else:
+            if not ok:
+                driver.warn(f'{self.name}: {text}')
+        return response
+
+
+def same_request(
+    row: Service, driver: DriverNode, request: Message, timeout: float = ANSWER_TIMEOUT
+) -> Future[ServiceAnswer]:
+    """Call the driver's service with the values of the fields that both requests have."""
+    ours = row.source_type.Request()
+    for field in ours.get_fields_and_field_types().keys() & request.get_fields_and_field_types():
+        setattr(ours, field, getattr(request, field))
+    return driver.call(row.source_type, row.source, ours, timeout)
+
+
+def class_of(type_name: str) -> Any:
+    """
+    Return the class of a type; None if its package is not installed, or lacks the type.
+
+    An installed package that is broken raises its own exception.
+    """
+    package, kind, name = type_name.split('/')
+    module = f'{package}.{kind}'
+    try:
+        return getattr(importlib.import_module(module), name, None)
+    except ModuleNotFoundError as error:
+        if error.name not in (package, module):
+            raise
+        return None

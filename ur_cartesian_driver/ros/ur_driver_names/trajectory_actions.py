@@ -1,0 +1,273 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The actions of the trajectory controllers: each forwards its goals to the driver's joint action.
+
+What a controller of ros2_control rejects is rejected here, before the driver sees it. Goals get
+the tolerances that the UR driver's configuration gives them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+import copy
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+import threading
+from typing import Any
+
+from action_msgs.msg import GoalStatus
+from rclpy.action.client import ActionClient
+from rclpy.action.server import CancelResponse, GoalResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer
+from ur_cartesian_driver.ros.message_fields import duration_message, Message, nanoseconds
+from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
+from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
+from ur_cartesian_driver.ros.ur_driver_names.offered_name import class_of, UrName
+
+#: From the UR driver's configuration of its controllers: how far a joint may be off its path [rad]
+#: and, at the end, off its last point [rad], and how fast it may still be there [rad/s].
+PATH_TOLERANCE, GOAL_TOLERANCE, STOPPED_VELOCITY = 0.2, 0.1, 0.2
+#: In place of a goal_time_tolerance of 0, which there means no bound [s].
+NO_TIME_TOLERANCE = 3600.0
+#: Largest velocity at the last point that counts as rest [rad/s].
+REST = 1e-6
+#: How long the driver's action may be gone before its goals are given up [s]; period of the look.
+LOST_TIMEOUT, LOOK_PERIOD = 5.0, 1.0
+
+
+def rejection(trajectory: Message, now: int) -> str:
+    """
+    Return why a controller of ros2_control rejects a trajectory; empty = it does not.
+
+    :param now: time of the node's clock [ns].
+    """
+    names, points = list(trajectory.joint_names), trajectory.points
+    if len(names) != len(JOINT_NAMES) or not all(
+        sum(name.endswith(joint) for name in names) == 1 for joint in JOINT_NAMES
+    ):
+        return f'joint_names must be the six joints of the arm, each once, not {names}'
+    if not points:
+        return 'the trajectory has no points'
+    times = [nanoseconds(point.time_from_start) for point in points]
+    for i, (before, time) in enumerate(pairwise(times), 1):
+        if time <= before:
+            return f'time_from_start of point {i} is not later than that of the point before'
+    for i, point in enumerate(points):
+        for field in ('positions', 'velocities', 'accelerations'):
+            count = len(getattr(point, field))
+            if count != len(names) and (count or field == 'positions'):
+                return f'{field} of point {i} has {count} values, not {len(names)}'
+    if any(abs(velocity) > REST for velocity in points[-1].velocities):
+        return 'the velocity at the last point is not 0'
+    start = nanoseconds(trajectory.header.stamp)
+    if start and start + times[-1] < now:
+        return 'the trajectory ends in the past'
+    return ''
+
+
+def with_default_tolerances(goal: Message, tolerance: Any) -> Message:
+    """
+    Return a goal with the tolerances that ros2_control's controller would use.
+
+    There 0 means the value of the configuration, and a negative value no bound.
+
+    :param tolerance: the class of ``JointTolerance``.
+    """
+    goal = copy.copy(goal)
+    names = goal.trajectory.joint_names
+    goal.path_tolerance = _filled(goal.path_tolerance, names, tolerance, PATH_TOLERANCE, 0.0)
+    goal.goal_tolerance = _filled(
+        goal.goal_tolerance, names, tolerance, GOAL_TOLERANCE, STOPPED_VELOCITY
+    )
+    return goal
+
+
+def _filled(
+    given: Iterable[Message],
+    names: Iterable[str],
+    tolerance: Any,
+    position: float,
+    velocity: float,
+) -> list[Message]:
+    by_name = {entry.name: entry for entry in given}
+    unknown = [entry for name, entry in by_name.items() if name not in names]
+    return [
+        tolerance(
+            name=name,
+            position=(entry := by_name.get(name, tolerance())).position or position,
+            velocity=entry.velocity or velocity,
+            acceleration=entry.acceleration,
+        )
+        for name in names
+    ] + unknown
+
+
+def _with_end(goal: Message) -> Message:
+    """Return a goal whose goal_time_tolerance is not 0."""
+    if nanoseconds(goal.goal_time_tolerance) == 0:
+        goal = copy.copy(goal)
+        goal.goal_time_tolerance = duration_message(NO_TIME_TOLERANCE)
+    return goal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControllerAction(UrName):
+    """The action of one trajectory controller."""
+
+    kind: str = 'action'
+    type: str = 'control_msgs/action/FollowJointTrajectory'
+
+    #: Goals get the tolerances of ros2_control's controller. The pass-through controller has none
+    #: of its own, and takes no goal while one runs.
+    has_defaults: bool = True
+    preempts: bool = True
+
+    @property
+    def served_by(self) -> str:
+        """The driver's joint action."""
+        return '`~/follow_joint_trajectory`'
+
+    def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
+        """Forward goals, feedback, results and cancels."""
+        return _Forwarder(self, driver, kind)
+
+
+class _Run:
+    """A goal of a client, and the driver's goal that it became."""
+
+    def __init__(self, handle: Any) -> None:
+        self.handle = handle
+        #: The driver's goal; None = the driver has not accepted it yet.
+        self.forwarded: Any = None
+        self.seconds_lost = 0.0
+
+
+class _Forwarder:
+    """An action server whose goals the driver executes."""
+
+    def __init__(self, row: ControllerAction, driver: DriverNode, action: Any) -> None:
+        self._row, self._driver, self._action = row, driver, action
+        self._lock = threading.Lock()
+        self._runs: dict[bytes, _Run] = {}
+        node, group = driver.node, ReentrantCallbackGroup()
+        self._client = ActionClient(
+            node, action, driver.own_name('follow_joint_trajectory'), callback_group=group
+        )
+        self._server = DeferredActionServer(  # type: ignore[no-untyped-call]  # rclpy's
+            node,
+            action,
+            row.name,
+            self._begin,
+            callback_group=group,
+            goal_callback=self._judge,
+            cancel_callback=self._cancel,
+        )
+        node.create_timer(
+            LOOK_PERIOD,
+            self._look_for_driver,
+            callback_group=group,
+            clock=Clock(clock_type=ClockType.STEADY_TIME),
+        )
+
+    def close(self) -> None:
+        """Stop serving; the driver goes on with its goals."""
+        self._server.destroy()
+        self._client.destroy()
+
+    def _judge(self, goal: Message) -> GoalResponse:
+        reason = rejection(goal.trajectory, self._driver.node.get_clock().now().nanoseconds)
+        if not reason and not self._client.server_is_ready():
+            reason = (
+                f'the driver does not serve {self._driver.own_name("follow_joint_trajectory")}: '
+                'does it run, with control_msgs installed'
+            )
+        if not reason and not self._row.preempts and self._runs:
+            reason = 'a trajectory is being executed; cancel it first'
+        if not reason:
+            return GoalResponse.ACCEPT
+        self._driver.warn(f'{self._row.name}: goal rejected: {reason}.')
+        return GoalResponse.REJECT
+
+    def _begin(self, handle: Any) -> None:
+        run = _Run(handle)
+        with self._lock:
+            self._runs[_key(handle)] = run
+        goal = _with_end(handle.request)
+        if self._row.has_defaults:
+            goal = with_default_tolerances(goal, class_of('control_msgs/msg/JointTolerance'))
+        self._client.send_goal_async(
+            goal, feedback_callback=lambda message: handle.publish_feedback(message.feedback)
+        ).add_done_callback(partial(self._accepted, run))
+
+    def _accepted(self, run: _Run, done: Any) -> None:
+        forwarded = done.result()
+        if not forwarded.accepted:
+            self._end(run, GoalStatus.STATUS_ABORTED, _failed(self._action, 'The driver refused.'))
+            return
+        run.forwarded = forwarded
+        forwarded.get_result_async().add_done_callback(
+            lambda done: self._end(run, done.result().status, done.result().result)
+        )
+        if run.handle.is_cancel_requested:
+            forwarded.cancel_goal_async()
+
+    def _cancel(self, handle: Any) -> CancelResponse:
+        run = self._runs.get(_key(handle))
+        if run is not None and run.forwarded is not None:
+            run.forwarded.cancel_goal_async()
+        return CancelResponse.ACCEPT
+
+    def _end(self, run: _Run, status: int, result: Message) -> None:
+        """Give a goal the end of the driver's goal; only the first end counts."""
+        with self._lock:
+            if self._runs.pop(_key(run.handle), None) is None:
+                return
+
+        def finish(handle: Any) -> Message:
+            if status == GoalStatus.STATUS_SUCCEEDED:
+                handle.succeed()
+            elif status == GoalStatus.STATUS_CANCELED and handle.is_cancel_requested:
+                handle.canceled()
+            else:
+                handle.abort()
+            return result
+
+        self._server.finish(run.handle, finish)
+
+    def _look_for_driver(self) -> None:
+        """Abort the goals of a driver that has been gone for some seconds."""
+        ready = self._client.server_is_ready()
+        for run in list(self._runs.values()):
+            run.seconds_lost = 0.0 if ready else run.seconds_lost + LOOK_PERIOD
+            if run.seconds_lost >= LOST_TIMEOUT:
+                text = 'The driver is gone: whether the arm moves is not known.'
+                self._end(run, GoalStatus.STATUS_ABORTED, _failed(self._action, text))
+
+
+def _key(handle: Any) -> bytes:
+    return bytes(handle.goal_id.uuid)
+
+
+def _failed(action: Any, text: str) -> Message:
+    return action.Result(error_code=action.Result.PATH_TOLERANCE_VIOLATED, error_string=text)
+
+
+TRAJECTORY_ACTIONS: tuple[UrName, ...] = (
+    # Its release for Lyrical has no scaled controller: the other one scales.
+    ControllerAction(
+        name='scaled_joint_trajectory_controller/follow_joint_trajectory', release='jazzy'
+    ),
+    ControllerAction(name='joint_trajectory_controller/follow_joint_trajectory'),
+    ControllerAction(
+        name='passthrough_trajectory_controller/follow_joint_trajectory',
+        has_defaults=False,
+        preempts=False,
+    ),
+)
