@@ -65,12 +65,6 @@ _ROWS = (
     ),
     (
         'action',
-        'motion_primitive_forward_controller/motion_sequence',
-        'control_msgs/action/ExecuteMotionPrimitiveSequence',
-        'see [motion primitives](motion_primitives.md) for the goal that does the same',
-    ),
-    (
-        'action',
         'tool_contact_controller/detect_tool_contact',
         'ur_msgs/action/ToolContact',
         'contact is the end of a press here: `presses` of a goal',

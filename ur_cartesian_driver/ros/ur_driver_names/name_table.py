@@ -14,6 +14,7 @@ from ur_cartesian_driver.ros.ur_driver_names.dashboard_services import DASHBOARD
 from ur_cartesian_driver.ros.ur_driver_names.io_services import IO_SERVICES
 from ur_cartesian_driver.ros.ur_driver_names.mode_action import MODE_ACTION
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import UrName
+from ur_cartesian_driver.ros.ur_driver_names.sequence_action import SEQUENCE_ACTION
 from ur_cartesian_driver.ros.ur_driver_names.state_topics import STATE_TOPICS
 from ur_cartesian_driver.ros.ur_driver_names.trajectory_actions import TRAJECTORY_ACTIONS
 
@@ -23,6 +24,7 @@ NAMES: tuple[UrName, ...] = (
     *DASHBOARD_SERVICES,
     *IO_SERVICES,
     *TRAJECTORY_ACTIONS,
+    SEQUENCE_ACTION,
     MODE_ACTION,
     *ABSENT,
 )
