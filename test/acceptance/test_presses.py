@@ -8,6 +8,7 @@ wiring, not the robot. All in virtual time.
 """
 
 from dataclasses import replace
+from math import nan
 from pathlib import Path as FilePath
 import re
 from runpy import run_path
@@ -17,7 +18,7 @@ import pytest
 from robot_cell import run_cell
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.geometry.pose import (
     multiply,
@@ -27,9 +28,11 @@ from ur_cartesian_driver.motion.geometry.pose import (
 from ur_cartesian_driver.motion.goal.goal import (
     ContactEnd,
     Goal,
+    Posture,
     Press,
     PressFrame,
     Segment,
+    SegmentType,
     Tolerance,
     Waypoint,
 )
@@ -181,6 +184,30 @@ def test_the_goal_ends_where_the_tool_touches(axes):
         assert places[-1] == pytest.approx((0.0, 0.05, 0.0), abs=1e-3)
         assert np.abs(forces[-1]).max() < 3.0
         assert cell.robot.controller.contact.force_mode is None
+
+    run_cell(scenario)
+
+
+def test_a_joint_motion_to_joint_positions_ends_where_the_tool_touches():
+    async def scenario(cell):
+        put(cell, 'box', (0.0, 0.075, 0.0), (0.1, 0.05, 0.1))  # its face is at 50 mm
+        state = cell.memory.read()
+        pan, *rest = state.actual_q
+        goal = Goal(
+            waypoints=tuple(
+                Waypoint(
+                    pose=Pose((nan,) * 3, (nan,) * 4),
+                    posture=Posture(names=JOINT_NAMES, values=(pan + turn, *rest)),
+                )
+                for turn in (-0.01, -0.2)
+            ),
+            segments=(Segment(type=SegmentType.JOINT, velocity=0.1, acceleration=0.5),) * 2,
+            presses=(replace(DOWN, contact=ContactEnd.REQUIRED, axes=(), forces=()),),
+        )
+        motion = cell.owner.start(plan(goal, state, ARM, OPTIONS))
+        places, _ = await recorded(cell, motion)
+        assert motion.outcome.succeeded, motion.outcome.text
+        assert places[-1, 1] == pytest.approx(0.05, abs=1e-3)
 
     run_cell(scenario)
 

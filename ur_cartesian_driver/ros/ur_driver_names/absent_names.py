@@ -67,13 +67,15 @@ _ROWS = (
         'action',
         'tool_contact_controller/detect_tool_contact',
         'ur_msgs/action/ToolContact',
-        'contact is the end of a press here: `presses` of a goal',
+        'the robot program watches for contact only where a goal asks for it, which the contact '
+        'then ends: `presses` of a goal',
     ),
     (
         'action',
         'trajectory_until_node/execute',
         'ur_msgs/action/FollowJointTrajectoryUntil',
-        'contact is the end of a press here: `presses` of a goal',
+        'contact ends lines, arcs and joint moves (`presses` of a goal), but not splines, which '
+        'joint trajectories are',
     ),
 )
 
