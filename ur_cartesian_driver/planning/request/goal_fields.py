@@ -73,8 +73,7 @@ def is_timed(goal: GoalTable) -> bool:
 
 def gives_joints(goal: GoalTable) -> Flags:
     """Return whether each point (n,) gives joint positions in place of a pose."""
-    given: Flags = np.isnan(goal.waypoints.poses).all(axis=1)
-    return given
+    return np.asarray(np.isnan(goal.waypoints.poses).all(axis=1))
 
 
 def is_optimized(kind: SegmentType) -> bool:

@@ -68,14 +68,7 @@ _ROWS = (
         'tool_contact_controller/detect_tool_contact',
         'ur_msgs/action/ToolContact',
         'the robot program watches for contact only where a goal asks for it, which the contact '
-        'then ends: `presses` of a goal',
-    ),
-    (
-        'action',
-        'trajectory_until_node/execute',
-        'ur_msgs/action/FollowJointTrajectoryUntil',
-        'contact ends lines, arcs and joint moves (`presses` of a goal), but not splines, which '
-        'joint trajectories are',
+        'then ends: `trajectory_until_node/execute`, or `presses` of a goal',
     ),
 )
 

@@ -118,12 +118,14 @@ def _with_end(goal: Message) -> Message:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TrajectoryAction(UrName):
+class ControllerAction(UrName):
     """The action of one trajectory controller."""
 
     kind: str = 'action'
     type: str = 'control_msgs/action/FollowJointTrajectory'
 
+    #: The driver's action.
+    target: str = 'follow_joint_trajectory'
     #: Goals get the tolerances of ros2_control's controller. The pass-through controller has none
     #: of its own, and takes no goal while one runs.
     has_defaults: bool = True
@@ -132,7 +134,7 @@ class TrajectoryAction(UrName):
     @property
     def served_by(self) -> str:
         """The driver's joint action."""
-        return '`~/follow_joint_trajectory`'
+        return f'`~/{self.target}`'
 
     def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
         """Forward goals, feedback, results and cancels."""
@@ -296,11 +298,13 @@ def _key(handle: Any) -> bytes:
 class _TrajectoryForwarder(GoalForwarder):
     """The action of one trajectory controller."""
 
-    def __init__(self, row: TrajectoryAction, driver: DriverNode, action: Any) -> None:
-        super().__init__(driver, row.name, action, ('follow_joint_trajectory', action))
+    def __init__(self, row: ControllerAction, driver: DriverNode, action: Any) -> None:
+        super().__init__(driver, row.name, action, (row.target, action))
         self.preempts, self._has_defaults = row.preempts, row.has_defaults
 
     def rejection(self, goal: Message) -> str:
+        if until := getattr(goal, 'until_type', 0):
+            return f'until_type is {until}, but only TOOL_CONTACT (0) is known'
         return rejection(goal.trajectory, self.driver.node.get_clock().now().nanoseconds)
 
     def forward(self, run: ForwardedGoal) -> None:
@@ -310,19 +314,28 @@ class _TrajectoryForwarder(GoalForwarder):
         self.send(run, goal)
 
     def failure(self, text: str) -> Message:
-        result = self.action.Result
-        return result(error_code=result.PATH_TOLERANCE_VIOLATED, error_string=text)
+        kind = self.action.Result
+        result = kind(error_code=kind.PATH_TOLERANCE_VIOLATED, error_string=text)
+        if hasattr(result, 'until_condition_result'):
+            result.until_condition_result = kind.NOT_TRIGGERED  # 0 is TRIGGERED
+        return result
 
 
 TRAJECTORY_ACTIONS: tuple[UrName, ...] = (
     # Its release for Lyrical has no scaled controller: the other one scales.
-    TrajectoryAction(
+    ControllerAction(
         name='scaled_joint_trajectory_controller/follow_joint_trajectory', release='jazzy'
     ),
-    TrajectoryAction(name='joint_trajectory_controller/follow_joint_trajectory'),
-    TrajectoryAction(
+    ControllerAction(name='joint_trajectory_controller/follow_joint_trajectory'),
+    ControllerAction(
         name='passthrough_trajectory_controller/follow_joint_trajectory',
         has_defaults=False,
+        preempts=False,
+    ),
+    ControllerAction(
+        name='trajectory_until_node/execute',
+        type='ur_msgs/action/FollowJointTrajectoryUntil',
+        target='follow_joint_trajectory_until',
         preempts=False,
     ),
 )
