@@ -8,6 +8,7 @@ wiring, not the robot. All in virtual time.
 """
 
 from dataclasses import replace
+from math import nan
 from pathlib import Path as FilePath
 import re
 from runpy import run_path
@@ -17,7 +18,7 @@ import pytest
 from robot_cell import run_cell
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.geometry.pose import (
     multiply,
@@ -27,13 +28,16 @@ from ur_cartesian_driver.motion.geometry.pose import (
 from ur_cartesian_driver.motion.goal.goal import (
     ContactEnd,
     Goal,
+    Posture,
     Press,
     PressFrame,
     Segment,
+    SegmentType,
     Tolerance,
     Waypoint,
 )
-from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.motion.goal.joint_goal import JointGoal, JointPoint
+from ur_cartesian_driver.planning import plan, plan_joint_goal, PlanningOptions
 from ur_cartesian_driver.sim import rtde_output_values
 from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 
@@ -181,6 +185,89 @@ def test_the_goal_ends_where_the_tool_touches(axes):
         assert places[-1] == pytest.approx((0.0, 0.05, 0.0), abs=1e-3)
         assert np.abs(forces[-1]).max() < 3.0
         assert cell.robot.controller.contact.force_mode is None
+
+    run_cell(scenario)
+
+
+def test_a_joint_motion_to_joint_positions_ends_where_the_tool_touches():
+    async def scenario(cell):
+        put(cell, 'box', (0.0, 0.075, 0.0), (0.1, 0.05, 0.1))  # its face is at 50 mm
+        state = cell.memory.read()
+        pan, *rest = state.actual_q
+        goal = Goal(
+            waypoints=tuple(
+                Waypoint(
+                    pose=Pose((nan,) * 3, (nan,) * 4),
+                    posture=Posture(names=JOINT_NAMES, values=(pan + turn, *rest)),
+                )
+                for turn in (-0.01, -0.2)
+            ),
+            segments=(Segment(type=SegmentType.JOINT, velocity=0.1, acceleration=0.5),) * 2,
+            presses=(replace(DOWN, contact=ContactEnd.REQUIRED, axes=(), forces=()),),
+        )
+        motion = cell.owner.start(plan(goal, state, ARM, OPTIONS))
+        places, _ = await recorded(cell, motion)
+        assert motion.outcome.succeeded, motion.outcome.text
+        assert places[-1, 1] == pytest.approx(0.05, abs=1e-3)
+
+    run_cell(scenario)
+
+
+def swing(state, *points, **fields):
+    """Return a joint goal (time, turn of the base) that ends where the tool touches."""
+    pan, *rest = state.actual_q
+    return JointGoal(
+        joint_names=JOINT_NAMES,
+        points=tuple(
+            JointPoint(time=time, positions=(pan + turn, *rest)) for time, turn in points
+        ),
+        until_contact=True,
+        **fields,
+    )
+
+
+@pytest.mark.parametrize(
+    ('points', 'accuracy'),
+    [
+        (((4.0, -0.3),), 1e-3),
+        (((0.0, 0.0), (2.0, -0.05), (4.0, -0.3)), 1e-3),
+        (((1.2, -0.3),), 2e-3),  # at 0.2 m/s, 0.4 mm in a cycle
+    ],
+    ids=['one point', 'from here', 'fast'],
+)
+def test_a_joint_trajectory_ends_where_the_tool_touches(points, accuracy):
+    async def scenario(cell):
+        put(cell, 'box', (0.0, 0.075, 0.0), (0.1, 0.05, 0.1))  # its face is at 50 mm
+        state = cell.memory.read()
+        motion = cell.owner.start(plan_joint_goal(swing(state, *points), state, ARM, OPTIONS))
+        places, forces = await recorded(cell, motion)
+        assert motion.outcome.succeeded, motion.outcome.text
+        assert motion.outcome.touched
+        assert f'on the way to point {len(points) - 1}, ' in motion.outcome.text
+        assert places[-1, 1] == pytest.approx(0.05, abs=accuracy)
+        assert np.abs(forces[-1]).max() < 3.0
+        # The arm takes the next goal, and the watch is over.
+        state = cell.memory.read()
+        back = replace(swing(state, (2.0, 0.1)), until_contact=False)
+        motion = cell.owner.start(plan_joint_goal(back, state, ARM, OPTIONS))
+        await cell.until(lambda: motion.outcome, 10.0)
+        assert motion.outcome.succeeded, motion.outcome.text
+        assert not motion.outcome.touched
+
+    run_cell(scenario)
+
+
+def test_a_joint_trajectory_that_touches_nothing_goes_to_its_end():
+    async def scenario(cell):
+        state = cell.memory.read()
+        motion = cell.owner.start(
+            plan_joint_goal(swing(state, (2.0, -0.1), (3.0, -0.2)), state, ARM, OPTIONS)
+        )
+        await cell.until(lambda: motion.outcome, 10.0)
+        assert motion.outcome.succeeded, motion.outcome.text
+        assert not motion.outcome.touched
+        q = cell.memory.read().target_q
+        assert q[0] - state.target_q[0] == pytest.approx(-0.2, abs=1e-5)
 
     run_cell(scenario)
 

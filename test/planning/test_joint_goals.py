@@ -23,6 +23,7 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.goal.joint_goal import JointGoal, JointPoint, JointTolerance
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.primitive import BeginPress, EndPress, PressLaw, Spline
 from ur_cartesian_driver.planning import plan_joint_goal, PlanningOptions
 from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 
@@ -216,3 +217,26 @@ def test_chosen_velocities_turn_no_joint_beyond_its_points(cell, steps):
         assert (q > low - 1e-9).all()
         assert (q < high + 1e-9).all()
         q_before = row
+
+
+def test_a_goal_until_contact_is_watched_from_its_start_to_its_end(cell):
+    goal = goal_through(cell, SIX, ZERO, until_contact=True)
+    made, plain = planned(cell, goal), planned(cell, replace(goal, until_contact=False))
+    assert [type(each) for each in made.rows.primitives] == [
+        PressLaw,
+        BeginPress,
+        Spline,
+        Spline,
+        EndPress,
+    ]
+    assert tuple(made.rows.primitives)[2:4] == tuple(plain.rows.primitives)
+    assert made.duration == plain.duration
+    assert made.reference.time.tolist() == plain.reference.time.tolist()
+
+
+@pytest.mark.parametrize('dialect', ['2.10', '2.12'])
+def test_older_programs_do_not_watch_splines_for_contact(cell, dialect):
+    goal, options = goal_through(cell, SIX), {'dialect': DIALECTS[dialect]}
+    planned(cell, goal, **options)
+    with pytest.raises(NotAvailable, match=rf'wire dialect {dialect} do not watch'):
+        planned(cell, replace(goal, until_contact=True), **options)

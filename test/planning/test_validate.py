@@ -110,6 +110,12 @@ FREE = {'free_axis': FreeAxis.Z}
 ARC = {'type': TYPE.CIRCULAR, 'via': VIA}
 
 REFUSALS = [
+    # joint positions in place of a pose
+    (
+        with_point(PLAIN, 1, pose=Pose((nan,) * 3, (nan,) * 4)),
+        InvalidGoal,
+        'the posture names 0 of the 6 joints; name all joints, or give the pose',
+    ),
     # rounded corners
     (
         replace(

@@ -63,9 +63,20 @@ def test_the_action_is_there_only_where_control_msgs_is(monkeypatch):
     vars(module)['FollowJointTrajectory'] = FollowJointTrajectory
     monkeypatch.setitem(sys.modules, 'control_msgs', package)
     monkeypatch.setitem(sys.modules, 'control_msgs.action', module)
-    _, joint_action = installed_actions()
+    _, joint_action, *_ = installed_actions()
     assert joint_action.name == NAME
     assert joint_action.action_type is FollowJointTrajectory
+
+
+def test_the_action_that_waits_for_contact_needs_a_ur_msgs_that_has_it(monkeypatch):
+    modules = {name: ModuleType(name) for name in ('control_msgs', 'ur_msgs')}
+    modules |= {f'{name}.action': ModuleType(f'{name}.action') for name in modules}
+    vars(modules['control_msgs.action'])['FollowJointTrajectory'] = FollowJointTrajectory
+    for name, module in modules.items():
+        monkeypatch.setitem(sys.modules, name, module)
+    assert [type(action) for action in installed_actions()] == [CartesianAction, JointAction]
+    vars(modules['ur_msgs.action'])['FollowJointTrajectoryUntil'] = object
+    assert installed_actions()[2].name == '~/follow_joint_trajectory_until'
 
 
 def test_a_control_msgs_that_is_broken_is_not_taken_for_missing(monkeypatch, tmp_path):

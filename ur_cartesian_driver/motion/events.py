@@ -184,6 +184,8 @@ class Outcome:
     #: The place on the path at which the goal was stopped; the arm came to rest some millimetres
     #: farther on. None = the goal succeeded, nothing had moved, or the place is not known.
     stopped: PathPlace | None = None
+    #: Whether the goal succeeded because the tool touched something.
+    touched: bool = False
 
     @property
     def succeeded(self) -> bool:

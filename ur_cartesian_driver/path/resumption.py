@@ -32,11 +32,12 @@ from ur_cartesian_driver.motion.goal.goal import (
     SegmentType,
     Waypoint,
 )
-from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable
+from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable, rows_where
 from ur_cartesian_driver.motion.goal.known_frames import FRAMES_OF_TOOL
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.request.goal_fields import (
+    gives_joints,
     is_rounded,
     is_spline,
     is_timed,
@@ -480,6 +481,12 @@ def _check(goal: Goal, place: PathPlace, overlap: float, approach: float) -> Non
             f'is {goal.frame_id}, which has moved with the arm since the goal began, and the path '
             'with it',
             'give the path in base, or in another frame that stays',
+        )
+    for k in rows_where(gives_joints(goal_table(goal)))[:1]:
+        raise InvalidGoal(
+            f'trajectory.points[{k}].pose',
+            'is given by joint positions, so the path around it is not known without the arm',
+            'give the pose, or send what is left of the path as a goal of its own',
         )
     for k, segment in enumerate(goal.segments):
         if segment.dwell and resolve_execution_mode(goal_table(goal)).traits.is_spline:

@@ -3,10 +3,10 @@
 """
 Plan a goal: choose the primitives, and refuse goals that the arm cannot execute.
 
-:func:`plan` makes the checks that need no robot
-(:func:`~ur_cartesian_driver.planning.request.validate.check`), expresses the goal for the TCP that
-is active while the goal runs, and calls the planner of the execution mode: :func:`plan_moves` or
-:func:`plan_spline_goal`.
+:func:`plan` checks the goal
+(:func:`~ur_cartesian_driver.planning.request.joint_points.check_for_arm`), expresses it for the
+TCP that is active while it runs, and calls the planner of the execution mode: :func:`plan_moves`
+or :func:`plan_spline_goal`.
 
 The stages of :func:`plan_moves`: the curve of every segment with the configuration in which the
 arm arrives, and the blends between the curves; clearance; times and speeds; primitives, outputs,
@@ -81,6 +81,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     resolve_execution_mode,
 )
 from ur_cartesian_driver.planning.request.ignored_fields import ignored_remarks
+from ur_cartesian_driver.planning.request.joint_points import check_for_arm
 from ur_cartesian_driver.planning.request.point_events.registry import (
     OUTPUT_EVENTS,
     POINT_EVENTS,
@@ -88,7 +89,6 @@ from ur_cartesian_driver.planning.request.point_events.registry import (
 from ur_cartesian_driver.planning.request.point_events.safe_outputs import add_safe_outputs
 from ur_cartesian_driver.planning.request.point_events.stops import Stops
 from ur_cartesian_driver.planning.request.program_features import time_remarks
-from ur_cartesian_driver.planning.request.validate import check
 from ur_cartesian_driver.planning.rounded.rounded_planner import plan_rounded_path
 from ur_cartesian_driver.planning.rounded.rounded_report import planned_rows, RoundedReport
 from ur_cartesian_driver.planning.spline.spline_planner import (
@@ -125,7 +125,7 @@ def plan(
     :raises GoalRefused: the goal fails a check (a subclass is raised); the text names point,
         quantity, value and bound.
     """
-    table = check(goal, options)
+    table = check_for_arm(goal, state.T_flange_tcp, arm, options)
     if table.segments.free_axes.any():
         return _plan_free(table, state, arm, options)
     return _plan_fixed(table, state, arm, options, running)

@@ -113,6 +113,7 @@ class GoalMachine:
         #: The code and the text of the outcome, as far as they are decided.
         self._code: ErrorCode | None = None
         self._text = ''
+        self._touched = False
         self._has_moved = False
         self._is_decided = False
 
@@ -351,6 +352,7 @@ class GoalMachine:
                 self._text = f'{self._text}; {text}'  # the lost connection is the cause
             else:
                 self._code, self._text = transition.code, text
+                self._touched = signal is GoalSignal.CONTACT
         if self.state is before:
             return []
         # Leaving the motion's mode while the safe outputs are armed makes the program set them.
@@ -479,6 +481,7 @@ class GoalMachine:
                 *(line for each in self.can.reporting for line in each.report),
             ),
             stopped=monitor.place() if has_place else None,
+            touched=self._touched,
         )
         return [*self._progress(), Finish(outcome=outcome)]
 

@@ -286,7 +286,7 @@ def _press_windows(plan: Plan) -> Iterator[PressWindow]:
     times = [*reference.time[rows].tolist(), inf]
     for press in goal.presses:
         yield PressWindow(
-            begin=times[press.first_waypoint],
+            begin=0.0 if press.first_waypoint < 0 else times[press.first_waypoint],
             end=times[press.last_waypoint],
             release=times[press.last_waypoint + 1],
             compliant=vector6(float(axis in press.axes) for axis in PRESS_AXES),

@@ -379,6 +379,10 @@ class ProportionalOutput:
     idle: Annotated[float, FRACTION] = 0.0
 
 
+#: ``Press.first_waypoint`` of the driver's own presses that begin where the motion begins.
+START_OF_MOTION = -1
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Press:
     """The controller's force mode between two waypoints, at both of which the arm stops."""

@@ -55,6 +55,8 @@ class JointGoal:
     goal_tolerance: tuple[JointTolerance, ...] = ()
     #: How much later than planned the goal may end [s]: 0 = the default, negative = any time.
     goal_time_tolerance: float = 0.0
+    #: Whether the goal ends, with success, where the tool touches something on its way.
+    until_contact: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

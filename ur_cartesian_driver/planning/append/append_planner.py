@@ -48,7 +48,7 @@ from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.planner import plan as plan_goal
 from ur_cartesian_driver.planning.request.controlled_frame import retarget_to_tcp, tool_tips
 from ur_cartesian_driver.planning.request.ignored_fields import ignored_remarks
-from ur_cartesian_driver.planning.request.validate import check
+from ur_cartesian_driver.planning.request.joint_points import check_for_arm
 from ur_cartesian_driver.planning.spline.spline_planner import (
     end_state,
     plan_spline,
@@ -364,8 +364,9 @@ class _PartPlanner:
             replace_horizon=0.0,  # not allowed without keep_open; set again below
         )
         try:
-            table = check(goal, self._options)
-            table = retarget_to_tcp(table, self._at_rest(start.q), self._options).goal
+            state = self._at_rest(start.q)
+            table = check_for_arm(goal, state.T_flange_tcp, self._arm, self._options)
+            table = retarget_to_tcp(table, state, self._options).goal
         except GoalRefused as refusal:
             raise refusal.reworded(_renumber_text(str(refusal), before.points)) from None
         points = table.waypoints

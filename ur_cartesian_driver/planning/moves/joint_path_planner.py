@@ -63,6 +63,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     point_field,
     segment_field,
 )
+from ur_cartesian_driver.planning.request.joint_points import JointPositions
 from ur_cartesian_driver.planning.request.program_features import check_wait
 from ur_cartesian_driver.planning.request.validate import duplicate_point_error
 
@@ -278,7 +279,9 @@ class JointPathPlanner:
         q = self._start_joints(k)
         target, posture = drafts.target(k), self.goal.waypoints.postures.get(i)
         where = point_field(i, 'pose')
-        if posture:
+        if isinstance(posture, JointPositions):
+            chosen = posture.joints(self.options.tf_prefix)
+        elif posture:
             named = named_joints(posture, self.options.tf_prefix)
             chosen = self.kinematics.solve_posture(target, named, q, where)
         else:

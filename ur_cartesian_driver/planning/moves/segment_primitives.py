@@ -47,6 +47,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     segment_field,
     type_table,
 )
+from ur_cartesian_driver.planning.request.joint_points import JointPositions
 from ur_cartesian_driver.planning.request.program_features import (
     adapt_primitive,
     explain_poses_only,
@@ -125,7 +126,9 @@ class _SpecialPrimitives:
             move = self._moves[row]
             assert not isinstance(move, MoveC | Spline | Stop)
             primitive = move
-            if kind in JOINT_SPACE_TYPES or row in self._postures:
+            if kind in JOINT_SPACE_TYPES and isinstance(self._postures.get(row), JointPositions):
+                primitive = replace(move, target=joints, q_near=None)
+            elif kind in JOINT_SPACE_TYPES or row in self._postures:
                 primitive = replace(move, q_near=self._q_near(row, joints))
         primitive, reason = adapt_primitive(primitive, point, joints, self._options)
         if reason:

@@ -9,6 +9,7 @@ The dataclasses in :mod:`~ur_cartesian_driver.motion.goal.goal` declare what eac
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from enum import IntEnum
 from math import hypot, isfinite, sqrt
 from typing import Any
@@ -17,12 +18,17 @@ import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
-from ur_cartesian_driver.motion.geometry.pose import Pose, Quaternion
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose, Quaternion
 from ur_cartesian_driver.motion.goal.field_table import Form, goal_fields, GoalField
 from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.goal.goal_table import GoalRows, GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.goal_fields import is_spline, point_field, segment_field
+from ur_cartesian_driver.planning.request.goal_fields import (
+    gives_joints,
+    is_spline,
+    point_field,
+    segment_field,
+)
 
 #: Largest allowed difference between the length of a quaternion and 1.
 QUATERNION_TOLERANCE = 1e-3
@@ -31,7 +37,11 @@ QUATERNION_TOLERANCE = 1e-3
 def check_fields(goal: GoalTable, options: PlanningOptions) -> None:
     """Refuse values that a field never accepts, regardless of the other fields."""
     check_record('', goal, Goal)
-    _check_rows(goal.waypoints, point_field, nan_in_rates=is_spline(goal))
+    points, by_joints = goal.waypoints, gives_joints(goal)
+    if by_joints.any():  # their NaN is allowed
+        poses = np.where(by_joints[:, None], IDENTITY.row(), points.poses)
+        points = replace(points, poses=poses)
+    _check_rows(points, point_field, nan_in_rates=is_spline(goal))
     _check_rows(goal.segments, segment_field)
 
 

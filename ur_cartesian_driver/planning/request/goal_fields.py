@@ -71,6 +71,11 @@ def is_timed(goal: GoalTable) -> bool:
     return bool(goal.waypoints.times.any())
 
 
+def gives_joints(goal: GoalTable) -> Flags:
+    """Return whether each point (n,) gives joint positions in place of a pose."""
+    return np.asarray(np.isnan(goal.waypoints.poses).all(axis=1))
+
+
 def is_optimized(kind: SegmentType) -> bool:
     """Return whether the speeds of a segment type are fractions of the robot's limits."""
     return kind in OPTIMIZED_TYPES

@@ -50,6 +50,7 @@ from ur_cartesian_driver.planning.request.field_rules import (
 )
 from ur_cartesian_driver.planning.request.free_axis_rules import check_free_axes
 from ur_cartesian_driver.planning.request.goal_fields import (
+    gives_joints,
     is_optimized,
     is_rounded,
     is_spline,
@@ -224,6 +225,26 @@ def _postures(goal: GoalTable, options: PlanningOptions) -> None:
         check_posture(segment_field(i, 'via_posture'), posture, options.tf_prefix)
 
 
+def _joint_points(goal: GoalTable, options: PlanningOptions) -> None:
+    """Refuse points without a pose whose posture does not determine one."""
+    for i in rows_where(gives_joints(goal)):
+        posture = goal.waypoints.postures.get(i, Posture())
+        if len(posture.names) < len(JOINT_NAMES):
+            raise InvalidGoal(
+                point_field(i, 'pose'),
+                'is NaN in every number, so the joint positions of the posture apply, but the '
+                f'posture names {len(posture.names)} of the {len(JOINT_NAMES)} joints',
+                'name all joints, or give the pose',
+            )
+        check_posture(point_field(i, 'posture'), posture, options.tf_prefix)
+        if goal.segments and goal.segments.free_axes[i]:
+            raise InvalidGoal(
+                segment_field(i, 'free_axis'),
+                'is set, but the point gives joint positions, which leave no rotation free',
+                'give the pose, or set it to NONE',
+            )
+
+
 def _motions(goal: GoalTable, options: PlanningOptions) -> None:
     if is_spline(goal):
         return  # a spline can wait at a point
@@ -231,7 +252,8 @@ def _motions(goal: GoalTable, options: PlanningOptions) -> None:
     lengths = np.linalg.norm(np.diff(points.poses[:, :3], axis=0), axis=1)
     is_arc = segments.types[1:] == SegmentType.CIRCULAR
     is_near = np.isin(segments.types[1:], STRAIGHT_TYPES) & (lengths < 2.0 * SAME_POSITION)
-    for i in rows_where(np.append(False, is_arc | is_near)):
+    is_known = ~np.isnan(lengths)  # else checked again when the joint positions have a pose
+    for i in rows_where(np.append(False, (is_arc | is_near) & is_known)):
         start, end = points.pose(i - 1), points.pose(i)
         if is_arc[i - 1]:
             # The start's orientation does not change the shape of the arc.
@@ -248,6 +270,7 @@ def _motions(goal: GoalTable, options: PlanningOptions) -> None:
 RULES: tuple[Rule, ...] = (
     _number_of_points,
     check_fields,
+    _joint_points,
     check_frames,
     _keep_open,
     _measurable_tolerances,

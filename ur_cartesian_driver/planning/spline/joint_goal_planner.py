@@ -17,11 +17,12 @@ import numpy as np
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded
+from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded, NotAvailable
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
 from ur_cartesian_driver.motion.geometry.polynomials import evaluate, MotionRows
 from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, keep_hemisphere
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import ContactEnd, Press, START_OF_MOTION
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, WaypointRows, zeros
 from ur_cartesian_driver.motion.goal.joint_goal import JointGoal
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
@@ -41,6 +42,8 @@ from ur_cartesian_driver.planning.request.joint_goal_rules import (
     CheckedJointGoal,
 )
 from ur_cartesian_driver.planning.request.point_events.safe_outputs import add_safe_outputs
+from ur_cartesian_driver.planning.request.point_events.stops import Stops
+from ur_cartesian_driver.planning.request.program_features import check_program
 from ur_cartesian_driver.planning.request.validate import check_measurable_tolerances
 from ur_cartesian_driver.planning.spline.joint_polynomials import to_ticks
 from ur_cartesian_driver.planning.spline.spline_limits import (
@@ -122,6 +125,8 @@ def plan_joint_goal(
     checked = check_joint_goal(goal, options)
     state = at_set_point(state, arm)
     table = _cartesian_goal(checked, state, arm, options)
+    if goal.until_contact:
+        table = _until_contact(table, options)
     kinematics = TcpKinematics(arm, state.T_flange_tcp)
     check_reported_tcp(state, kinematics)
     check_approach(state, table.waypoints.pose(0), options)
@@ -143,15 +148,20 @@ def plan_joint_goal(
     durations = np.diff(trajectory.times)
     begin = trajectory.times[samples.piece]
     factor = trajectory.times[-1] / given.times[-1]
-    return Plan(
-        goal=stretch_times(table, factor),
-        segments=_segments(trajectory, samples, durations),
-        reference=ReferencePath(
+    table, segments, reference = Stops(table, options).insert(
+        stretch_times(table, factor),
+        _segments(trajectory, samples, durations),
+        ReferencePath(
             poses=poses,
             point=samples.points,
             time=begin + samples.u * durations[samples.piece],
             fraction=samples.u,
         ),
+    )
+    return Plan(
+        goal=table,
+        segments=segments,
+        reference=reference,
         start=state.actual_q,
         T_flange_active=state.T_flange_tcp,
         older_program=options.older_program,
@@ -180,6 +190,30 @@ def _cartesian_goal(
     table = apply_default_tolerances(table, options)
     check_measurable_tolerances(table, options)
     return add_safe_outputs(table, options)
+
+
+def _until_contact(table: GoalTable, options: PlanningOptions) -> GoalTable:
+    """
+    Return a goal that ends where the tool touches.
+
+    :raises NotAvailable: the robot program does not watch for contact along splines.
+    """
+    watch = Press(
+        first_waypoint=START_OF_MOTION,
+        last_waypoint=len(table.waypoints) - 1,
+        contact=ContactEnd.ENDS,
+    )
+    table = replace(table, presses=(watch,))
+    try:
+        check_program(table, options)
+    except NotAvailable:
+        raise NotAvailable(
+            'trajectory',
+            'is to end where the tool touches, but robot programs of wire dialect '
+            f'{options.dialect.name} do not watch for that along splines',
+            'let the driver send its own robot program',
+        ) from None
+    return table
 
 
 def _trajectory(

@@ -3,16 +3,19 @@
 """
 The actions of the node: each class converts the messages of one action for the runs of goals.
 
-:class:`JointAction` is served only if control_msgs, which is not on PyPI, is installed.
+:class:`JointAction` is served only if control_msgs is installed, and :class:`JointUntilAction`
+only if ur_msgs is, too; neither is on PyPI.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 import importlib
 from typing import Any, Protocol, TypeAlias
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
+from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.goal.joint_goal import JointGoal
@@ -143,13 +146,47 @@ class JointAction:
         return joint_result(self.action_type.Result, outcome)
 
 
+class JointUntilAction(JointAction):
+    """Follow a joint trajectory until the tool touches: ``~/follow_joint_trajectory_until``."""
+
+    name = '~/follow_joint_trajectory_until'
+
+    def goal(self, request: Message, context: GoalContext, received: int) -> JointGoal:
+        """
+        Return the goal of a message.
+
+        :raises InvalidGoal: the goal waits for something else than contact.
+        """
+        if request.until_type != request.TOOL_CONTACT:
+            raise InvalidGoal(
+                'until_type',
+                f'is {request.until_type}',
+                f'use TOOL_CONTACT ({request.TOOL_CONTACT})',
+            )
+        return replace(super().goal(request, context, received), until_contact=True)
+
+    def result(self, outcome: Outcome) -> Message:
+        """Return the result message of an outcome."""
+        message = super().result(outcome)
+        message.until_condition_result = (
+            message.TRIGGERED if outcome.touched else message.NOT_TRIGGERED
+        )
+        return message
+
+
 def installed_actions() -> list[GoalAction]:
     """Return the actions that the node can serve with the installed packages."""
     actions: list[GoalAction] = [CartesianAction()]
-    try:
-        control_msgs = importlib.import_module('control_msgs.action')
-    except ModuleNotFoundError as error:
-        if error.name not in ('control_msgs', 'control_msgs.action'):
-            raise  # it is installed, but broken
-        return actions
-    return [*actions, JointAction(control_msgs.FollowJointTrajectory)]
+    for package, name, kind in (
+        ('control_msgs', 'FollowJointTrajectory', JointAction),
+        ('ur_msgs', 'FollowJointTrajectoryUntil', JointUntilAction),
+    ):
+        try:
+            module = importlib.import_module(f'{package}.action')
+        except ModuleNotFoundError as error:
+            if error.name not in (package, f'{package}.action'):
+                raise  # it is installed, but broken
+            break  # ur_msgs needs control_msgs
+        if action_type := getattr(module, name, None):  # an older ur_msgs lacks it
+            actions.append(kind(action_type))
+    return actions

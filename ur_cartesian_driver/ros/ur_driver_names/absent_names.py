@@ -52,21 +52,10 @@ _ROWS = (
     ),
     (
         'action',
-        'motion_primitive_forward_controller/motion_sequence',
-        'control_msgs/action/ExecuteMotionPrimitiveSequence',
-        'see [motion primitives](motion_primitives.md) for the goal that does the same',
-    ),
-    (
-        'action',
         'tool_contact_controller/detect_tool_contact',
         'ur_msgs/action/ToolContact',
-        'contact is the end of a press here: `presses` of a goal',
-    ),
-    (
-        'action',
-        'trajectory_until_node/execute',
-        'ur_msgs/action/FollowJointTrajectoryUntil',
-        'contact is the end of a press here: `presses` of a goal',
+        'the robot program watches for contact only where a goal asks for it, which the contact '
+        'then ends: `trajectory_until_node/execute`, or `presses` of a goal',
     ),
 )
 

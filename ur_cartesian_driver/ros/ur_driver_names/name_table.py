@@ -15,6 +15,7 @@ from ur_cartesian_driver.ros.ur_driver_names.io_services import IO_SERVICES
 from ur_cartesian_driver.ros.ur_driver_names.mode_action import MODE_ACTION
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import UrName
 from ur_cartesian_driver.ros.ur_driver_names.program_services import PROGRAM_SERVICES
+from ur_cartesian_driver.ros.ur_driver_names.sequence_action import SEQUENCE_ACTION
 from ur_cartesian_driver.ros.ur_driver_names.state_topics import STATE_TOPICS
 from ur_cartesian_driver.ros.ur_driver_names.trajectory_actions import TRAJECTORY_ACTIONS
 
@@ -25,6 +26,7 @@ NAMES: tuple[UrName, ...] = (
     *PROGRAM_SERVICES,
     *IO_SERVICES,
     *TRAJECTORY_ACTIONS,
+    SEQUENCE_ACTION,
     MODE_ACTION,
     *ABSENT,
 )

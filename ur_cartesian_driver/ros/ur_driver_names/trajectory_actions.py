@@ -124,6 +124,8 @@ class ControllerAction(UrName):
     kind: str = 'action'
     type: str = 'control_msgs/action/FollowJointTrajectory'
 
+    #: The driver's action.
+    target: str = 'follow_joint_trajectory'
     #: Goals get the tolerances of ros2_control's controller. The pass-through controller has none
     #: of its own, and takes no goal while one runs.
     has_defaults: bool = True
@@ -132,14 +134,14 @@ class ControllerAction(UrName):
     @property
     def served_by(self) -> str:
         """The driver's joint action."""
-        return '`~/follow_joint_trajectory`'
+        return f'`~/{self.target}`'
 
     def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
         """Forward goals, feedback, results and cancels."""
-        return _Forwarder(self, driver, kind)
+        return _TrajectoryForwarder(self, driver, kind)
 
 
-class _Run:
+class ForwardedGoal:
     """A goal of a client, and the driver's goal that it became."""
 
     def __init__(self, handle: Any) -> None:
@@ -149,21 +151,31 @@ class _Run:
         self.seconds_lost = 0.0
 
 
-class _Forwarder:
-    """An action server whose goals the driver executes."""
+class GoalForwarder:
+    """
+    An action server whose goals an action of the driver executes.
 
-    def __init__(self, row: ControllerAction, driver: DriverNode, action: Any) -> None:
-        self._row, self._driver, self._action = row, driver, action
+    :param name: of the action that is served.
+    :param action: its class.
+    :param target: name of the driver's action, and its class.
+    """
+
+    #: A goal replaces the one that runs; if not, it is rejected meanwhile.
+    preempts = True
+
+    def __init__(
+        self, driver: DriverNode, name: str, action: Any, target: tuple[str, Any]
+    ) -> None:
+        self.driver, self.action = driver, action
+        self._name, self._target = name, driver.own_name(target[0])
         self._lock = threading.Lock()
-        self._runs: dict[bytes, _Run] = {}
+        self._runs: dict[bytes, ForwardedGoal] = {}
         node, group = driver.node, ReentrantCallbackGroup()
-        self._client = ActionClient(
-            node, action, driver.own_name('follow_joint_trajectory'), callback_group=group
-        )
+        self._client = ActionClient(node, target[1], self._target, callback_group=group)
         self._server = DeferredActionServer(  # type: ignore[no-untyped-call]  # rclpy's
             node,
             action,
-            row.name,
+            name,
             self._begin,
             callback_group=group,
             goal_callback=self._judge,
@@ -176,44 +188,73 @@ class _Forwarder:
             clock=Clock(clock_type=ClockType.STEADY_TIME),
         )
 
+    # -- how the two actions differ; by default they do not --------------------------------------
+
+    def rejection(self, goal: Message) -> str:
+        """Return why a goal is rejected; empty = it is not."""
+        return ''
+
+    def forward(self, run: ForwardedGoal) -> None:
+        """Pass a goal on by :meth:`send`, at once or later, or end it by :meth:`refuse`."""
+        self.send(run, run.handle.request)
+
+    def feedback(self, feedback: Message) -> Message:
+        """Return the feedback of the goal for that of the driver's goal."""
+        return feedback
+
+    def result(self, result: Message) -> Message:
+        """Return the result of the goal for that of the driver's goal."""
+        return result
+
+    def failure(self, text: str) -> Message:
+        """Return the result of a goal that the driver does not execute to its end."""
+        raise NotImplementedError
+
+    # -- the same for all ------------------------------------------------------------------------
+
+    def send(self, run: ForwardedGoal, goal: Message) -> None:
+        """Send the driver's goal for a goal."""
+        self._client.send_goal_async(
+            goal,
+            feedback_callback=lambda message: run.handle.publish_feedback(
+                self.feedback(message.feedback)
+            ),
+        ).add_done_callback(partial(self._accepted, run))
+
+    def refuse(self, run: ForwardedGoal, text: str) -> None:
+        """End a goal without the driver."""
+        self._end(run, GoalStatus.STATUS_ABORTED, self.failure(text))
+
     def close(self) -> None:
         """Stop serving; the driver goes on with its goals."""
         self._server.destroy()
         self._client.destroy()
 
     def _judge(self, goal: Message) -> GoalResponse:
-        reason = rejection(goal.trajectory, self._driver.node.get_clock().now().nanoseconds)
+        reason = self.rejection(goal)
         if not reason and not self._client.server_is_ready():
-            reason = (
-                f'the driver does not serve {self._driver.own_name("follow_joint_trajectory")}: '
-                'does it run, with control_msgs installed'
-            )
-        if not reason and not self._row.preempts and self._runs:
-            reason = 'a trajectory is being executed; cancel it first'
+            reason = f'the driver does not serve {self._target}: does it run'
+        if not reason and not self.preempts and self._runs:
+            reason = 'a goal is being executed; cancel it first'
         if not reason:
             return GoalResponse.ACCEPT
-        self._driver.warn(f'{self._row.name}: goal rejected: {reason}.')
+        self.driver.warn(f'{self._name}: goal rejected: {reason}.')
         return GoalResponse.REJECT
 
     def _begin(self, handle: Any) -> None:
-        run = _Run(handle)
+        run = ForwardedGoal(handle)
         with self._lock:
             self._runs[_key(handle)] = run
-        goal = _with_end(handle.request)
-        if self._row.has_defaults:
-            goal = with_default_tolerances(goal, class_of('control_msgs/msg/JointTolerance'))
-        self._client.send_goal_async(
-            goal, feedback_callback=lambda message: handle.publish_feedback(message.feedback)
-        ).add_done_callback(partial(self._accepted, run))
+        self.forward(run)
 
-    def _accepted(self, run: _Run, done: Any) -> None:
+    def _accepted(self, run: ForwardedGoal, done: Any) -> None:
         forwarded = done.result()
         if not forwarded.accepted:
-            self._end(run, GoalStatus.STATUS_ABORTED, _failed(self._action, 'The driver refused.'))
+            self.refuse(run, 'The driver refused.')
             return
         run.forwarded = forwarded
         forwarded.get_result_async().add_done_callback(
-            lambda done: self._end(run, done.result().status, done.result().result)
+            lambda done: self._end(run, done.result().status, self.result(done.result().result))
         )
         if run.handle.is_cancel_requested:
             forwarded.cancel_goal_async()
@@ -224,7 +265,7 @@ class _Forwarder:
             run.forwarded.cancel_goal_async()
         return CancelResponse.ACCEPT
 
-    def _end(self, run: _Run, status: int, result: Message) -> None:
+    def _end(self, run: ForwardedGoal, status: int, result: Message) -> None:
         """Give a goal the end of the driver's goal; only the first end counts."""
         with self._lock:
             if self._runs.pop(_key(run.handle), None) is None:
@@ -247,16 +288,37 @@ class _Forwarder:
         for run in list(self._runs.values()):
             run.seconds_lost = 0.0 if ready else run.seconds_lost + LOOK_PERIOD
             if run.seconds_lost >= LOST_TIMEOUT:
-                text = 'The driver is gone: whether the arm moves is not known.'
-                self._end(run, GoalStatus.STATUS_ABORTED, _failed(self._action, text))
+                self.refuse(run, 'The driver is gone: whether the arm moves is not known.')
 
 
 def _key(handle: Any) -> bytes:
     return bytes(handle.goal_id.uuid)
 
 
-def _failed(action: Any, text: str) -> Message:
-    return action.Result(error_code=action.Result.PATH_TOLERANCE_VIOLATED, error_string=text)
+class _TrajectoryForwarder(GoalForwarder):
+    """The action of one trajectory controller."""
+
+    def __init__(self, row: ControllerAction, driver: DriverNode, action: Any) -> None:
+        super().__init__(driver, row.name, action, (row.target, action))
+        self.preempts, self._has_defaults = row.preempts, row.has_defaults
+
+    def rejection(self, goal: Message) -> str:
+        if until := getattr(goal, 'until_type', 0):
+            return f'until_type is {until}, but only TOOL_CONTACT (0) is known'
+        return rejection(goal.trajectory, self.driver.node.get_clock().now().nanoseconds)
+
+    def forward(self, run: ForwardedGoal) -> None:
+        goal = _with_end(run.handle.request)
+        if self._has_defaults:
+            goal = with_default_tolerances(goal, class_of('control_msgs/msg/JointTolerance'))
+        self.send(run, goal)
+
+    def failure(self, text: str) -> Message:
+        kind = self.action.Result
+        result = kind(error_code=kind.PATH_TOLERANCE_VIOLATED, error_string=text)
+        if hasattr(result, 'until_condition_result'):
+            result.until_condition_result = kind.NOT_TRIGGERED  # 0 is TRIGGERED
+        return result
 
 
 TRAJECTORY_ACTIONS: tuple[UrName, ...] = (
@@ -268,6 +330,12 @@ TRAJECTORY_ACTIONS: tuple[UrName, ...] = (
     ControllerAction(
         name='passthrough_trajectory_controller/follow_joint_trajectory',
         has_defaults=False,
+        preempts=False,
+    ),
+    ControllerAction(
+        name='trajectory_until_node/execute',
+        type='ur_msgs/action/FollowJointTrajectoryUntil',
+        target='follow_joint_trajectory_until',
         preempts=False,
     ),
 )

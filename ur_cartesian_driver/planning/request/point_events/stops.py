@@ -90,12 +90,12 @@ class Stops:
         columns = {
             name: np.insert(getattr(segments, name), at, value, axis=0)
             for name, value in (
-                ('waypoints', waypoints),
+                ('waypoints', np.maximum(waypoints, segments.waypoints[0])),
                 ('lengths', 0.0),
                 ('angles', 0.0),
                 ('durations', durations),
                 ('blend_entries', 0.0),
-                ('joints', segments.joints[at - 1]),
+                ('joints', segments.joints[np.maximum(at - 1, 0)]),
             )
         }
         only_rests = self._only_rests(goal)

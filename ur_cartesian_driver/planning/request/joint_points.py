@@ -1,0 +1,70 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Points that give joint positions in place of a pose: every number of their pose is NaN.
+
+Only the planner knows the calibrated arm and the tool, so it computes these poses, and all later
+stages see an ordinary goal. A joint move to such a point is sent as joint positions: near a
+singularity, where robots stand at rest more often than not, no pose selects them reliably.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.errors import JointLimitExceeded
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
+from ur_cartesian_driver.motion.goal.goal import Goal, Posture
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.goal_fields import gives_joints, point_field
+from ur_cartesian_driver.planning.request.validate import check
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointPositions(Posture):
+    """The posture of all joints from which the pose of its point was computed."""
+
+    def joints(self, tf_prefix: str) -> Joints:
+        """Return the joint positions [rad]."""
+        by_name = dict(zip(self.names, self.values, strict=True))
+        return vector6(by_name[tf_prefix + name] for name in JOINT_NAMES)
+
+
+def check_for_arm(goal: Goal, T_flange_tcp: Pose, arm: Arm, options: PlanningOptions) -> GoalTable:
+    """
+    Return a goal as a table that passed :func:`~.validate.check`, with a pose at each point.
+
+    :param T_flange_tcp: the active TCP; a controlled frame of the goal takes its place.
+    :raises GoalRefused: the goal is wrong, or a joint position is out of its range.
+    """
+    table = check(goal, options)
+    by_joints = gives_joints(table)
+    if not by_joints.any():
+        return table
+    T_frame_base = table.T_base_frame.inverse()
+    T_flange_point = table.T_flange_controlled or T_flange_tcp
+    poses, postures = table.waypoints.poses.copy(), dict(table.waypoints.postures)
+    for i in rows_where(by_joints):
+        posture = JointPositions(names=postures[i].names, values=postures[i].values)
+        q = posture.joints(options.tf_prefix)
+        _check_ranges(i, q, arm)
+        poses[i] = (T_frame_base @ arm.forward(q) @ T_flange_point).row()
+        postures[i] = posture
+    waypoints = replace(table.waypoints, poses=poses, postures=postures)
+    return check(replace(table, waypoints=waypoints), options)
+
+
+def _check_ranges(index: int, q: Joints, arm: Arm) -> None:
+    """Refuse joint positions out of their ranges: whole turns are not taken off."""
+    limits = np.array(arm.model.position_limits)
+    for k in rows_where((q < limits[:, 0]) | (q > limits[:, 1]))[:1]:
+        raise JointLimitExceeded(
+            f'{point_field(index, "posture")} has {JOINT_NAMES[k]} at {q[k]:.4f} rad, outside its '
+            f'range of {arm.model.range_text(k)}; keep within it.'
+        )

@@ -1,0 +1,110 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The action of motion_primitives_controllers: each sequence becomes a goal of the driver's action.
+
+What the controller rejects is rejected here, too: a goal while one runs, and targets that do not
+suit their type. A rejection carries no reason, which therefore is logged.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from rcl_interfaces.srv import GetParameters
+
+from ur_cartesian_driver.action import FollowCartesianTrajectory
+from ur_cartesian_driver.goal_files.goal_schema import message_of, with_defaults
+from ur_cartesian_driver.goal_files.goal_writing import fields_of_goal
+from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
+from ur_cartesian_driver.ros.message_fields import Message
+from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode, DriverSilent
+from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
+from ur_cartesian_driver.ros.ur_driver_names.offered_name import UrName
+from ur_cartesian_driver.ros.ur_driver_names.primitive_sequence import (
+    check_targets,
+    goal_of_sequence,
+)
+from ur_cartesian_driver.ros.ur_driver_names.trajectory_actions import ForwardedGoal, GoalForwarder
+
+#: Codes of failures that a sequence has, too; all others become INVALID_GOAL.
+_SAME_CODES = (ErrorCode.OLD_HEADER_TIMESTAMP,)
+#: The index of the feedback is a byte.
+_MAX_INDEX = 255
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SequenceAction(UrName):
+    """``motion_primitive_forward_controller/motion_sequence``."""
+
+    kind: str = 'action'
+    name: str = 'motion_primitive_forward_controller/motion_sequence'
+    type: str = 'control_msgs/action/ExecuteMotionPrimitiveSequence'
+
+    @property
+    def served_by(self) -> str:
+        """The driver's own action."""
+        return '`~/follow_cartesian_trajectory`'
+
+    def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
+        """Forward goals, feedback, results and cancels."""
+        return _SequenceForwarder(driver, self.name, kind)
+
+
+class _SequenceForwarder(GoalForwarder):
+    preempts = False
+
+    def __init__(self, driver: DriverNode, name: str, action: Any) -> None:
+        target = 'follow_cartesian_trajectory', FollowCartesianTrajectory
+        super().__init__(driver, name, action, target)
+
+    def rejection(self, goal: Message) -> str:
+        """Return why the controller rejects a sequence; empty = it does not."""
+        try:
+            check_targets(goal.trajectory.motions)
+        except InvalidGoal as error:
+            return str(error).rstrip('.')
+        return ''
+
+    def forward(self, run: ForwardedGoal) -> None:
+        """Ask for the prefix of the joints, and then send the goal."""
+        request = GetParameters.Request(names=['tf_prefix'])
+        answer = self.driver.request(GetParameters, 'get_parameters', request)
+        answer.add_done_callback(partial(self._send, run))
+
+    def _send(self, run: ForwardedGoal, answer: Future[Message]) -> None:
+        try:
+            (prefix,) = answer.result().values
+            goal = goal_of_sequence(run.handle.request.trajectory.motions, prefix.string_value)
+        except (DriverSilent, InvalidGoal) as error:
+            self.refuse(run, str(error))
+        else:
+            fields = with_defaults(fields_of_goal(goal))
+            self.send(run, message_of(fields, FollowCartesianTrajectory.Goal))
+
+    def feedback(self, feedback: Message) -> Message:
+        """Return the number of the primitive that is being executed."""
+        index = min(feedback.point_index, _MAX_INDEX)
+        return self.action.Feedback(current_primitive_index=index)
+
+    def result(self, result: Message) -> Message:
+        """Return code and sentence, the latter with the name of the driver's code."""
+        code = ErrorCode(result.error_code)
+        if code is ErrorCode.SUCCESSFUL:
+            return self.action.Result(error_string=result.error_string)
+        return self.action.Result(
+            error_code=int(code if code in _SAME_CODES else ErrorCode.INVALID_GOAL),
+            error_string=f'{code.name}: {result.error_string}',
+        )
+
+    def failure(self, text: str) -> Message:
+        """Return an INVALID_GOAL."""
+        return self.action.Result(
+            error_code=self.action.Result.INVALID_GOAL, error_string=f'INVALID_GOAL: {text}'
+        )
+
+
+SEQUENCE_ACTION = SequenceAction()
