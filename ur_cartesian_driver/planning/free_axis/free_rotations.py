@@ -23,7 +23,6 @@ from ur_cartesian_driver.motion.geometry.pose import (
     IDENTITY,
     multiply,
     normalize,
-    pose_from_row,
     Quaternion,
     rotate,
 )
@@ -48,7 +47,7 @@ from ur_cartesian_driver.planning.free_axis.rotation_lattice import (
     RotationPath,
     RotationSamples,
 )
-from ur_cartesian_driver.planning.geometry.curves import ArcCurve
+from ur_cartesian_driver.planning.geometry.curves import arc_faults, ArcRows
 from ur_cartesian_driver.planning.geometry.samples import counted
 from ur_cartesian_driver.planning.options import MAX_CLEARANCE, PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import Clearance
@@ -234,25 +233,16 @@ class _FreePath:
 
     def _with_arc_ends(self, poses: Floats) -> Floats:
         """Return the poses, at ends of FIXED arcs as the arcs arrive there; keep the arcs."""
-        self.arcs: dict[int, ArcCurve] = {}
-        segments = self.goal.segments
-        for row in np.flatnonzero(segments.types == SegmentType.CIRCULAR).tolist():
-            before = pose_from_row(poses[row - 1]) if row else self.start
-            via = segments.via(row)
-            assert via is not None
-            mode = ArcMode(int(segments.arc_modes[row]))
-            try:
-                arc = ArcCurve.through(
-                    before,
-                    (self.goal.T_base_frame @ via).position,
-                    pose_from_row(poses[row]),
-                    mode,
-                )
-            except ValueError:  # the planner refuses the arc
-                continue
-            self.arcs[row] = arc
-            if mode is ArcMode.FIXED:
-                poses[row] = arc.end.row()
+        segments, starts = self.goal.segments, np.concatenate([[self.start.row()], poses[:-1]])
+        rows = np.flatnonzero(segments.types == SegmentType.CIRCULAR)
+        vias = transform_rows(self.goal.T_base_frame, segments.vias[rows])
+        is_fixed = segments.arc_modes[rows] == ArcMode.FIXED
+        fine = np.ones(len(rows), dtype=np.bool_)  # the planner refuses the other arcs
+        fine[[*arc_faults(starts[rows], vias, poses[rows], is_fixed)]] = False
+        self.arc_rows, vias = rows[fine], vias[fine]
+        starts_of, ends_of = starts[self.arc_rows], poses[self.arc_rows]
+        self.arcs = ArcRows.through(starts_of, vias, ends_of, is_fixed[fine])
+        self.arcs.turn_ends(self.arc_rows, starts, poses)
         return poses
 
     def _references(self) -> tuple[Floats, Floats]:
@@ -279,8 +269,7 @@ class _FreePath:
         """Return the lattice of the path, with a layer for each of the ``knots``."""
         before = np.concatenate([[self.start.row()], self.poses[:-1]])
         lengths = distance_rows(before, self.poses)
-        for arc_row, arc in self.arcs.items():
-            lengths[arc_row] = arc.length
+        lengths[self.arc_rows] = self.arcs.radius * self.arcs.sweep
         references = np.concatenate([[self.start.quaternion], self.references])
         tilts = angle_rows(references[:-1], references[1:])
         self.sizes = lengths / _LENGTH_PER_RADIAN + tilts
@@ -293,9 +282,9 @@ class _FreePath:
         ends = np.concatenate([self.poses[:, :3], self.references], axis=1)
         begins = np.concatenate([[self.start.row()], ends[:-1]])
         poses = interpolate_rows(begins[row], ends[row], u)
-        for arc_row, arc in self.arcs.items():
-            here = slice(*np.searchsorted(row, (arc_row, arc_row + 1)).tolist())
-            poses[here, :3] = arc.rows(u[here])[:, :3]
+        on_arc = np.isin(row, self.arc_rows)
+        number = np.searchsorted(self.arc_rows, row[on_arc])
+        poses[on_arc, :3] = self.arcs.take(number).places(u[on_arc])
         layer = np.searchsorted(self.knots, row)
         sizes = self.sizes[row] / counts[row]
         behind = np.cumsum(sizes)

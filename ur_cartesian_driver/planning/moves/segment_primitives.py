@@ -32,7 +32,6 @@ from ur_cartesian_driver.motion.plan.primitive import (
     Stop,
     Target,
 )
-from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
 from ur_cartesian_driver.planning.moves.segment_drafts import JOINT_SPACE_TYPES
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
@@ -184,11 +183,10 @@ class _SpecialPrimitives:
         :raises InvalidPosture: the arm follows the arc in another configuration.
         """
         geometries, samples = self._geometries, self._paths.samples
-        point, arc = geometries.begin + row, geometries.path.curves.others[row]
-        assert isinstance(arc, ArcCurve)
+        point, u_via = geometries.begin + row, geometries.path.curves.arcs.u_via[row]
         location = segment_field(point, 'via')
         first, last = np.searchsorted(samples.segment, (point, point + 1))
-        nearest = int(first + np.argmin(np.abs(samples.fraction[first:last] - arc.u_via)))
+        nearest = int(first + np.argmin(np.abs(samples.fraction[first:last] - u_via)))
         # The arm need not pass the via in the via's orientation, so the arc's joints are only the
         # seed from which the via's pose is solved.
         q = self._kinematics.nearest(via, vector6(samples.q[nearest].tolist()), location)

@@ -36,7 +36,12 @@ from ur_cartesian_driver.motion.goal.goal import (
     SegmentType,
 )
 from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable, rows_where
-from ur_cartesian_driver.planning.geometry.curves import ArcCurve, is_same_pose, SAME_POSITION
+from ur_cartesian_driver.planning.geometry.curves import (
+    arc_faults,
+    ArcCurve,
+    is_same_pose,
+    SAME_POSITION,
+)
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.blend_limits import check_blends
 from ur_cartesian_driver.planning.request.default_tolerances import (
@@ -230,8 +235,12 @@ def _motions(goal: GoalTable, options: PlanningOptions) -> None:
     points, segments = goal.waypoints, goal.motions
     lengths = np.linalg.norm(np.diff(points.poses[:, :3], axis=0), axis=1)
     is_arc = segments.types[1:] == SegmentType.CIRCULAR
-    is_near = np.isin(segments.types[1:], STRAIGHT_TYPES) & (lengths < 2.0 * SAME_POSITION)
-    for i in rows_where(np.append(False, is_arc | is_near)):
+    suspect = np.isin(segments.types[1:], STRAIGHT_TYPES) & (lengths < 2.0 * SAME_POSITION)
+    arcs = np.flatnonzero(is_arc)
+    is_fixed = segments.arc_modes[arcs + 1] == ArcMode.FIXED
+    starts, ends = points.poses[arcs], points.poses[arcs + 1]
+    suspect[arcs[[*arc_faults(starts, segments.vias[arcs + 1], ends, is_fixed)]]] = True
+    for i in rows_where(np.append(False, suspect)):
         start, end = points.pose(i - 1), points.pose(i)
         if is_arc[i - 1]:
             # The start's orientation does not change the shape of the arc.
