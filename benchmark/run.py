@@ -35,6 +35,7 @@ MODULES = (
     'replaced_tails',
     RTDE_RATE,
     'planning',
+    'sliced',
     'free_axis',
     'import_files',
     'motion_page',

@@ -37,7 +37,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     transform_rows,
 )
 from ur_cartesian_driver.motion.geometry.vectors import cross, dot, Vector3, vector6
-from ur_cartesian_driver.motion.goal.goal import ArcMode, FreeAxis, Posture, SegmentType
+from ur_cartesian_driver.motion.goal.goal import FreeAxis, Posture, SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, SegmentRows
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.free_axis.rotation_lattice import (
@@ -47,7 +47,7 @@ from ur_cartesian_driver.planning.free_axis.rotation_lattice import (
     RotationPath,
     RotationSamples,
 )
-from ur_cartesian_driver.planning.geometry.curves import arc_faults, ArcRows
+from ur_cartesian_driver.planning.geometry.curves import goal_arcs
 from ur_cartesian_driver.planning.geometry.samples import counted
 from ur_cartesian_driver.planning.options import MAX_CLEARANCE, PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import Clearance
@@ -221,7 +221,10 @@ class _FreePath:
         self.is_open = free & (self.is_any | (self.high > self.low))
         poses = transform_rows(goal.T_base_frame, goal.waypoints.poses)
         self.start = state.actual_tcp_pose @ T_tcp_controlled
-        self.poses = self._with_arc_ends(poses)
+        starts = np.concatenate([[self.start.row()], poses[:-1]])
+        # At ends of FIXED arcs, the poses become those in which the arcs arrive.
+        self.arc_rows, self.arcs, _ = goal_arcs(goal.segments, goal.T_base_frame, starts, poses)
+        self.poses = poses
         self.references, self.rotations = self._references()
         if is_timed(goal) and goal.waypoints.times[0] == 0.0 and free[0]:
             # The arm is already at this point: keep its orientation if that is allowed.
@@ -230,20 +233,6 @@ class _FreePath:
             self.low, self.high = self.low.copy(), self.high.copy()
             self.low[0] = self.high[0] = turn[0] if may else 0.0
             self.is_any[0] = self.is_open[0] = False
-
-    def _with_arc_ends(self, poses: Floats) -> Floats:
-        """Return the poses, at ends of FIXED arcs as the arcs arrive there; keep the arcs."""
-        segments, starts = self.goal.segments, np.concatenate([[self.start.row()], poses[:-1]])
-        rows = np.flatnonzero(segments.types == SegmentType.CIRCULAR)
-        vias = transform_rows(self.goal.T_base_frame, segments.vias[rows])
-        is_fixed = segments.arc_modes[rows] == ArcMode.FIXED
-        fine = np.ones(len(rows), dtype=np.bool_)  # the planner refuses the other arcs
-        fine[[*arc_faults(starts[rows], vias, poses[rows], is_fixed)]] = False
-        self.arc_rows, vias = rows[fine], vias[fine]
-        starts_of, ends_of = starts[self.arc_rows], poses[self.arc_rows]
-        self.arcs = ArcRows.through(starts_of, vias, ends_of, is_fixed[fine])
-        self.arcs.turn_ends(self.arc_rows, starts, poses)
-        return poses
 
     def _references(self) -> tuple[Floats, Floats]:
         """

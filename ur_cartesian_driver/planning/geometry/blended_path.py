@@ -29,6 +29,7 @@ from ur_cartesian_driver.planning.geometry.blend_shapes import (
     fillet_rows,
 )
 from ur_cartesian_driver.planning.geometry.curves import (
+    ARC_CHORD_ERROR,
     ArcCurve,
     ArcRows,
     JointLineCurve,
@@ -140,21 +141,21 @@ class CurveRows:
     def samples(self) -> Indices:
         """(n,) the number of chords that follow each curve closely enough."""
         samples = np.maximum(1, np.ceil(self.angle / MAX_TURN_PER_SAMPLE)).astype(np.intp)
-        arcs = np.flatnonzero(self.is_arc)
-        samples[arcs] = np.maximum(samples[arcs], np.ceil(self.arcs.take(arcs).chords))
+        at = np.flatnonzero(self.is_arc)
+        arcs = self.arcs.take(at)
+        chords = np.ceil(arcs.sweep / np.sqrt(8.0 * ARC_CHORD_ERROR / arcs.radius))
+        samples[at] = np.maximum(samples[at], chords)
         for row in rows_where(self.is_joint_line):
             samples[row] = self.joint_line(row).samples
         return samples
 
     def rows(self, row: Indices, u: Floats) -> Floats:
         """Return poses (n, 7) on many curves; ``row`` must not decrease."""
+        rows = interpolate_rows(self.start[row], self.end[row], u)
         if self.is_line[row].all():
-            return interpolate_rows(self.start[row], self.end[row], u)
-        rows, is_arc = np.empty((len(u), 7)), self.is_arc[row]
-        at, of = np.flatnonzero(~is_arc), row[~is_arc]
-        rows[at] = interpolate_rows(self.start[of], self.end[of], u[at])
-        at, of = np.flatnonzero(is_arc), row[is_arc]
-        rows[at] = self.arcs.take(of).rows(self.start[of], self.end[of], u[at])
+            return rows
+        at = np.flatnonzero(self.is_arc[row])
+        rows[at] = self.arcs.take(row[at]).rows(self.start[row[at]], rows[at], u[at])
         for k in np.unique(row[self.is_joint_line[row]]).tolist():
             first, last = np.searchsorted(row, (k, k + 1))
             rows[first:last] = self.others[k].rows(u[first:last])

@@ -27,10 +27,11 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     interpolate_rows,
     multiply_rows,
     normalized_rows,
+    transform_rows,
 )
 from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector3, vector6
-from ur_cartesian_driver.motion.goal.goal import ArcMode
-from ur_cartesian_driver.motion.goal.goal_table import rows_where
+from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
+from ur_cartesian_driver.motion.goal.goal_table import rows_where, SegmentRows
 
 #: If a line turns the tool by half a turn, to within this angle [rad], rounding on the wire and
 #: the arm's actual pose decide the direction of the turn.
@@ -88,7 +89,7 @@ class ArcRows(NamedTuple):
         """
         Return the arcs through three positions each (n, 3 or more) [m].
 
-        Rows with :func:`arc_faults` contain any numbers.
+        Rows with faults (:func:`arc_faults`) contain any numbers.
         """
         ab, ac = via[:, :3] - start[:, :3], end[:, :3] - start[:, :3]
         normal = cross_rows(ab, ac)
@@ -132,9 +133,12 @@ class ArcRows(NamedTuple):
         places: Floats = self.center + np.cos(angle) * self.spoke + np.sin(angle) * self.across
         return places
 
-    def rows(self, start: Floats, end: Floats, u: Floats) -> Floats:
-        """Return the poses (n, 7) at ``u`` (n,) of arcs between two poses (n, 7)."""
-        rows = interpolate_rows(start, end, u)
+    def rows(self, start: Floats, rows: Floats, u: Floats) -> Floats:
+        """
+        Return the poses (n, 7) at ``u`` (n,) of arcs that begin at ``start`` (n, 7).
+
+        :param rows: (n, 7) the poses on the lines between the same ends; changed in place.
+        """
         rows[:, :3] = self.places(u)
         fixed = np.flatnonzero(self.is_fixed)
         if len(fixed):
@@ -146,11 +150,6 @@ class ArcRows(NamedTuple):
         """Return the ``u`` (n,) at a distance (n,) [m] from the starts."""
         half = np.arcsin(np.minimum(1.0, 0.5 * radius / self.radius))
         return np.minimum(1.0, 2.0 * half / self.sweep)
-
-    @property
-    def chords(self) -> Floats:
-        """(n,) numbers of chords, not rounded, that follow the arcs closely enough."""
-        return self.sweep / np.sqrt(8.0 * ARC_CHORD_ERROR / self.radius)
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,7 +197,8 @@ class ArcCurve:
     def rows(self, u: Floats) -> Floats:
         """Return the poses (n, 7) at many ``u`` (n,)."""
         start, end = (np.tile(pose.row(), (len(u), 1)) for pose in (self.start, self.end))
-        return self.columns.take(np.zeros(len(u), dtype=np.intp)).rows(start, end, u)
+        arcs = self.columns.take(np.zeros(len(u), dtype=np.intp))
+        return arcs.rows(start, interpolate_rows(start, end, u), u)
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,11 +242,6 @@ class JointLineCurve:
             samples,
             unevenness,
         )
-
-    @property
-    def angle(self) -> float:
-        """Shortest turn of the tool from the start to the end [rad]."""
-        return self.start.angle_to(self.end)
 
     @property
     def travel(self) -> Joints:
@@ -299,6 +294,28 @@ def tcp_rows(arm: Arm, T_flange_tcp: Pose, q: Floats) -> Floats:
 def is_same_pose(a: Pose, b: Pose) -> bool:
     """Return whether two poses are the same within the resolution of the wire."""
     return a.distance_to(b) <= SAME_POSITION and a.angle_to(b) <= SAME_ANGLE
+
+
+def goal_arcs(
+    segments: SegmentRows, T_base_frame: Pose, start: Floats, end: Floats
+) -> tuple[Indices, ArcRows, dict[int, str]]:
+    """
+    Return the rows of CIRCULAR segments that make arcs, their arcs, and the faults of the others.
+
+    :param start: (n, 7) the pose in base at which each segment begins; ``end``: the target. Where
+        arcs are FIXED, ends and the starts after them are turned as the arcs arrive, in place.
+    """
+    rows = np.flatnonzero(segments.types == SegmentType.CIRCULAR)
+    vias = transform_rows(T_base_frame, segments.vias[rows])
+    is_fixed = segments.arc_modes[rows] == ArcMode.FIXED
+    faults = arc_faults(start[rows], vias, end[rows], is_fixed)
+    fine = np.ones(len(rows), dtype=np.bool_)
+    fine[[*faults]] = False
+    named = {int(rows[k]): fault for k, fault in faults.items()}
+    rows = rows[fine]
+    arcs = ArcRows.through(start[rows], vias[fine], end[rows], is_fixed[fine])
+    arcs.turn_ends(rows, start, end)
+    return rows, arcs, named
 
 
 def arc_faults(start: Floats, via: Floats, end: Floats, is_fixed: Flags) -> dict[int, str]:

@@ -16,14 +16,13 @@ import numpy as np
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.geometry.pose_rows import distance_rows, transform_rows
+from ur_cartesian_driver.motion.geometry.pose_rows import distance_rows
 from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, CurveRows
 from ur_cartesian_driver.planning.geometry.curves import (
-    arc_faults,
     ArcCurve,
-    ArcRows,
+    goal_arcs,
     HALF_TURN,
     is_same_pose,
     SAME_POSITION,
@@ -140,18 +139,14 @@ class SegmentDrafts:
     def _curves(self, start: Pose, remarks: list[tuple[int, str]]) -> CurveRows:
         """Return the curves of lines and arcs; the rows of joint moves have no meaning."""
         starts, ends = np.concatenate([[start.row()], self.targets[:-1]]), self.targets.copy()
-        rows = np.flatnonzero(self.kinds == SegmentType.CIRCULAR)
-        vias = transform_rows(self._goal.T_base_frame, self.segments.vias[rows])
-        is_fixed = self.segments.arc_modes[rows] == ArcMode.FIXED
-        arcs = ArcRows.through(starts[rows], vias, ends[rows], is_fixed)
-        arcs.turn_ends(rows, starts, ends)
+        rows, arcs, faults = goal_arcs(self.segments, self._goal.T_base_frame, starts, ends)
         curves = CurveRows(starts, ends, {})
         suspect = ~self.is_joint_move & (curves.angle > pi - 2.0 * HALF_TURN)
-        suspect[rows[[*arc_faults(starts[rows], vias, ends[rows], is_fixed)]]] = True
+        suspect[[*faults]] = True
         for row in rows_where(suspect):
             check = self._arc if self.kinds[row] == SegmentType.CIRCULAR else self._check_turn
             check(row, pose_from_row(starts[row]))
-        for row in rows[is_fixed].tolist():
+        for row in rows[arcs.is_fixed].tolist():
             remarks += [(row, text) for text in self._turn_remarks(row, pose_from_row(ends[row]))]
         curves.put_arcs(rows, arcs)
         return curves

@@ -37,8 +37,8 @@ from ur_cartesian_driver.motion.goal.goal import (
 )
 from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable, rows_where
 from ur_cartesian_driver.planning.geometry.curves import (
-    arc_faults,
     ArcCurve,
+    goal_arcs,
     is_same_pose,
     SAME_POSITION,
 )
@@ -236,10 +236,8 @@ def _motions(goal: GoalTable, options: PlanningOptions) -> None:
     lengths = np.linalg.norm(np.diff(points.poses[:, :3], axis=0), axis=1)
     is_arc = segments.types[1:] == SegmentType.CIRCULAR
     suspect = np.isin(segments.types[1:], STRAIGHT_TYPES) & (lengths < 2.0 * SAME_POSITION)
-    arcs = np.flatnonzero(is_arc)
-    is_fixed = segments.arc_modes[arcs + 1] == ArcMode.FIXED
-    starts, ends = points.poses[arcs], points.poses[arcs + 1]
-    suspect[arcs[[*arc_faults(starts, segments.vias[arcs + 1], ends, is_fixed)]]] = True
+    starts, ends = points.poses[:-1].copy(), points.poses[1:].copy()
+    suspect[[*goal_arcs(segments[1:], IDENTITY, starts, ends)[2]]] = True
     for i in rows_where(np.append(False, suspect)):
         start, end = points.pose(i - 1), points.pose(i)
         if is_arc[i - 1]:
