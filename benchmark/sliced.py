@@ -27,10 +27,10 @@ from ur_cartesian_driver.motion.goal.goal_table import (
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.simulator_config import HOME
 
-#: Speed [m/s], and the blend radius [m] as far as it fits; smaller radii than the least are 0.
+#: Speed [m/s], and the blend radius [m] as far as it fits; radii below the minimum are 0.
 SPEED = 0.04
 RADIUS = 0.0005
-LEAST_RADIUS = 0.0001
+MIN_RADIUS = 0.0001
 #: Part of a move that each of its two blends may take.
 PART = 0.4
 #: The walk turns back at this distance from its middle [m].
@@ -139,6 +139,6 @@ def goals_of(places: Floats, vias: Floats) -> tuple[GoalTable, GoalTable]:
         waypoints=WaypointRows.of_columns(n, {'poses': poses}),
         segments=SegmentRows.of_columns(n, columns),
     )
-    columns['blend_radii'] = np.where(radii >= LEAST_RADIUS, radii, 0.0)
+    columns['blend_radii'] = np.where(radii >= MIN_RADIUS, radii, 0.0)
     blends = replace(stops, segments=SegmentRows.of_columns(n, columns))
     return goal_table(stops), goal_table(blends)
