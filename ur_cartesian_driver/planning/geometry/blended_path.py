@@ -34,8 +34,10 @@ from ur_cartesian_driver.planning.geometry.curves import (
     ArcRows,
     JointLineCurve,
     MAX_TURN_PER_SAMPLE,
+    NO_ARCS,
     SegmentCurve,
     tcp_rows,
+    unset_arcs,
 )
 
 # Rows per block, so that the intermediate arrays stay in the CPU cache.
@@ -89,7 +91,7 @@ class CurveRows:
         self.is_line = np.ones(len(start), dtype=np.bool_)
         self.is_joint_line = ~self.is_line
         #: The arcs; other rows are meaningless. Empty if there are no arcs.
-        self.arcs = _unset_arcs(0)
+        self.arcs = NO_ARCS
         self.others: dict[int, SegmentCurve] = {}
         for row, curve in others.items():
             self.put(row, curve)
@@ -121,7 +123,7 @@ class CurveRows:
     def put_arcs(self, row: Indices, arcs: ArcRows) -> None:
         """Replace lines of some rows by arcs between the same poses."""
         if len(row) and not len(self.arcs.sweep):
-            self.arcs = _unset_arcs(len(self))
+            self.arcs = unset_arcs(len(self))
         for column, values in zip(self.arcs, arcs, strict=True):
             column[row] = values
         self.length[row], self.is_line[row] = arcs.radius * arcs.sweep, False
@@ -182,11 +184,6 @@ class CurveRows:
         for k in rows_where(self.is_joint_line[row]):
             u[k] = self.joint_line(int(row[k])).trim(float(radius[k]), at_end=at_end)
         return u
-
-
-def _unset_arcs(n: int) -> ArcRows:
-    places = np.zeros((n, 3))
-    return ArcRows.through(places, places, places, np.zeros(n, dtype=np.bool_))
 
 
 class BlendedPath:

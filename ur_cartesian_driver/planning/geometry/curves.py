@@ -152,6 +152,15 @@ class ArcRows(NamedTuple):
         return np.minimum(1.0, 2.0 * half / self.sweep)
 
 
+def unset_arcs(n: int) -> ArcRows:
+    """Return n rows that are still to be filled."""
+    places = np.zeros((n, 3))
+    return ArcRows.through(places, places, places, np.zeros(n, dtype=np.bool_))
+
+
+NO_ARCS = unset_arcs(0)
+
+
 @dataclass(frozen=True, slots=True)
 class ArcCurve:
     """The tool on a circular arc."""
@@ -160,6 +169,9 @@ class ArcCurve:
     end: Pose
     #: The arc as a single row.
     columns: ArcRows
+    #: Radius [m]; angle of the arc [rad], in (0, 2 pi).
+    radius: float
+    sweep: float
 
     @classmethod
     def through(cls, start: Pose, via: Vector3, end: Pose, mode: ArcMode) -> ArcCurve:
@@ -177,17 +189,7 @@ class ArcCurve:
             raise ValueError(fault)
         arc = ArcRows.through(a, b, c, is_fixed)
         arc.turn_ends(np.zeros(1, dtype=np.intp), a, c)
-        return cls(start, pose_from_row(c[0]), arc)
-
-    @property
-    def radius(self) -> float:
-        """Radius [m]."""
-        return float(self.columns.radius[0])
-
-    @property
-    def sweep(self) -> float:
-        """Angle of the arc [rad], in (0, 2 pi)."""
-        return float(self.columns.sweep[0])
+        return cls(start, pose_from_row(c[0]), arc, float(arc.radius[0]), float(arc.sweep[0]))
 
     @property
     def length(self) -> float:
@@ -306,16 +308,17 @@ def goal_arcs(
         arcs are FIXED, ends and the starts after them are turned as the arcs arrive, in place.
     """
     rows = np.flatnonzero(segments.types == SegmentType.CIRCULAR)
+    if not len(rows):
+        return rows, NO_ARCS, {}
     vias = transform_rows(T_base_frame, segments.vias[rows])
     is_fixed = segments.arc_modes[rows] == ArcMode.FIXED
-    faults = arc_faults(start[rows], vias, end[rows], is_fixed)
-    fine = np.ones(len(rows), dtype=np.bool_)
-    fine[[*faults]] = False
-    named = {int(rows[k]): fault for k, fault in faults.items()}
+    found = arc_faults(start[rows], vias, end[rows], is_fixed)
+    faults = {int(rows[k]): fault for k, fault in found.items()}
+    fine = ~np.isin(rows, [*faults])
     rows = rows[fine]
     arcs = ArcRows.through(start[rows], vias[fine], end[rows], is_fixed[fine])
     arcs.turn_ends(rows, start, end)
-    return rows, arcs, named
+    return rows, arcs, faults
 
 
 def arc_faults(start: Floats, via: Floats, end: Floats, is_fixed: Flags) -> dict[int, str]:

@@ -143,13 +143,11 @@ class _SpecialPrimitives:
         wanted = posture and full_posture(named_joints(posture, self._options.tf_prefix))
         if wanted:
             where = point_field(self._geometries.begin + row, 'pose')
-            found = self._kinematics.nearest(self._target(row), wanted, where)
+            target = pose_from_row(self._moves.targets[row])
+            found = self._kinematics.nearest(target, wanted, where)
             if max_joint_change(found, joints) <= SAME_SOLUTION:
                 return wanted
         return joints
-
-    def _target(self, row: int) -> Pose:
-        return pose_from_row(self._moves.targets[row].tolist())
 
     def _arc(self, row: int, arc: MoveC, joints: Joints) -> MoveC:
         """Return the arc move; a target or via that has a posture becomes joint positions."""
