@@ -65,6 +65,8 @@ def _encoding(points: int) -> Figure:
             targets=pose_rows(paths.meander(points)),
             q_near=np.zeros((points, 6)),
             has_q_near=np.zeros(points, dtype=np.bool_),
+            vias=np.zeros((points, 7)),
+            arc_modes=np.zeros(points, dtype=np.int64),
             velocities=np.full(points, 0.1),
             accelerations=np.ones(points),
             durations=np.zeros(points),

@@ -36,6 +36,7 @@ MODULES = (
     RTDE_RATE,
     'planning',
     'rounded_corners',
+    'sliced',
     'free_axis',
     'import_files',
     'motion_page',

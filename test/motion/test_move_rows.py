@@ -9,7 +9,7 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.goal.goal import OutputKind
+from ur_cartesian_driver.motion.goal.goal import ArcMode, OutputKind
 from ur_cartesian_driver.motion.plan.move_rows import (
     blend_radii,
     has_optimized,
@@ -46,6 +46,8 @@ def rows(n=12, seed=0, **columns):
             'targets': np.concatenate([rng.normal(size=(n, 3)), quaternions], axis=1),
             'q_near': rng.uniform(-6.0, 6.0, (n, 6)),
             'has_q_near': rng.random(n) < 0.5,
+            'vias': np.concatenate([rng.normal(size=(n, 3)), quaternions[::-1]], axis=1),
+            'arc_modes': rng.integers(0, len(ArcMode), n),
             'velocities': rng.uniform(0.01, 1.0, n),
             'accelerations': rng.uniform(0.01, 1.0, n),
             'durations': np.where(kinds <= MOVES.index(MoveL), rng.uniform(0.0, 9.0, n), 0.0),

@@ -347,8 +347,11 @@ def compare(old, new):
     names = ('rows', 'start', 'duration', 'T_flange_active', 'T_flange_tcp', 'T_tcp_controlled')
     for name in (*names, 'execution', 'goal'):
         a, b = getattr(old, name), getattr(new, name)
-        if name == 'rows':  # their lines are compared above
-            a, b = (replace(rows, report_lines=(), notes={}) for rows in (a, b))
+        if name == 'rows':  # their lines are compared above; primitives may be columns or objects
+            a, b = (
+                replace(rows, report_lines=(), notes={}, primitives=tuple(rows.primitives))
+                for rows in (a, b)
+            )
         if found := difference(a, b, name):
             return found
     return ''

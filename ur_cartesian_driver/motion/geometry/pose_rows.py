@@ -103,12 +103,18 @@ def interpolate_rows(a: Floats, b: Floats, fraction: Floats) -> Floats:
 
     Positions are on the straight line, orientations on the shortest rotation.
     """
-    f = fraction[:, None]
-    rows = a + f * (b - a)
-    if (a[:, 3:] == b[:, 3:]).all():
-        rows[:, 3:] = a[:, 3:]
-        return rows
-    dot = np.einsum('ij,ij->i', a[:, 3:], b[:, 3:])
+    rows: Floats = a + fraction[:, None] * (b - a)
+    rows[:, 3:] = a[:, 3:]
+    a, b = (np.broadcast_to(pose[:, 3:], (len(rows), 4)) for pose in (a, b))
+    turns = np.flatnonzero((a != b).any(axis=1))
+    if len(turns):
+        rows[turns, 3:] = _turned_rows(a[turns], b[turns], fraction[turns])
+    return rows
+
+
+def _turned_rows(a: Floats, b: Floats, fraction: Floats) -> Floats:
+    """Return orientations (n, 4) at fractions (n,) of the shortest rotations from a to b."""
+    dot = np.einsum('ij,ij->i', a, b)
     angle = np.arccos(np.minimum(1.0, np.abs(dot)))
     sine = np.sin(angle)
     turns = angle >= _SMALL_ANGLE
@@ -117,8 +123,7 @@ def interpolate_rows(a: Floats, b: Floats, fraction: Floats) -> Floats:
     sign = np.where(dot < 0.0, -1.0, 1.0)
     wa = np.where(turns, np.sin((1.0 - fraction) * angle) / safe, 1.0 - fraction)
     wb = np.where(turns, np.sin(fraction * angle) / safe, fraction) * sign
-    rows[:, 3:] = normalized_rows(wa[:, None] * a[:, 3:] + wb[:, None] * b[:, 3:])
-    return rows
+    return normalized_rows(wa[:, None] * a + wb[:, None] * b)
 
 
 def normalized_rows(quaternions: Floats) -> Floats:

@@ -3,7 +3,7 @@
 """
 The primitives of a plan in columns: a row for each motion.
 
-Nearly all motions of a long goal go to a pose, or are pieces of a spline. The others (arcs, joint
+Nearly all motions of a long goal go to a pose, or are pieces of a spline. The others (to joint
 targets) are kept as objects, by row, in addition to the columns. The rows are still a sequence of
 primitives; those in columns are created on access.
 """
@@ -12,14 +12,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int64s
 from ur_cartesian_driver.motion.geometry.pose import pose_from_row
 from ur_cartesian_driver.motion.geometry.vectors import vector6
+from ur_cartesian_driver.motion.goal.goal import ArcMode
 from ur_cartesian_driver.motion.goal.goal_table import Rows
 from ur_cartesian_driver.motion.plan.primitive import (
+    MoveC,
     MoveJ,
     MoveL,
     MoveP,
@@ -31,7 +34,9 @@ from ur_cartesian_driver.motion.plan.primitive import (
 )
 
 #: The classes that are stored in columns; a kind is an index into this tuple.
-MOVES = (MoveJ, MoveL, MoveP, OptimoveJ, OptimoveL)
+MOVES = (MoveJ, MoveL, MoveP, OptimoveJ, OptimoveL, MoveC)
+#: The kind of arcs.
+ARC = MOVES.index(MoveC)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
@@ -46,6 +51,9 @@ class MoveRows(Rows[Primitive]):
     q_near: Floats
     #: (n,) whether the row has a ``q_near``
     has_q_near: Flags
+    #: (n, 7) the poses on the arcs, and (n,) their modes; other rows are meaningless
+    vias: Floats
+    arc_modes: Int64s
     #: (n,) each; only MoveJ and MoveL have durations
     velocities: Floats
     accelerations: Floats
@@ -61,28 +69,27 @@ class MoveRows(Rows[Primitive]):
 
     def __iter__(self) -> Iterator[Primitive]:
         numbers = self._numbers(
-            'kinds',
-            'targets',
-            'q_near',
-            'has_q_near',
-            'velocities',
-            'accelerations',
-            'durations',
-            'blend_radii',
+            *('kinds', 'targets', 'velocities', 'accelerations', 'durations', 'blend_radii'),
+            *('q_near', 'has_q_near', 'vias', 'arc_modes'),
         )
         for i, row in enumerate(numbers):
             if i in self.others:
                 yield self.others[i]
                 continue
-            kind, target, q_near, has_q_near, velocity, acceleration, duration, radius = row
+            kind, target, velocity, acceleration, duration, radius, *rest = row
+            q_near, has_q_near, via, mode = rest
             move = MOVES[kind]
+            own: dict[str, Any] = {'q_near': vector6(q_near) if has_q_near else None}
+            if move is MoveC:
+                own = {'via': pose_from_row(via), 'mode': ArcMode(mode)}
+            elif move in (MoveJ, MoveL):
+                own['duration'] = duration
             yield move(
                 target=pose_from_row(target),
-                q_near=vector6(q_near) if has_q_near else None,
                 velocity=velocity,
                 acceleration=acceleration,
                 blend_radius=radius,
-                **({'duration': duration} if move in (MoveJ, MoveL) else {}),
+                **own,
             )
 
 

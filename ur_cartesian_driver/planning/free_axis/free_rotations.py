@@ -23,7 +23,6 @@ from ur_cartesian_driver.motion.geometry.pose import (
     IDENTITY,
     multiply,
     normalize,
-    pose_from_row,
     Quaternion,
     rotate,
 )
@@ -38,7 +37,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     transform_rows,
 )
 from ur_cartesian_driver.motion.geometry.vectors import cross, dot, Vector3, vector6
-from ur_cartesian_driver.motion.goal.goal import ArcMode, FreeAxis, Posture, SegmentType
+from ur_cartesian_driver.motion.goal.goal import FreeAxis, Posture, SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, SegmentRows
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.free_axis.rotation_lattice import (
@@ -48,7 +47,7 @@ from ur_cartesian_driver.planning.free_axis.rotation_lattice import (
     RotationPath,
     RotationSamples,
 )
-from ur_cartesian_driver.planning.geometry.curves import ArcCurve
+from ur_cartesian_driver.planning.geometry.curves import goal_arcs
 from ur_cartesian_driver.planning.geometry.samples import counted
 from ur_cartesian_driver.planning.options import MAX_CLEARANCE, PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import Clearance
@@ -222,7 +221,10 @@ class _FreePath:
         self.is_open = free & (self.is_any | (self.high > self.low))
         poses = transform_rows(goal.T_base_frame, goal.waypoints.poses)
         self.start = state.actual_tcp_pose @ T_tcp_controlled
-        self.poses = self._with_arc_ends(poses)
+        starts = np.concatenate([[self.start.row()], poses[:-1]])
+        # At ends of FIXED arcs, the poses become those in which the arcs arrive.
+        self.arc_rows, self.arcs, _ = goal_arcs(goal.segments, goal.T_base_frame, starts, poses)
+        self.poses = poses
         self.references, self.rotations = self._references()
         if is_timed(goal) and goal.waypoints.times[0] == 0.0 and free[0]:
             # The arm is already at this point: keep its orientation if that is allowed.
@@ -231,29 +233,6 @@ class _FreePath:
             self.low, self.high = self.low.copy(), self.high.copy()
             self.low[0] = self.high[0] = turn[0] if may else 0.0
             self.is_any[0] = self.is_open[0] = False
-
-    def _with_arc_ends(self, poses: Floats) -> Floats:
-        """Return the poses, at ends of FIXED arcs as the arcs arrive there; keep the arcs."""
-        self.arcs: dict[int, ArcCurve] = {}
-        segments = self.goal.segments
-        for row in np.flatnonzero(segments.types == SegmentType.CIRCULAR).tolist():
-            before = pose_from_row(poses[row - 1]) if row else self.start
-            via = segments.via(row)
-            assert via is not None
-            mode = ArcMode(int(segments.arc_modes[row]))
-            try:
-                arc = ArcCurve.through(
-                    before,
-                    (self.goal.T_base_frame @ via).position,
-                    pose_from_row(poses[row]),
-                    mode,
-                )
-            except ValueError:  # the planner refuses the arc
-                continue
-            self.arcs[row] = arc
-            if mode is ArcMode.FIXED:
-                poses[row] = arc.end.row()
-        return poses
 
     def _references(self) -> tuple[Floats, Floats]:
         """
@@ -279,8 +258,7 @@ class _FreePath:
         """Return the lattice of the path, with a layer for each of the ``knots``."""
         before = np.concatenate([[self.start.row()], self.poses[:-1]])
         lengths = distance_rows(before, self.poses)
-        for arc_row, arc in self.arcs.items():
-            lengths[arc_row] = arc.length
+        lengths[self.arc_rows] = self.arcs.radius * self.arcs.sweep
         references = np.concatenate([[self.start.quaternion], self.references])
         tilts = angle_rows(references[:-1], references[1:])
         self.sizes = lengths / _LENGTH_PER_RADIAN + tilts
@@ -293,9 +271,9 @@ class _FreePath:
         ends = np.concatenate([self.poses[:, :3], self.references], axis=1)
         begins = np.concatenate([[self.start.row()], ends[:-1]])
         poses = interpolate_rows(begins[row], ends[row], u)
-        for arc_row, arc in self.arcs.items():
-            here = slice(*np.searchsorted(row, (arc_row, arc_row + 1)).tolist())
-            poses[here, :3] = arc.rows(u[here])[:, :3]
+        on_arc = np.isin(row, self.arc_rows)
+        number = np.searchsorted(self.arc_rows, row[on_arc])
+        poses[on_arc, :3] = self.arcs.take(number).places(u[on_arc])
         layer = np.searchsorted(self.knots, row)
         sizes = self.sizes[row] / counts[row]
         behind = np.cumsum(sizes)

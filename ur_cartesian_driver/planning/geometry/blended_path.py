@@ -3,8 +3,8 @@
 """
 The path of a goal in columns: the curve of each segment, and the blends between them.
 
-Goals have up to 100,000 segments, and nearly all of them are lines. So lines and blends are stored
-as rows, the other curves (arcs, joint lines) as objects.
+Goals have up to 100,000 segments, and nearly all of them are lines and arcs. So these, and the
+blends, are stored as rows; joint lines are objects.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     distance_rows,
     interpolate_rows,
 )
+from ur_cartesian_driver.motion.goal.goal_table import rows_where
 from ur_cartesian_driver.planning.geometry.blend_shapes import (
     BlendShapes,
     crossfade,
@@ -28,12 +29,15 @@ from ur_cartesian_driver.planning.geometry.blend_shapes import (
     fillet_rows,
 )
 from ur_cartesian_driver.planning.geometry.curves import (
-    arc_rows,
+    ARC_CHORD_ERROR,
     ArcCurve,
+    ArcRows,
     JointLineCurve,
     MAX_TURN_PER_SAMPLE,
+    NO_ARCS,
     SegmentCurve,
     tcp_rows,
+    unset_arcs,
 )
 
 # Rows per block, so that the intermediate arrays stay in the CPU cache.
@@ -72,7 +76,7 @@ class CurveRows:
     The curves of consecutive segments, a row for each.
 
     :param start: (n, 7) the pose where each curve begins; ``end``: (n, 7) where it ends.
-    :param others: the curves that are not lines, by row.
+    :param others: curves that are not lines, by row.
     """
 
     def __init__(self, start: Floats, end: Floats, others: Mapping[int, SegmentCurve]) -> None:
@@ -86,12 +90,19 @@ class CurveRows:
         self.joint_travel = np.zeros(len(start))
         self.is_line = np.ones(len(start), dtype=np.bool_)
         self.is_joint_line = ~self.is_line
+        #: The arcs; other rows are meaningless. Empty if there are no arcs.
+        self.arcs = NO_ARCS
         self.others: dict[int, SegmentCurve] = {}
         for row, curve in others.items():
             self.put(row, curve)
 
     def __len__(self) -> int:
         return len(self.length)
+
+    @property
+    def is_arc(self) -> Flags:
+        """(n,) whether each curve is an arc."""
+        return ~(self.is_line | self.is_joint_line)
 
     def joint_line(self, row: int) -> JointLineCurve:
         """Return the curve of a joint move."""
@@ -101,15 +112,26 @@ class CurveRows:
 
     def put(self, row: int, curve: SegmentCurve) -> None:
         """Replace the curve of a row by one that is not a line."""
-        self.start[row], self.end[row] = curve.start.row(), curve.end.row()
-        self.length[row], self.angle[row] = curve.length, curve.angle
-        self.joint_travel[row] = curve.joint_travel
-        self.is_line[row], self.is_joint_line[row] = False, isinstance(curve, JointLineCurve)
+        self.put_line(row, curve.start, curve.end)
         self.others[row] = curve
+        if isinstance(curve, ArcCurve):
+            self.put_arcs(np.array([row]), curve.columns)
+            return
+        self.length[row], self.joint_travel[row] = curve.length, curve.joint_travel
+        self.is_line[row], self.is_joint_line[row] = False, True
 
-    def put_line(self, row: int, start: Pose) -> None:
-        """Replace a curve by the line from a pose to the end of the curve."""
-        self.start[row] = start.row()
+    def put_arcs(self, row: Indices, arcs: ArcRows) -> None:
+        """Replace lines of some rows by arcs between the same poses."""
+        if len(row) and not len(self.arcs.sweep):
+            self.arcs = unset_arcs(len(self))
+        for column, values in zip(self.arcs, arcs, strict=True):
+            column[row] = values
+        self.length[row], self.is_line[row] = arcs.radius * arcs.sweep, False
+        self.angle[row] = np.where(arcs.is_fixed, arcs.sweep, self.angle[row])
+
+    def put_line(self, row: int, start: Pose, end: Pose | None = None) -> None:
+        """Replace a curve by the line from a pose to another one, or to the end of the curve."""
+        self.start[row], self.end[row] = start.row(), self.end[row] if end is None else end.row()
         one = slice(row, row + 1)
         self.length[one] = distance_rows(self.start[one], self.end[one])
         self.angle[one] = angle_rows(self.start[one, 3:], self.end[one, 3:])
@@ -121,37 +143,46 @@ class CurveRows:
     def samples(self) -> Indices:
         """(n,) the number of chords that follow each curve closely enough."""
         samples = np.maximum(1, np.ceil(self.angle / MAX_TURN_PER_SAMPLE)).astype(np.intp)
-        for row, curve in self.others.items():
-            samples[row] = curve.samples
+        at = np.flatnonzero(self.is_arc)
+        arcs = self.arcs.take(at)
+        chords = np.ceil(arcs.sweep / np.sqrt(8.0 * ARC_CHORD_ERROR / arcs.radius))
+        samples[at] = np.maximum(samples[at], chords)
+        for row in rows_where(self.is_joint_line):
+            samples[row] = self.joint_line(row).samples
         return samples
 
     def rows(self, row: Indices, u: Floats) -> Floats:
         """Return poses (n, 7) on many curves; ``row`` must not decrease."""
-        on_line = self.is_line[row]
-        if on_line.all():
-            return interpolate_rows(self.start[row], self.end[row], u)
-        rows = np.empty((len(u), 7))
-        lines = row[on_line]
-        rows[on_line] = interpolate_rows(self.start[lines], self.end[lines], u[on_line])
-        numbers, number = np.unique(row[~on_line], return_inverse=True)
-        curves = [self.others[k] for k in numbers.tolist()]
-        arcs = [curve for curve in curves if isinstance(curve, ArcCurve)]
-        if len(arcs) == len(curves):
-            rows[~on_line] = arc_rows(arcs, number, u[~on_line])
+        rows = interpolate_rows(self.start[row], self.end[row], u)
+        if self.is_line[row].all():
             return rows
-        for k, curve in zip(numbers.tolist(), curves, strict=True):
+        at = np.flatnonzero(self.is_arc[row])
+        rows[at] = self.arcs.take(row[at]).rows(self.start[row[at]], rows[at], u[at])
+        for k in np.unique(row[self.is_joint_line[row]]).tolist():
             first, last = np.searchsorted(row, (k, k + 1))
-            rows[first:last] = curve.rows(u[first:last])
+            rows[first:last] = self.others[k].rows(u[first:last])
         return rows
+
+    def places(self, row: Indices, u: Floats) -> Floats:
+        """Return positions (n, m, 3) [m] at many ``u`` (n, m) on each of some curves (n,)."""
+        start, end = self.start[row, None, :3], self.end[row, None, :3]
+        places: Floats = start + u[..., None] * (end - start)
+        on_arc = np.flatnonzero(self.is_arc[row])
+        places[on_arc] = self.arcs.take((row[on_arc], None)).places(u[on_arc])
+        for k in rows_where(self.is_joint_line[row]):
+            places[k] = self.joint_line(int(row[k])).rows(u[k])[:, :3]
+        return places
 
     def trim(self, row: Indices, radius: Floats, *, at_end: bool = False) -> Floats:
         """Return the ``u`` (n,) at a distance [m] from the starts, or the ends, of curves."""
         length = self.length[row]
         u: Floats = np.minimum(1.0, radius / np.maximum(length, 1e-300)) * (length > 0.0)
+        on_arc = np.flatnonzero(self.is_arc[row])
+        u[on_arc] = self.arcs.take(row[on_arc]).trim(radius[on_arc])
         if at_end:
             u = 1.0 - u
-        for k in np.flatnonzero(~self.is_line[row]).tolist():
-            u[k] = self.others[int(row[k])].trim(float(radius[k]), at_end=at_end)
+        for k in rows_where(self.is_joint_line[row]):
+            u[k] = self.joint_line(int(row[k])).trim(float(radius[k]), at_end=at_end)
         return u
 
 
@@ -223,10 +254,18 @@ class BlendedPath:
         self.blend_samples[row] = shapes.samples()
         self.arc_radius[row] = shapes.arc_radii()
         self.blend_tolerance[row] = shapes.tolerances()
-        for k in row[~(curves.is_line[row] & curves.is_line[after])].tolist():
-            s = np.linspace(0.0, 1.0, _CHORDS + 1)
-            positions = self.blend_rows(np.full(len(s), k), s)[:, :3]
-            self.blend_length[k] = np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()
+        curved = row[~(curves.is_line[row] & curves.is_line[after])]
+        s = np.linspace(0.0, 1.0, _CHORDS + 1)
+        for k in range(0, len(curved), _BLOCK // _CHORDS):
+            row = curved[k : k + _BLOCK // _CHORDS]
+            after = row + 1
+            a, b = crossfade(self.u_leave[row, None], self.u_join[after, None], s)
+            places = curves.places(row, a) + curves.places(after, b)
+            places -= curves.start[after, None, :3]
+            for j in rows_where(curves.is_joint_line[row] & curves.is_joint_line[after]):
+                places[j] = self.blend_rows(np.full(len(s), row[j]), s)[:, :3]
+            chords = np.linalg.norm(np.diff(places, axis=1), axis=2)
+            self.blend_length[row] = chords.sum(axis=1)
 
     def extents(self, number: Indices) -> tuple[Floats, Floats]:
         """Return lengths (n,) [m] and turns (n,) [rad] of curves, as :meth:`extent` does."""

@@ -11,21 +11,15 @@ adds the blends between them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import asin, atan2, ceil, degrees, hypot, pi, sqrt
-from typing import ClassVar, TypeAlias
+from math import ceil, degrees, hypot, pi, sqrt
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
-from ur_cartesian_driver.motion.geometry.pose import (
-    distance,
-    multiply,
-    Pose,
-    quaternion_from_rotation_vector,
-)
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
+from ur_cartesian_driver.motion.geometry.pose import multiply, Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.pose_rows import (
     compose_rows,
     cross_rows,
@@ -33,17 +27,11 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     interpolate_rows,
     multiply_rows,
     normalized_rows,
+    transform_rows,
 )
-from ur_cartesian_driver.motion.geometry.vectors import (
-    cross,
-    dot,
-    Joints,
-    scale,
-    subtract,
-    Vector3,
-    vector6,
-)
-from ur_cartesian_driver.motion.goal.goal import ArcMode
+from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector3, vector6
+from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
+from ur_cartesian_driver.motion.goal.goal_table import rows_where, SegmentRows
 
 #: If a line turns the tool by half a turn, to within this angle [rad], rounding on the wire and
 #: the arm's actual pose decide the direction of the turn.
@@ -71,26 +59,119 @@ MAX_TURN_PER_SAMPLE = pi / 18.0
 _TRIM_DIVISIONS = (32,) * 6
 
 
+class ArcRows(NamedTuple):
+    """
+    Circular arcs, one per row.
+
+    Positions turn about the axis through the center. The orientation changes from the start's to
+    the end's by the shortest rotation (UNCONSTRAINED) or turns along with the tangent (FIXED),
+    like the modes of URScript's ``movec``.
+    """
+
+    #: (n, 3) [m]
+    center: Floats
+    #: (n, 3) from the center to the start, and to the place a quarter turn later [m]
+    spoke: Floats
+    across: Floats
+    #: (n, 3) unit vectors
+    axis: Floats
+    #: (n,) [m]
+    radius: Floats
+    #: (n,) angles of the arcs, in (0, 2 pi)
+    sweep: Floats
+    #: (n,) the ``u`` of the vias, in (0, 1)
+    u_via: Floats
+    #: (n,) whether the tool turns along with the tangent
+    is_fixed: Flags
+
+    @classmethod
+    def through(cls, start: Floats, via: Floats, end: Floats, is_fixed: Flags) -> ArcRows:
+        """
+        Return the arcs through three positions each (n, 3 or more) [m].
+
+        Rows with faults (:func:`arc_faults`) contain any numbers.
+        """
+        ab, ac = via[:, :3] - start[:, :3], end[:, :3] - start[:, :3]
+        normal = cross_rows(ab, ac)
+        # Circumcenter seen from a: ((|ab|^2 ac - |ac|^2 ab) x (ab x ac)) / (2 |ab x ac|^2).
+        with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
+            area, ab2, ac2 = (np.sum(each**2, axis=1)[:, None] for each in (normal, ab, ac))
+            offset = cross_rows(ab2 * ac - ac2 * ab, normal) * 0.5 / area
+            axis, spoke = normal / np.sqrt(area), -offset
+            across = cross_rows(axis, spoke)
+            to_via, sweep = (
+                np.arctan2(np.sum(across * v, axis=1), np.sum(spoke * v, axis=1)) % (2.0 * pi)
+                for v in (ab + spoke, ac + spoke)
+            )
+            radius, center = np.sqrt(np.sum(offset**2, axis=1)), start[:, :3] + offset
+            return cls(center, spoke, across, axis, radius, sweep, to_via / sweep, is_fixed)
+
+    def take(self, row: Any) -> ArcRows:
+        """Return the rows of an index."""
+        return ArcRows(*[column[row] for column in self])
+
+    def turn(self, u: Floats) -> Floats:
+        """Return the rotations (n, 4) about the axes from the starts of the arcs to ``u`` (n,)."""
+        half = (0.5 * u * self.sweep)[:, None]
+        return np.concatenate([np.sin(half) * self.axis, np.cos(half)], axis=1)
+
+    def turn_ends(self, row: Indices, start: Floats, end: Floats) -> None:
+        """
+        Turn the ends of FIXED arcs as the arcs arrive, and the starts of the curves after them.
+
+        :param row: (n,) the rows of the arcs in ``start`` and ``end``, poses (m, 7).
+        """
+        turns = self.turn(np.ones(len(row)))
+        for k in rows_where(self.is_fixed):  # in order, because each arc turns the next start
+            i = int(row[k])
+            end[i, 3:] = multiply(tuple(turns[k].tolist()), tuple(start[i, 3:].tolist()))
+            start[i + 1 : i + 2] = end[i]
+
+    def places(self, u: Floats) -> Floats:
+        """Return the positions (..., 3) [m] at ``u``, which has the shape of ``sweep``."""
+        angle = (u * self.sweep)[..., None]
+        places: Floats = self.center + np.cos(angle) * self.spoke + np.sin(angle) * self.across
+        return places
+
+    def rows(self, start: Floats, rows: Floats, u: Floats) -> Floats:
+        """
+        Return the poses (n, 7) at ``u`` (n,) of arcs that begin at ``start`` (n, 7).
+
+        :param rows: (n, 7) the poses on the lines between the same ends; changed in place.
+        """
+        rows[:, :3] = self.places(u)
+        fixed = np.flatnonzero(self.is_fixed)
+        if len(fixed):
+            turned = multiply_rows(self.take(fixed).turn(u[fixed]), start[fixed, 3:])
+            rows[fixed, 3:] = normalized_rows(turned)
+        return rows
+
+    def trim(self, radius: Floats) -> Floats:
+        """Return the ``u`` (n,) at a distance (n,) [m] from the starts."""
+        half = np.arcsin(np.minimum(1.0, 0.5 * radius / self.radius))
+        return np.minimum(1.0, 2.0 * half / self.sweep)
+
+
+def unset_arcs(n: int) -> ArcRows:
+    """Return n rows that are still to be filled."""
+    places = np.zeros((n, 3))
+    return ArcRows.through(places, places, places, np.zeros(n, dtype=np.bool_))
+
+
+NO_ARCS = unset_arcs(0)
+
+
 @dataclass(frozen=True, slots=True)
 class ArcCurve:
-    """
-    The tool on a circular arc.
-
-    The position turns about ``axis`` through ``center`` by ``sweep`` in (0, 2 pi). The orientation
-    changes from the start's to the end's by the shortest rotation (UNCONSTRAINED) or turns along
-    with the tangent (FIXED), like the modes of URScript's ``movec``.
-    """
+    """The tool on a circular arc."""
 
     start: Pose
     end: Pose
-    center: Vector3
-    axis: Vector3
+    #: The arc as a single row.
+    columns: ArcRows
+    #: Radius [m]; angle of the arc [rad], in (0, 2 pi).
     radius: float
     sweep: float
-    mode: ArcMode
-    #: The ``u`` of the via, in (0, 1).
-    u_via: float
-    joint_travel: ClassVar[float] = 0.0
 
     @classmethod
     def through(cls, start: Pose, via: Vector3, end: Pose, mode: ArcMode) -> ArcCurve:
@@ -102,65 +183,24 @@ class ArcCurve:
         :raises ValueError: the three positions make no circle, or, in mode FIXED, a circle that
             rounding on the wire changes too much; the text is a clause that gives the reason.
         """
-        center, axis, radius = _circle(start.position, via, end.position)
-        if mode is ArcMode.FIXED:
-            _check_turn_error(start.position, via, end.position)
-        e1 = scale(subtract(start.position, center), 1.0 / radius)
-        e2 = cross(axis, e1)
-        sweep = _angle_on(e1, e2, subtract(end.position, center))
-        if mode is ArcMode.FIXED:
-            turn = quaternion_from_rotation_vector(scale(axis, sweep))
-            end = Pose(end.position, multiply(turn, start.quaternion))
-        u_via = _angle_on(e1, e2, subtract(via, center)) / sweep
-        return cls(start, end, center, axis, radius, sweep, mode, u_via)
+        a, b, c = (np.array([place]) for place in (start.row(), via, end.row()))
+        is_fixed = np.array([mode is ArcMode.FIXED])
+        for fault in arc_faults(a, b, c, is_fixed).values():
+            raise ValueError(fault)
+        arc = ArcRows.through(a, b, c, is_fixed)
+        arc.turn_ends(np.zeros(1, dtype=np.intp), a, c)
+        return cls(start, pose_from_row(c[0]), arc, float(arc.radius[0]), float(arc.sweep[0]))
 
     @property
     def length(self) -> float:
         """Length of the arc [m]."""
         return self.radius * self.sweep
 
-    @property
-    def angle(self) -> float:
-        """Turn of the tool along the arc [rad]; may exceed pi if the tool follows the tangent."""
-        return self.sweep if self.mode is ArcMode.FIXED else self.start.angle_to(self.end)
-
-    @property
-    def samples(self) -> int:
-        """Number of chords that follow the arc closely enough."""
-        step = sqrt(8.0 * ARC_CHORD_ERROR / self.radius)
-        return max(1, ceil(self.sweep / step), ceil(self.angle / MAX_TURN_PER_SAMPLE))
-
     def rows(self, u: Floats) -> Floats:
         """Return the poses (n, 7) at many ``u`` (n,)."""
-        return arc_rows([self], np.zeros(len(u), dtype=np.intp), u)
-
-    def trim(self, radius: float, *, at_end: bool) -> float:
-        """Return the ``u`` at a distance ``radius`` [m] from the start of the arc, or its end."""
-        u = min(1.0, 2.0 * asin(min(1.0, 0.5 * radius / self.radius)) / self.sweep)
-        return 1.0 - u if at_end else u
-
-
-def arc_rows(arcs: Sequence[ArcCurve], number: Indices, u: Floats) -> Floats:
-    """
-    Return poses (n, 7) on many arcs.
-
-    :param number: (n,) the arc of each pose.
-    :param u: (n,) its place on the arc.
-    """
-    starts = np.array([arc.start.row() for arc in arcs])
-    centers, axes = (np.array([getattr(arc, name) for arc in arcs]) for name in ('center', 'axis'))
-    spokes = starts[:, :3] - centers  # at a right angle to the axes
-    ends = np.array([arc.end.row() for arc in arcs])
-    rows = interpolate_rows(starts[number], ends[number], u)
-    angle = (u * np.array([arc.sweep for arc in arcs])[number])[:, None]
-    across = cross_rows(axes, spokes)
-    rows[:, :3] = centers[number] + np.cos(angle) * spokes[number] + np.sin(angle) * across[number]
-    fixed = np.array([arc.mode is ArcMode.FIXED for arc in arcs])[number]
-    if fixed.any():
-        half, arc = 0.5 * angle[fixed], number[fixed]
-        turn = np.concatenate([np.sin(half) * axes[arc], np.cos(half)], axis=1)
-        rows[fixed, 3:] = normalized_rows(multiply_rows(turn, starts[arc, 3:]))
-    return rows
+        start, end = (np.tile(pose.row(), (len(u), 1)) for pose in (self.start, self.end))
+        arcs = self.columns.take(np.zeros(len(u), dtype=np.intp))
+        return arcs.rows(start, interpolate_rows(start, end, u), u)
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,11 +244,6 @@ class JointLineCurve:
             samples,
             unevenness,
         )
-
-    @property
-    def angle(self) -> float:
-        """Shortest turn of the tool from the start to the end [rad]."""
-        return self.start.angle_to(self.end)
 
     @property
     def travel(self) -> Joints:
@@ -263,50 +298,61 @@ def is_same_pose(a: Pose, b: Pose) -> bool:
     return a.distance_to(b) <= SAME_POSITION and a.angle_to(b) <= SAME_ANGLE
 
 
-def _circle(a: Vector3, b: Vector3, c: Vector3) -> tuple[Vector3, Vector3, float]:
-    """Return center, axis (unit) and radius of the circle through a, b and c in this order."""
-    ab, ac = subtract(b, a), subtract(c, a)
-    chord = hypot(*ac)
-    for name, distance_apart in (
-        ('the start and the end', chord),
-        ('the start and the via', hypot(*ab)),
-        ('the via and the end', distance(b, c)),
-    ):
-        if distance_apart < MIN_ARC_HEIGHT:
-            raise ValueError(f'{name} of the arc coincide ({1e3 * distance_apart:.3f} mm apart)')
-    if max(chord, hypot(*ab)) > MAX_ARC_SIZE:
-        raise ValueError(f'the points of the arc are more than {MAX_ARC_SIZE:g} m apart')
-    normal = cross(ab, ac)
-    area = hypot(*normal)
-    if area / max(chord, hypot(*ab), distance(b, c)) < MIN_ARC_HEIGHT:
-        raise ValueError('the start, the via and the end of the arc lie on one straight line')
-    # Circumcenter seen from a: ((|ab|^2 ac - |ac|^2 ab) x (ab x ac)) / (2 |ab x ac|^2).
-    ab2, ac2 = hypot(*ab) ** 2, chord**2
-    mixed = subtract(scale(ac, ab2), scale(ab, ac2))
-    offset = scale(cross(mixed, normal), 0.5 / area**2)
-    center = (a[0] + offset[0], a[1] + offset[1], a[2] + offset[2])
-    return center, scale(normal, 1.0 / area), hypot(*offset)
-
-
-def _check_turn_error(a: Vector3, b: Vector3, c: Vector3) -> None:
+def goal_arcs(
+    segments: SegmentRows, T_base_frame: Pose, start: Floats, end: Floats
+) -> tuple[Indices, ArcRows, dict[int, str]]:
     """
-    Refuse an arc at whose end the rounding of its points turns the tool too far.
+    Return the rows of CIRCULAR segments that make arcs, their arcs, and the faults of the others.
 
-    Rounding tilts the circle by rounding / height of the triangle. At the end of the arc this tilt
-    turns the tool by 2 sin(sweep / 2) times as much. The law of sines expresses this error by the
-    distances between start, via and end.
+    :param start: (n, 7) the pose in base at which each segment begins; ``end``: the target. Where
+        arcs are FIXED, ends and the starts after them are turned as the arcs arrive, in place.
     """
-    from_start, to_end = distance(a, b), distance(b, c)
-    error = 2.0 * _ROUNDING * max(from_start, to_end, distance(a, c)) / (from_start * to_end)
-    if error > MAX_ARC_TURN_ERROR:
-        raise ValueError(
-            f'its via is {1e3 * from_start:.3f} mm and {1e3 * to_end:.3f} mm from its ends, so '
-            f'that micrometres on the wire may turn the tool by {degrees(error):.1f} degrees at '
-            f'its end, more than {degrees(MAX_ARC_TURN_ERROR):.1f}'
-        )
+    rows = np.flatnonzero(segments.types == SegmentType.CIRCULAR)
+    if not len(rows):
+        return rows, NO_ARCS, {}
+    vias = transform_rows(T_base_frame, segments.vias[rows])
+    is_fixed = segments.arc_modes[rows] == ArcMode.FIXED
+    found = arc_faults(start[rows], vias, end[rows], is_fixed)
+    faults = {int(rows[k]): fault for k, fault in found.items()}
+    fine = ~np.isin(rows, [*faults])
+    rows = rows[fine]
+    arcs = ArcRows.through(start[rows], vias[fine], end[rows], is_fixed[fine])
+    arcs.turn_ends(rows, start, end)
+    return rows, arcs, faults
 
 
-def _angle_on(e1: Vector3, e2: Vector3, v: Vector3) -> float:
-    """Return the angle of a vector from e1 towards e2, in (0, 2 pi]."""
-    angle = atan2(dot(e2, v), dot(e1, v))
-    return angle if angle > 0.0 else angle + 2.0 * pi
+def arc_faults(start: Floats, via: Floats, end: Floats, is_fixed: Flags) -> dict[int, str]:
+    """
+    Return why positions (n, 3 or more) [m] make no arc, by row: clauses.
+
+    The rounding of three points on the wire tilts their circle by rounding / height of the
+    triangle. At the end of a FIXED arc this tilt turns the tool by 2 sin(sweep / 2) times as much.
+    The law of sines expresses this error by the distances between start, via and end.
+    """
+    pairs = (('start', 'end'), ('start', 'via'), ('via', 'end'))
+    with np.errstate(over='ignore', divide='ignore', invalid='ignore'):
+        places = {'start': start, 'via': via, 'end': end}
+        chord, from_start, to_end = sides = [distance_rows(places[a], places[b]) for a, b in pairs]
+        longest, size = np.maximum.reduce(sides), np.maximum(chord, from_start)
+        normal = cross_rows(via[:, :3] - start[:, :3], end[:, :3] - start[:, :3])
+        height = np.linalg.norm(normal, axis=1) / longest
+        error = np.where(is_fixed, 2.0 * _ROUNDING * longest / (from_start * to_end), 0.0)
+    is_flat = np.minimum.reduce([*sides, height]) < MIN_ARC_HEIGHT
+    faults: dict[int, str] = {}
+    for row in rows_where(is_flat | (size > MAX_ARC_SIZE) | (error > MAX_ARC_TURN_ERROR)):
+        near = [k for k in range(3) if sides[k][row] < MIN_ARC_HEIGHT]
+        if near:
+            (a, b), apart = pairs[near[0]], 1e3 * sides[near[0]][row]
+            faults[row] = f'the {a} and the {b} of the arc coincide ({apart:.3f} mm apart)'
+        elif size[row] > MAX_ARC_SIZE:
+            faults[row] = f'the points of the arc are more than {MAX_ARC_SIZE:g} m apart'
+        elif is_flat[row]:
+            faults[row] = 'the start, the via and the end of the arc lie on one straight line'
+        else:
+            faults[row] = (
+                f'its via is {1e3 * from_start[row]:.3f} mm and {1e3 * to_end[row]:.3f} mm from '
+                f'its ends, so that micrometres on the wire may turn the tool by '
+                f'{degrees(error[row]):.1f} degrees at its end, more than '
+                f'{degrees(MAX_ARC_TURN_ERROR):.1f}'
+            )
+    return faults

@@ -22,6 +22,7 @@ from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, CurveRows
 from ur_cartesian_driver.planning.geometry.curves import (
     ArcCurve,
+    goal_arcs,
     HALF_TURN,
     is_same_pose,
     SAME_POSITION,
@@ -125,9 +126,10 @@ class SegmentDrafts:
         if after < len(self) and not self.is_joint_move[after]:
             start = self.target(row)
             if self.kinds[after] == SegmentType.CIRCULAR:
-                arc, remark = self._arc(after, start)
+                arc = self._arc(after, start)
                 self.path.curves.put(after, arc)
-                self._remarks += [remark] if remark else []
+                if self.segments.arc_modes[after] == ArcMode.FIXED:
+                    self._remarks += self._turn_remarks(after, arc.end)
             else:
                 self._check_turn(after, start)
                 self.path.curves.put_line(after, start)
@@ -136,44 +138,37 @@ class SegmentDrafts:
 
     def _curves(self, start: Pose, remarks: list[tuple[int, str]]) -> CurveRows:
         """Return the curves of lines and arcs; the rows of joint moves have no meaning."""
-        starts = np.concatenate([[start.row()], self.targets[:-1]])
-        arcs: dict[int, ArcCurve] = {}
-        refusal, end = None, len(self)
-        for row in rows_where(self.kinds == SegmentType.CIRCULAR):
-            try:
-                arc, remark = self._arc(row, pose_from_row(starts[row]))
-            except InvalidGoal as error:
-                refusal, end = error, row
-                break
-            arcs[row] = arc
-            if row + 1 < len(self):
-                starts[row + 1] = arc.end.row()
-            if remark:
-                remarks.append((row, remark))
-        curves = CurveRows(starts, self.targets.copy(), arcs)
-        is_line = ~self.is_joint_move & curves.is_line
-        for row in rows_where((curves.angle > pi - 2.0 * HALF_TURN)[:end] & is_line[:end]):
-            self._check_turn(row, pose_from_row(starts[row]))
-        if refusal is not None:
-            raise refusal
+        starts, ends = np.concatenate([[start.row()], self.targets[:-1]]), self.targets.copy()
+        rows, arcs, faults = goal_arcs(self.segments, self._goal.T_base_frame, starts, ends)
+        curves = CurveRows(starts, ends, {})
+        suspect = ~self.is_joint_move & (curves.angle > pi - 2.0 * HALF_TURN)
+        suspect[[*faults]] = True
+        for row in rows_where(suspect):
+            check = self._arc if self.kinds[row] == SegmentType.CIRCULAR else self._check_turn
+            check(row, pose_from_row(starts[row]))
+        for row in rows[arcs.is_fixed].tolist():
+            remarks += [(row, text) for text in self._turn_remarks(row, pose_from_row(ends[row]))]
+        curves.put_arcs(rows, arcs)
         return curves
 
-    def _arc(self, row: int, start: Pose) -> tuple[ArcCurve, str]:
-        """Return the arc of a segment from the pose ``start``, and a remark on it ('' = none)."""
-        segments, index, target = self.segments, self.begin + row, self.target(row)
-        mode = ArcMode(int(segments.arc_modes[row]))
+    def _arc(self, row: int, start: Pose) -> ArcCurve:
+        """Return the arc of a segment from the pose ``start``."""
+        mode, via = ArcMode(int(self.segments.arc_modes[row])), self.segments.via(row)
         if mode != ArcMode.FIXED:
             self._check_turn(row, start)
-        via = segments.via(row)
         assert via is not None
-        arc = arc_through_via(index, start, self._goal.T_base_frame @ via, target, mode)
-        off = arc.end.angle_to(target)
+        T_base_via = self._goal.T_base_frame @ via
+        return arc_through_via(self.begin + row, start, T_base_via, self.target(row), mode)
+
+    def _turn_remarks(self, row: int, end: Pose) -> list[str]:
+        """Return the remark on an arc that arrives in another orientation than the target's."""
+        off = end.angle_to(self.target(row))
         if off <= self._options.start_tolerance_angle:
-            return arc, ''
-        return arc, (
-            f'point {index}: the orientation is ignored, because arc_mode FIXED turns the tool '
-            f'with the arc; it arrives {degrees(off):.1f} degrees off'
-        )
+            return []
+        return [
+            f'point {self.begin + row}: the orientation is ignored, because arc_mode FIXED turns '
+            f'the tool with the arc; it arrives {degrees(off):.1f} degrees off'
+        ]
 
     def _check_turn(self, row: int, start: Pose) -> None:
         """Refuse a turn whose direction is ambiguous."""

@@ -3,8 +3,8 @@
 """
 Choose the primitive of each segment.
 
-Nearly all primitives are rows of numbers. Arcs, moves to a posture, and moves that older robot
-programs expect in another form are separate objects.
+Nearly all primitives are rows of numbers. Moves to a posture, and moves that older robot programs
+expect in another form are separate objects.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidPosture
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose_rows import transform_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6, ZERO6
-from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
+from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
 from ur_cartesian_driver.motion.plan.move_rows import MoveRows, MOVES
 from ur_cartesian_driver.motion.plan.primitive import (
@@ -30,9 +31,7 @@ from ur_cartesian_driver.motion.plan.primitive import (
     Primitive,
     Spline,
     Stop,
-    Target,
 )
-from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
 from ur_cartesian_driver.planning.moves.segment_drafts import JOINT_SPACE_TYPES
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
@@ -55,12 +54,13 @@ from ur_cartesian_driver.planning.request.program_features import (
 )
 
 _CLASSES = {
+    SegmentType.CIRCULAR: MoveC,
     SegmentType.JOINT: MoveJ,
     SegmentType.PROCESS: MoveP,
     SegmentType.OPTIMIZED_JOINT: OptimoveJ,
     SegmentType.OPTIMIZED_LINEAR: OptimoveL,
 }
-#: For each type of segment, the index of its primitive in MOVES; not used for arcs.
+#: For each type of segment, the index of its primitive in MOVES.
 _MOVE_OF = np.array([MOVES.index(_CLASSES.get(kind, MoveL)) for kind in SegmentType])
 _HAS_Q_NEAR = type_table(JOINT_SPACE_TYPES)
 
@@ -75,12 +75,18 @@ def segment_primitives(
     :raises NotAvailable: the robot program does not support a primitive.
     :raises InvalidPosture: the arm would not pass a via in the configuration of the via's posture.
     """
-    kinds = geometries.kinds
+    kinds, vias = geometries.kinds, geometries.segments.vias
+    arcs = np.flatnonzero(kinds == SegmentType.CIRCULAR)
+    if len(arcs):
+        vias = vias.copy()
+        vias[arcs] = transform_rows(paths.goal.T_base_frame, vias[arcs])
     moves = MoveRows(
         kinds=_MOVE_OF[kinds],
         targets=paths.targets[geometries.begin :],
         q_near=geometries.joints,
         has_q_near=_HAS_Q_NEAR[kinds],
+        vias=vias,
+        arc_modes=geometries.segments.arc_modes,
         velocities=timings.velocities,
         accelerations=timings.accelerations,
         durations=timings.wire_times,
@@ -103,9 +109,8 @@ class _SpecialPrimitives:
     def by_row(self) -> Mapping[int, Primitive]:
         """Return the special primitives by row."""
         geometries = self._geometries
-        special = geometries.kinds == SegmentType.CIRCULAR
-        special |= not takes_q_near(self._options)
-        special[list(self._postures)] = True
+        special = np.full(len(geometries), not takes_q_near(self._options))
+        special[[*self._postures, *geometries.segments.via_postures]] = True
         special[0] |= geometries.waits
         return {row: self._primitive(row) for row in rows_where(special)}
 
@@ -120,13 +125,13 @@ class _SpecialPrimitives:
                 velocities=ZERO6,
                 duration=float(self._moves.durations[row]),
             )
-        elif kind == SegmentType.CIRCULAR:
-            primitive = self._arc(row, joints)
         else:
             move = self._moves[row]
-            assert not isinstance(move, MoveC | Spline | Stop)
+            assert not isinstance(move, Spline | Stop)
             primitive = move
-            if kind in JOINT_SPACE_TYPES and isinstance(self._postures.get(row), JointPositions):
+            if isinstance(move, MoveC):
+                primitive = self._arc(row, move, joints)
+            elif kind in JOINT_SPACE_TYPES and isinstance(self._postures.get(row), JointPositions):
                 primitive = replace(move, target=joints, q_near=None)
             elif kind in JOINT_SPACE_TYPES or row in self._postures:
                 primitive = replace(move, q_near=self._q_near(row, joints))
@@ -141,22 +146,17 @@ class _SpecialPrimitives:
         wanted = posture and full_posture(named_joints(posture, self._options.tf_prefix))
         if wanted:
             where = point_field(self._geometries.begin + row, 'pose')
-            found = self._kinematics.nearest(self._target(row), wanted, where)
+            target = pose_from_row(self._moves.targets[row])
+            found = self._kinematics.nearest(target, wanted, where)
             if max_joint_change(found, joints) <= SAME_SOLUTION:
                 return wanted
         return joints
 
-    def _target(self, row: int) -> Pose:
-        return pose_from_row(self._moves.targets[row].tolist())
-
-    def _arc(self, row: int, joints: Joints) -> MoveC:
+    def _arc(self, row: int, arc: MoveC, joints: Joints) -> MoveC:
         """Return the arc move; a target or via that has a posture becomes joint positions."""
         point, segments = self._geometries.begin + row, self._geometries.segments
-        segment_via = segments.via(row)
-        assert segment_via is not None
-        T_base_via = self._paths.goal.T_base_frame @ segment_via
-        via: Target = T_base_via
-        target: Target = self._target(row)
+        via = arc.via
+        assert isinstance(via, Pose)
         at_point, at_via = row in self._postures, row in segments.via_postures
         wanted = [name for name, has in (('the point', at_point), ('the via', at_via)) if has]
         if wanted and (reason := explain_poses_only(self._options)):
@@ -168,17 +168,11 @@ class _SpecialPrimitives:
             self._paths.reasons.setdefault(point, []).append(
                 f'{" and ".join(wanted)} {"has" if len(wanted) == 1 else "have"} a posture'
             )
-            target = joints if at_point else target
-            via = self._via_joints(row, T_base_via) if at_via else via
-        moves = self._moves
-        return MoveC(
-            target=target,
-            via=via,
-            velocity=float(moves.velocities[row]),
-            acceleration=float(moves.accelerations[row]),
-            blend_radius=float(moves.blend_radii[row]),
-            mode=ArcMode(int(segments.arc_modes[row])),
-        )
+            if at_point:
+                arc = replace(arc, target=joints)
+            if at_via:
+                arc = replace(arc, via=self._via_joints(row, via))
+        return arc
 
     def _via_joints(self, row: int, via: Pose) -> Joints:
         """
@@ -187,11 +181,10 @@ class _SpecialPrimitives:
         :raises InvalidPosture: the arm follows the arc in another configuration.
         """
         geometries, samples = self._geometries, self._paths.samples
-        point, arc = geometries.begin + row, geometries.path.curves.others[row]
-        assert isinstance(arc, ArcCurve)
+        point, u_via = geometries.begin + row, geometries.path.curves.arcs.u_via[row]
         location = segment_field(point, 'via')
         first, last = np.searchsorted(samples.segment, (point, point + 1))
-        nearest = int(first + np.argmin(np.abs(samples.fraction[first:last] - arc.u_via)))
+        nearest = int(first + np.argmin(np.abs(samples.fraction[first:last] - u_via)))
         # The arm need not pass the via in the via's orientation, so the arc's joints are only the
         # seed from which the via's pose is solved.
         q = self._kinematics.nearest(via, vector6(samples.q[nearest].tolist()), location)

@@ -36,7 +36,12 @@ from ur_cartesian_driver.motion.goal.goal import (
     SegmentType,
 )
 from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable, rows_where
-from ur_cartesian_driver.planning.geometry.curves import ArcCurve, is_same_pose, SAME_POSITION
+from ur_cartesian_driver.planning.geometry.curves import (
+    ArcCurve,
+    goal_arcs,
+    is_same_pose,
+    SAME_POSITION,
+)
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.blend_limits import check_blends
 from ur_cartesian_driver.planning.request.default_tolerances import (
@@ -251,9 +256,11 @@ def _motions(goal: GoalTable, options: PlanningOptions) -> None:
     points, segments = goal.waypoints, goal.motions
     lengths = np.linalg.norm(np.diff(points.poses[:, :3], axis=0), axis=1)
     is_arc = segments.types[1:] == SegmentType.CIRCULAR
-    is_near = np.isin(segments.types[1:], STRAIGHT_TYPES) & (lengths < 2.0 * SAME_POSITION)
-    is_known = ~np.isnan(lengths)  # else checked again when the joint positions have a pose
-    for i in rows_where(np.append(False, (is_arc | is_near) & is_known)):
+    suspect = np.isin(segments.types[1:], STRAIGHT_TYPES) & (lengths < 2.0 * SAME_POSITION)
+    starts, ends = points.poses[:-1].copy(), points.poses[1:].copy()
+    suspect[[*goal_arcs(segments[1:], IDENTITY, starts, ends)[2]]] = True
+    suspect &= ~np.isnan(lengths)  # checked again when the joint positions have a pose
+    for i in rows_where(np.append(False, suspect)):
         start, end = points.pose(i - 1), points.pose(i)
         if is_arc[i - 1]:
             # The start's orientation does not change the shape of the arc.

@@ -81,7 +81,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.rotation_rows import log_rows
 from ur_cartesian_driver.motion.geometry.vectors import Vector6, vector6, ZERO6
 from ur_cartesian_driver.motion.goal.goal import ArcMode, ContactEnd, InputKind, OutputKind
-from ur_cartesian_driver.motion.plan.move_rows import MoveRows, MOVES, SplineRows
+from ur_cartesian_driver.motion.plan.move_rows import ARC, MoveRows, MOVES, SplineRows
 from ur_cartesian_driver.motion.plan.primitive import (
     AwaitInput,
     BeginPress,
@@ -261,7 +261,7 @@ _ARC_TYPES = {
 _MOVES = {types[is_pose]: (cls, is_pose) for cls, types in _TYPES.items() for is_pose in (0, 1)}
 #: Last index into ``MOVES`` of a move with a duration; the moves after it have none.
 _LAST_TIMED = MOVES.index(MoveL)
-_POSE_TYPES = np.array([_TYPES[move][1] for move in MOVES])
+_POSE_TYPES = np.array([_TYPES[move][1] if move in _TYPES else MotionType.MOVEC for move in MOVES])
 _STOPS: dict[type[Stop], MotionType] = {
     Wait: MotionType.WAIT,
     AwaitInput: MotionType.AWAIT_INPUT,
@@ -344,6 +344,9 @@ def move_fields(moves: MoveRows) -> Floats:
     fields[:, PointField.VELOCITY] = moves.velocities
     fields[:, PointField.ACCELERATION] = moves.accelerations
     fields[:, PointField.HAS_Q_NEAR] = moves.has_q_near
+    arcs = np.flatnonzero(moves.kinds == ARC)
+    fields[arcs, 6:9], fields[arcs, 9:12] = moves.vias[arcs, :3], log_rows(moves.vias[arcs, 3:])
+    fields[arcs, PointField.ARC_MODE] = moves.arc_modes[arcs]
     fields[:, PointField.DURATION] = np.where(moves.kinds <= _LAST_TIMED, moves.durations, 0.0)
     fields[:, PointField.BLEND] = moves.blend_radii
     fields[:, PointField.TYPE] = _POSE_TYPES[moves.kinds]
