@@ -32,9 +32,9 @@ class Host:
         with contextlib.suppress(OSError):
             while True:
                 client, (peer, _) = self._listener.accept()
+                assert client.recv(100) == b'request_program\n'
                 self.peers.append(peer)
                 self.clients.append(client)
-                assert client.recv(100) == b'request_program\n'
                 for part in self.parts:
                     client.sendall(part) if part is not None else client.close()
 
