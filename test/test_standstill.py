@@ -35,6 +35,10 @@ def test_of_time():
         stand_still()
         raise AssertionError
 
+def test_of_a_loop():
+    if ran('loop') == 1:
+        raise TimeoutError('The robot loop ended unexpectedly, or hangs; wait.')
+
 def test_that_is_wrong():
     ran('wrong')
     raise AssertionError
@@ -64,9 +68,9 @@ def test_a_test_runs_again_only_if_the_computer_stood_still(tmp_path):
         timeout=60.0,
         check=False,
     )
-    assert '2 failed, 1 passed, 2 rerun' in done.stdout, done.stdout + done.stderr
+    assert '2 failed, 2 passed, 3 rerun' in done.stdout, done.stdout + done.stderr
     runs = {
         name: len((tmp_path / name).read_text().splitlines())
-        for name in ('time', 'wrong', 'always')
+        for name in ('time', 'loop', 'wrong', 'always')
     }
-    assert runs == {'time': 2, 'wrong': 1, 'always': 2}
+    assert runs == {'time': 2, 'loop': 2, 'wrong': 1, 'always': 2}

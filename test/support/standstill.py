@@ -3,9 +3,10 @@
 """
 A test with deadlines tells nothing of a computer that stands still.
 
-A virtual machine may get no processor for seconds. Timeouts then pass that are much longer than
-what they wait for, and a test fails without a defect. Such a test, and no other, runs once more;
-the summary counts it as rerun.
+A virtual machine may get no processor for seconds, and on two processors robot, driver and several
+tests at once may leave one of them none. Timeouts then pass that are much longer than what they
+wait for, and a test fails without a defect. Such a test, and no other, runs once more; the summary
+counts it as rerun.
 """
 
 from threading import Thread
@@ -17,6 +18,8 @@ import pytest
 STEP = 0.02  # [s]
 #: As long as the shortest deadlines of the driver [s].
 LIMIT = 0.2
+#: What a driver says when its robot loop sent nothing for 5 s, ten heartbeats.
+SILENT_LOOP = 'robot loop ended unexpectedly, or hangs'
 
 
 class Standstill:
@@ -26,8 +29,12 @@ class Standstill:
         self.longest = 0.0
         Thread(target=self._watch, name='standstill', daemon=True).start()
 
+    def __call__(self, error: BaseException) -> bool:
+        """Tell whether a test that failed runs again; pytest-rerunfailures asks."""
+        return bool(self) or SILENT_LOOP in str(error).lower()
+
     def __bool__(self) -> bool:
-        """Tell whether this process stood still; pytest-rerunfailures asks when a test failed."""
+        """Tell whether this process stood still; older versions of the plugin ask so."""
         return self.longest > LIMIT
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
