@@ -231,6 +231,7 @@ def test_a_goal_until_contact_is_watched_from_its_start_to_its_end(cell):
     ]
     assert tuple(made.rows.primitives)[2:4] == tuple(plain.rows.primitives)
     assert made.duration == plain.duration
+    assert 'goes from the start to point 1, or until the tool touches' in made.report[0]
     assert made.reference.time.tolist() == plain.reference.time.tolist()
 
 

@@ -11,13 +11,12 @@ import numpy as np
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.geometry.arrays import Bytes, Floats, Singles
 from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
-from ur_cartesian_driver.motion.goal.goal_table import zeros
-from ur_cartesian_driver.motion.plan.move_rows import SplineRows
-from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows
+from ur_cartesian_driver.motion.plan.plan import PlannedRows
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SlowStretch
 from ur_cartesian_driver.planning.rounded.programmed_path import SegmentEnds
 from ur_cartesian_driver.planning.rounded.rounded_planner import RoundedMotion
 from ur_cartesian_driver.planning.rounded.section_law import SectionLaw
+from ur_cartesian_driver.planning.spline.joint_polynomials import piece_rows
 
 #: The requested speed counts as kept if the tool is slower by at most this fraction.
 _KEPT = 0.01
@@ -109,28 +108,11 @@ class RoundedReport:
 def planned_rows(motion: RoundedMotion, report: RoundedReport) -> PlannedRows:
     """Return the pieces, each with the first point that is passed at its end or later."""
     polynomials, path = motion.polynomials, motion.path
-    durations = np.round(np.diff(polynomials.times), 6)
     waypoints = np.minimum(
         np.searchsorted(motion.point_times, polynomials.times[1:] - 1e-6),
         len(motion.point_times) - 1,
-    ).astype(np.int32)
-    n, times = len(durations), path.times
-    return PlannedRows(
-        waypoints=waypoints,
-        lengths=np.diff(np.interp(polynomials.times, times, path.length)),
-        angles=np.diff(np.interp(polynomials.times, times, path.angle)),
-        durations=durations,
-        blend_entries=zeros(n, 5),
-        joints=polynomials.joints.x[1:],
-        primitives=SplineRows(
-            targets=polynomials.joints.x[1:],
-            velocities=polynomials.joints.v[1:],
-            accelerations=polynomials.joints.a[1:],
-            durations=durations,
-            quintic=np.ones(n, dtype=np.bool_),
-        ),
-        report_lines=LateLines(n, report.lines),
     )
+    return piece_rows(path, polynomials, waypoints, lambda _: report.lines())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -154,7 +136,7 @@ class _SectionSpeeds:
     @classmethod
     def of(cls, law: SectionLaw) -> _SectionSpeeds:
         """Return the speeds of a law."""
-        times = law.law.sampled_times()
+        times = law.law.all_times()
         place, rate, _ = law.law.at(times)
         s, caps = law.samples.s, np.stack(list(law.caps.values()))
         limit, travel = np.argmin(caps, axis=0), length_rows(law.samples.x1)

@@ -285,11 +285,15 @@ class TimeLaw:
             between = between[near]
         return np.sort(np.concatenate([passed, between]))
 
+    def all_times(self) -> Floats:
+        """Return :meth:`sampled_times`, with the begin and the end of the motion [s]."""
+        return np.concatenate([[0.0], self.sampled_times(), [self.duration]])
+
     def times_of(self, s: Floats) -> Floats:
         """Return when the averaged law passes places (m,) [s]."""
         low = np.interp(s, self._s, self.times)
         high = low + self.window
-        known = np.concatenate([[0.0], self.sampled_times(), [self.duration]])
+        known = self.all_times()
         t = np.clip(np.interp(s, self.at(known).s, known), low, high)
         for _ in range(_NEWTON_STEPS):
             place, v, _ = self.at(t)

@@ -11,6 +11,7 @@ halved until none does.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf
 
@@ -27,6 +28,9 @@ from ur_cartesian_driver.motion.geometry.polynomials import (
     values,
 )
 from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, compose_rows
+from ur_cartesian_driver.motion.goal.goal_table import zeros
+from ur_cartesian_driver.motion.plan.move_rows import SplineRows
+from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
@@ -67,6 +71,41 @@ class JointPolynomials:
     def angle(self) -> float:
         """Maximum turn of the tool away from the tool spline [rad]."""
         return float(self.deviations[:, 1].max())
+
+
+def piece_rows(
+    path: SplinePath,
+    polynomials: JointPolynomials,
+    waypoints: Indices,
+    lines: Callable[[Floats], Sequence[str]],
+) -> PlannedRows:
+    """
+    Return joint pieces as the segments of a plan.
+
+    :param waypoints: (n,) the point of the goal to which each piece leads.
+    :param lines: returns the line of the report for each piece, from lengths [m], turns [rad] and
+        times [s] of the pieces (n, 3).
+    """
+    durations = np.round(np.diff(polynomials.times), 6)
+    lengths = np.diff(np.interp(polynomials.times, path.times, path.length))
+    angles = np.diff(np.interp(polynomials.times, path.times, path.angle))
+    n = len(durations)
+    return PlannedRows(
+        waypoints=waypoints.astype(np.int32),
+        lengths=lengths,
+        angles=angles,
+        durations=durations,
+        blend_entries=zeros(n, 5),
+        joints=polynomials.joints.x[1:],
+        primitives=SplineRows(
+            targets=polynomials.joints.x[1:],
+            velocities=polynomials.joints.v[1:],
+            accelerations=polynomials.joints.a[1:],
+            durations=durations,
+            quintic=np.full(n, polynomials.quintic),
+        ),
+        report_lines=LateLines(n, lambda: lines(np.stack([lengths, angles, durations], axis=1))),
+    )
 
 
 def fit_joint_polynomials(

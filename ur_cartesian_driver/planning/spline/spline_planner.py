@@ -29,11 +29,9 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.pose_rows import keep_hemisphere
 from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector6, vector6, ZERO6
 from ur_cartesian_driver.motion.goal.goal import PIECES_PER_HORIZON
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable, zeros
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
-from ur_cartesian_driver.motion.plan.move_rows import SplineRows
 from ur_cartesian_driver.motion.plan.plan import (
-    LateLines,
     Plan,
     PlannedRows,
     PlannedSegment,
@@ -51,6 +49,7 @@ from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_m
 from ur_cartesian_driver.planning.spline.joint_polynomials import (
     fit_joint_polynomials,
     JointPolynomials,
+    piece_rows,
 )
 from ur_cartesian_driver.planning.spline.slow_spline import slow_spline_stretches
 from ur_cartesian_driver.planning.spline.spline_limits import stretch_remark, worst_excess
@@ -288,19 +287,12 @@ def _fit_to_limits(
 
 
 def _segments(path: SplinePath, polynomials: JointPolynomials, goal: GoalTable) -> PlannedRows:
-    durations = np.round(np.diff(polynomials.times), 6)
-    lengths = np.diff(np.interp(polynomials.times, path.times, path.length))
-    angles = np.diff(np.interp(polynomials.times, path.times, path.angle))
-    n = len(durations)
-
-    def lines() -> list[str]:
+    def lines(sizes: Floats) -> list[str]:
         """Return a line for the last piece to each point, and '' for the other pieces."""
         last = np.flatnonzero(np.diff(polynomials.piece, append=-1))
         count = np.diff(last, prepend=-1)
-        done = np.add.reduceat(
-            np.stack([lengths, angles, durations], axis=1), last + 1 - count, axis=0
-        )
-        made = [''] * n
+        done = np.add.reduceat(sizes, last + 1 - count, axis=0)
+        made = [''] * len(sizes)
         for k, (row, pieces, sums, margin) in enumerate(
             zip(last.tolist(), count.tolist(), done.tolist(), path.tightest_margins, strict=True)
         ):
@@ -308,22 +300,7 @@ def _segments(path: SplinePath, polynomials: JointPolynomials, goal: GoalTable) 
             made[row] = f'{line}; margin {margin}'
         return made
 
-    return PlannedRows(
-        waypoints=(path.first + polynomials.piece).astype(np.int32),
-        lengths=lengths,
-        angles=angles,
-        durations=durations,
-        blend_entries=zeros(n, 5),
-        joints=polynomials.joints.x[1:],
-        primitives=SplineRows(
-            targets=polynomials.joints.x[1:],
-            velocities=polynomials.joints.v[1:],
-            accelerations=polynomials.joints.a[1:],
-            durations=durations,
-            quintic=np.full(n, polynomials.quintic),
-        ),
-        report_lines=LateLines(n, lines),
-    )
+    return piece_rows(path, polynomials, path.first + polynomials.piece, lines)
 
 
 def _segment_line(goal: GoalTable, first: int, k: int, count: int, done: Sequence[float]) -> str:

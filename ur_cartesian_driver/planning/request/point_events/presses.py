@@ -22,6 +22,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     PRESS_AXES,
     PressFrame,
     SegmentType,
+    START_OF_MOTION,
 )
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan.primitive import BeginPress, EndPress, PressLaw
@@ -149,7 +150,8 @@ class Presses(PointEvent[Press]):
     def stops(self, goal: GoalTable, options: PlanningOptions) -> Iterator[PlacedStop]:
         """Yield the ends and beginnings of presses; at the same point, the end comes first."""
         for press in goal.presses:
-            yield PlacedStop(press.last_waypoint, EndPress(), 'ends to press there', order=-1)
+            what = 'pressing' if press.axes else 'watching for contact'
+            yield PlacedStop(press.last_waypoint, EndPress(), f'stops {what} there', order=-1)
             for record, note in press_records(press, goal.T_base_frame):
                 yield PlacedStop(press.first_waypoint, record, note, order=2)
 
@@ -200,7 +202,8 @@ def _note(press: Press) -> str:
         ContactEnd.ENDS: ', or until the tool touches',
         ContactEnd.REQUIRED: ', where the tool must have touched before',
     }[press.contact]
-    return f'{pressing} from there to point {press.last_waypoint}{end}'
+    begin = 'the start' if press.first_waypoint == START_OF_MOTION else 'there'
+    return f'{pressing} from {begin} to point {press.last_waypoint}{end}'
 
 
 def _speed_limit(press: Press, k: int) -> float:

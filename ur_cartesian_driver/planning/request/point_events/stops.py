@@ -117,8 +117,9 @@ class Stops:
 
         notes: dict[int, str] = {}
         motions: dict[int, int] = {}
+        first_motion = next(row for row in range(len(primitives)) if row not in places)
         for row, each in zip(places.tolist(), self._stops, strict=True):
-            motion = motions.setdefault(each.waypoint, row - 1)
+            motion = motions.setdefault(each.waypoint, max(row - 1, first_motion))
             if each.note:
                 notes[motion] = f'{notes.get(motion, "")}; {each.note}'
         return (
