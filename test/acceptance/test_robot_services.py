@@ -323,7 +323,7 @@ def test_a_program_of_polyscope_x_is_downloaded_changed_uploaded_and_played(make
     program = json.loads(driver.download_program('one').text)
     program['program']['programInformation']['name'] = 'two'
     assert driver.upload_program(json.dumps(program)).text == 'two'
-    assert driver.list_programs().text.splitlines() == ['one', 'external_control', 'two']
+    assert driver.list_programs().text.splitlines() == ['external_control', 'one', 'two']
     refused = driver.upload_program(json.dumps(program))
     assert 'HTTP 400' in refused.text
     assert driver.upload_program(json.dumps(program), replaces=True).ok

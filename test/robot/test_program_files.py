@@ -117,12 +117,12 @@ def test_a_program_is_downloaded_unchanged(name):
 @pytest.mark.parametrize(
     ('call', 'status', 'remedy'),
     [
-        (UploadProgramCall(program=PROGRAM), 400, 'update_program replaces it'),
+        (UploadProgramCall(program=PROGRAM), 400, 'Replace that one instead'),
         (UploadProgramCall(program=PROGRAM), 403, 'switch it to remote control'),
         (UploadProgramCall(program=PROGRAM), 422, 'the content of a .urpx file'),
-        (UploadProgramCall(program=PROGRAM, replaces=True), 404, 'get_programs lists'),
+        (UploadProgramCall(program=PROGRAM, replaces=True), 404, 'Ask for the list'),
         (UploadProgramCall(program=PROGRAM, replaces=True), 409, 'load another one first'),
-        (DownloadProgramCall(program_name='weld'), 404, 'get_programs lists'),
+        (DownloadProgramCall(program_name='weld'), 404, 'Ask for the list'),
         (ListProgramsCall(), 500, 'log of the robot'),
     ],
 )
@@ -152,5 +152,5 @@ def test_a_program_that_is_too_long_is_refused_in_both_directions(monkeypatch):
 def test_a_call_without_a_program_is_refused():
     with pytest.raises(LocalProtocolError, match=r'content of a \.urpx file'):
         UploadProgramCall(program=' ')
-    with pytest.raises(LocalProtocolError, match='get_programs lists the names'):
+    with pytest.raises(LocalProtocolError, match='ask for the list of programs'):
         DownloadProgramCall(program_name='')

@@ -169,7 +169,7 @@ def test_programs_of_polyscope_x(no_thread_left, make_cell):
         cell = make_cell(robot, robot_api_port=robot.ports.robot_api)
         cell.wait_ready()
         call = ServiceClient(cell)
-        assert call('dashboard/get_programs').message == 'one\nexternal_control'
+        assert call('dashboard/get_programs').message == 'external_control\none'
         program = call(
             'dashboard/download_program', DownloadProgram.Request(program_name='one')
         ).message
@@ -177,7 +177,7 @@ def test_programs_of_polyscope_x(no_thread_left, make_cell):
         assert not call('dashboard/update_program', two).success
         assert call('dashboard/upload_program', two).message == 'two'
         assert call('dashboard/update_program', two).success
-        assert call('dashboard/get_programs').message == 'one\nexternal_control\ntwo'
+        assert call('dashboard/get_programs').message == 'external_control\none\ntwo'
         assert not call('dashboard/upload_program', two).success
 
 

@@ -37,7 +37,7 @@ from ur_cartesian_driver.sim.pendant_programs.external_control import (
     UrCap,
     UrCapX,
 )
-from ur_cartesian_driver.sim.pendant_programs.program_tree import ProgramTree
+from ur_cartesian_driver.sim.pendant_programs.program_tree import FetchedScript, ProgramTree
 from ur_cartesian_driver.sim.programs.interpreter_mode import InterpreterMode
 from ur_cartesian_driver.sim.programs.program_runner import ProgramRunner
 from ur_cartesian_driver.sim.programs.rtde_watchdog import Watchdogs
@@ -413,6 +413,8 @@ class Controller:
         program = self.stored_programs.program(file := PurePosixPath(name).name)
         if program is None:
             return f'File not found: {name}'
+        if isinstance(program, ProgramTree) and not program.has_external_control:
+            program = program.script(file, FetchedScript())
         if isinstance(program, ProgramTree):
             return self.programs.load_generated(
                 file, partial(self.external_control.generate, program, file)

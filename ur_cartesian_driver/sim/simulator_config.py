@@ -201,8 +201,7 @@ class SimulatorConfig:
     @property
     def saved_programs(self) -> Mapping[str, str | ProgramTree]:
         """Return the programs that can be loaded: file name -> URScript or tree."""
-        built_in = {n: tree for n, tree in BUILT_IN_PROGRAMS.items() if n not in self.programs}
-        return {**self.programs, **built_in}
+        return {**BUILT_IN_PROGRAMS, **self.programs}
 
     @property
     def listening_secondary_port(self) -> int:

@@ -12,6 +12,7 @@ from robot_ports import FREE
 from waiting import wait_for
 
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
+from ur_cartesian_driver.sim.pendant_programs.program_tree import ProgramTree, ScriptText
 
 PROGRAM = b'textmsg("from ', b'the host")\nwhile True:\nsync()\nend\n'
 
@@ -22,6 +23,8 @@ class Host:
     def __init__(self, host='127.0.0.1'):
         self._listener = socket.create_server((host, 0))
         self.port = self._listener.getsockname()[1]
+        self._accepted = []
+        #: The peers that have sent their request, and the connections to them.
         self.peers, self.clients = [], []
         #: The parts of the answers to come; None = hang up.
         self.parts = [*PROGRAM]
@@ -32,6 +35,7 @@ class Host:
         with contextlib.suppress(OSError):
             while True:
                 client, (peer, _) = self._listener.accept()
+                self._accepted.append(client)
                 assert client.recv(100) == b'request_program\n'
                 self.peers.append(peer)
                 self.clients.append(client)
@@ -41,7 +45,7 @@ class Host:
     def close(self):
         self._listener.shutdown(socket.SHUT_RDWR)
         self._listener.close()
-        for client in self.clients:
+        for client in self._accepted:
             client.close()
         self._thread.join()
 
@@ -135,7 +139,7 @@ def test_cycles_go_on_while_a_host_is_silent_and_stop_gives_up(host):
         host.parts = [*PROGRAM]
         robot.play_program()
         wait_for(lambda: len(host.clients) == 2)
-        wait_for(lambda: robot.state().runtime_state.name == 'PLAYING')
+        wait_for(lambda: 'from the host' in robot.state().messages)
         assert robot.state().messages.count('from the host') == 1
 
 
@@ -162,3 +166,12 @@ def test_a_robot_closes_while_a_host_is_silent(host):
     with robot_of(host.port) as robot:
         robot.play_program()
         wait_for(lambda: host.clients)
+    assert host.clients[0].recv(1) == b''
+
+
+def test_a_program_without_external_control_asks_nobody(host):
+    tree = ProgramTree((ScriptText('textmsg("alone")'),))
+    with robot_of(host.port, program='alone.urp', programs={'alone.urp': tree}) as robot:
+        robot.play_program()
+        wait_for(lambda: 'alone' in robot.state().messages)
+    assert host.clients == []

@@ -36,9 +36,9 @@ from ur_cartesian_driver.robot.services.service_calls import (
 
 #: What to do about a refusal, by its status.
 REMEDIES: Mapping[int, str] = {
-    400: 'Does it have a program of this name? update_program replaces it.',
+    400: 'Does it have a program of this name? Replace that one instead.',
     403: 'It is in local control: switch it to remote control on the pendant.',
-    404: 'get_programs lists the programs that it has.',
+    404: 'Ask for the list of its programs.',
     409: 'The program is loaded: load another one first.',
     422: 'Is this the content of a .urpx file?',
 }

@@ -127,7 +127,7 @@ class DownloadProgramCall:
         """Check that there is a name."""
         _declare_types(self)
         if not self.program_name.strip():
-            raise LocalProtocolError('program_name is empty; get_programs lists the names.')
+            raise LocalProtocolError('program_name is empty; ask for the list of programs.')
         _check_length(self.program_name)
 
 

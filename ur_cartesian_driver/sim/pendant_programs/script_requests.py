@@ -88,13 +88,15 @@ class ScriptRequests:
             then(self._cached[0])
             return
 
-        async def answer() -> None:
+        async def fetch() -> None:
             answer = await self._fetch()
             if isinstance(answer, str) and answer:
                 self._cached = answer, loop.time() + self._limits.cache
             then(answer)
 
-        task = loop.create_task(answer())
+        for earlier in self._tasks:  # only one start can wait
+            earlier.cancel()
+        task = loop.create_task(fetch())
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 

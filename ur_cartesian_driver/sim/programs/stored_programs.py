@@ -49,9 +49,11 @@ class StoredPrograms:
         A program that was not uploaded gets one without a tree, and with nothing at its nodes of
         External Control.
         """
+        if (content := self._uploaded.get(name)) is not None:
+            return content
         program = self._programs[self.names()[name]]
         script = program if isinstance(program, str) else program.script(name, FetchedScript())
-        return self._uploaded.get(name) or {
+        return {
             'application': {},
             'program': {
                 'programInformation': {
