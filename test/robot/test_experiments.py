@@ -10,7 +10,6 @@ import pytest
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.robot.check import experiments
 from ur_cartesian_driver.robot.check.corner_experiment import corner_pieces, PIECE, PIECES, TURN
-from ur_cartesian_driver.robot.check.corner_findings import steps
 from ur_cartesian_driver.robot.check.experiments import (
     EXPERIMENTS,
     JOINT_ACCELERATION,
@@ -30,7 +29,7 @@ from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 
 CYCLE = 0.002
 ANALYSES = {experiment.check: experiment.analyses[0] for experiment in EXPERIMENTS}
-ANALYSES['steps_100'] = steps('steps_100')
+ANALYSES['steps_100'] = next(e for e in EXPERIMENTS if e.check == 'corner_100').analyses[1]
 
 
 def trapezoid(distance, speed, acceleration, stretched=1.0):

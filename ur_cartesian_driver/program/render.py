@@ -44,7 +44,7 @@ from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.framing import FIXED_POINT
 from ur_cartesian_driver.protocol.program import point_fields, registers, reverse, script_command
 from ur_cartesian_driver.protocol.program import trajectory_points as trajectory
-from ur_cartesian_driver.protocol.rtde.rtde_client import LOWER_REGISTERS
+from ur_cartesian_driver.protocol.rtde.rtde_fields import LOWER_REGISTERS
 
 PROGRAM_NAME = 'ur_cartesian_driver'
 

@@ -4,7 +4,7 @@
 The RTDE registers between the driver and the robot program.
 
 The controller reserves the numbers from 24 for external clients and the lower ones for fieldbuses.
-With the parameter ``lower_registers`` all numbers below are less by 24.
+With the parameter ``lower_registers``, 24 is subtracted from all numbers below.
 The servo numbers follow the manufacturer's guide to buffered ``servoj``, so a program that follows
 this guide works, too.
 

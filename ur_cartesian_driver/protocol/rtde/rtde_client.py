@@ -36,11 +36,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-import re
 from typing import TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType, INPUT_TYPES, OUTPUT_TYPES
+from ur_cartesian_driver.protocol.rtde.rtde_fields import (
+    DataType,
+    in_lower_half,
+    INPUT_TYPES,
+    LOWER_REGISTERS,
+    OUTPUT_TYPES,
+    REGISTER,
+)
 from ur_cartesian_driver.protocol.rtde.rtde_packages import (
     Acknowledgement,
     ControllerVersion,
@@ -64,9 +70,6 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import (
 )
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe, RtdeValues
 
-#: The controller reserves this many int and double registers for fieldbuses: the first ones.
-LOWER_REGISTERS = 24
-_REGISTER = re.compile(r'(?:in|out)put_(?:int|double)_register_(\d+)')
 #: Number of unexpected packages that are tolerated in each state of the handshake.
 MAX_UNEXPECTED_PACKAGES = 5
 
@@ -88,7 +91,7 @@ class InputsInUse(RemoteProtocolError):
 
     def __init__(self, names: Sequence[str]) -> None:
         """Build the error text from the names."""
-        numbers = [int(match[1]) for name in names if (match := _REGISTER.fullmatch(name))]
+        numbers = [int(match[1]) for name in names if (match := REGISTER.fullmatch(name))]
         is_lower = bool(numbers) and min(numbers) < LOWER_REGISTERS
         owner = 'the fieldbus, or another client' if is_lower else 'another client'
         super().__init__(
@@ -103,14 +106,6 @@ def _other_half(is_lower: bool) -> str:
     if is_lower:
         return ', or take the registers from 24 on (lower_registers: false)'
     return ', or take the registers 0 to 23 (lower_registers: true) if no fieldbus has them'
-
-
-def in_lower_half(name: str) -> str:
-    """Return a field's name with its register, 24 to 47, moved to 0 to 23."""
-    match = _REGISTER.fullmatch(name)
-    if match is None:
-        return name
-    return f'{name[: match.start(1)]}{int(match[1]) - LOWER_REGISTERS}'
 
 
 class RtdeState(Enum):
@@ -203,7 +198,7 @@ class RtdeClientCodec:
                 f'{len(outputs)} outputs and {frequency!r} Hz were requested.'
             )
         self.state = RtdeState.NEW
-        self._wire_names = in_lower_half if lower_registers else str
+        self._wire_name = in_lower_half if lower_registers else str
         self._outputs = tuple(outputs)
         self._optional = frozenset(optional_outputs)
         self._missing: tuple[str, ...] = ()
@@ -352,7 +347,7 @@ class RtdeClientCodec:
         frequency = None if self._version == 1 else self._frequency
         return self._send_request(
             RtdeState.OUTPUTS,
-            SetupOutputs(names=tuple(map(self._wire_names, self._outputs)), frequency=frequency),
+            SetupOutputs(names=tuple(map(self._wire_name, self._outputs)), frequency=frequency),
         )
 
     def _on_outputs(self, reply: RtdeReply) -> list[RtdeEvent]:
@@ -362,7 +357,7 @@ class RtdeClientCodec:
         missing = [n for n, text in zip(names, reply.types, strict=True) if text == NOT_FOUND]
         needed = [name for name in missing if name not in self._optional]
         if needed or len(missing) == len(names):
-            lacking = list(map(self._wire_names, needed or missing))
+            lacking = list(map(self._wire_name, needed or missing))
             raise FieldsNotFound('outputs', lacking, self._controller)
         if missing:
             self._missing += tuple(missing)
@@ -380,7 +375,7 @@ class RtdeClientCodec:
         if len(self._inputs) < len(self._groups):
             return self._send_request(
                 RtdeState.INPUTS,
-                SetupInputs(names=tuple(map(self._wire_names, self._groups[len(self._inputs)]))),
+                SetupInputs(names=tuple(map(self._wire_name, self._groups[len(self._inputs)]))),
             )
         return self._send_request(RtdeState.START, StartStreaming())
 
@@ -390,9 +385,9 @@ class RtdeClientCodec:
         _check_count(reply.types, names)
         answers = list(zip(names, reply.types, strict=True))
         if missing := [name for name, text in answers if text == NOT_FOUND]:
-            raise FieldsNotFound('inputs', list(map(self._wire_names, missing)), self._controller)
+            raise FieldsNotFound('inputs', list(map(self._wire_name, missing)), self._controller)
         if taken := [name for name, text in answers if text == IN_USE]:
-            raise InputsInUse(list(map(self._wire_names, taken)))
+            raise InputsInUse(list(map(self._wire_name, taken)))
         types = [_type(name, text, INPUT_TYPES.get(name)) for name, text in answers]
         self._inputs.append(Recipe(names, types, reply.recipe_id))
         return self._request_inputs()

@@ -45,6 +45,20 @@ class DataType(Enum):
         return number if self.length == 1 else (number,) * self.length
 
 
+#: The controller reserves this many int and double registers for fieldbuses: the first ones.
+LOWER_REGISTERS = 24
+#: Matches the name of an int or double register, and captures its number.
+REGISTER = re.compile(r'(?:in|out)put_(?:int|double)_register_(\d+)')
+
+
+def in_lower_half(name: str) -> str:
+    """Return a field's name with its register, 24 to 47, moved to 0 to 23."""
+    match = REGISTER.fullmatch(name)
+    if match is None:
+        return name
+    return f'{name[: match.start(1)]}{int(match[1]) - LOWER_REGISTERS}'
+
+
 def _registers(direction: str) -> dict[str, DataType]:
     """Return the general purpose registers of one direction."""
     return {

@@ -31,12 +31,16 @@ from ur_cartesian_driver.robot.rtde.state_decoding import REQUIRED_FIELDS
 MIN_VERSIONS = {3: (3, 14, 3), 5: (5, 9, 4)}
 #: Outputs to record in addition to the driver's own recipe.
 EXTRA_OUTPUTS = ('target_speed_fraction', 'payload', 'payload_cog', 'payload_inertia')
+#: Input registers, of which the driver can take either half, by purpose.
+REGISTER_GROUPS: Mapping[str, tuple[str, ...]] = {
+    'SERVO registers': tuple(SERVO_INPUTS),
+    'path offset registers': tuple(OFFSET_INPUTS),
+}
 #: Inputs that the driver writes, by purpose.
-REGISTERS = ('SERVO registers', 'path offset registers')
 INPUT_GROUPS: Mapping[str, tuple[str, ...]] = {
     'speed slider': ('speed_slider_mask', 'speed_slider_fraction'),
     'outputs': ('standard_digital_output_mask', 'standard_digital_output'),
-    **dict(zip(REGISTERS, (SERVO_INPUTS, OFFSET_INPUTS), strict=True)),
+    **REGISTER_GROUPS,
 }
 #: How long this check tries to get the inputs of a closed connection [s]; a goal tries for 0.2 s.
 RELEASE_TIMEOUT = 2.0
@@ -216,8 +220,8 @@ async def observe_inputs(address: RobotAddress) -> AsyncIterator[Finding]:
 
 async def _has_free_lower_registers(address: RobotAddress) -> bool:
     try:
-        for purpose in REGISTERS:
-            await _request_inputs(address, INPUT_GROUPS[purpose], lower_registers=True)
+        for names in REGISTER_GROUPS.values():
+            await _request_inputs(address, names, lower_registers=True)
     except OSError:
         return False
     return True
