@@ -1,18 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A test that failed while the computer stood still runs once more, and no other."""
-
-import os
-from pathlib import Path
-import subprocess
-import sys
+"""A test runs once more if its process stood still or a robot loop was silent, and no other."""
 
 import pytest
+from small_suite import run_small_suite
 
 pytest.importorskip('xdist')
 pytest.importorskip('pytest_rerunfailures')
 
-HERE = Path(__file__).resolve().parent
 CASES = """
 import os
 from pathlib import Path
@@ -52,22 +47,7 @@ def test_that_is_always_wrong():
 
 @pytest.mark.slow
 def test_a_test_runs_again_only_if_the_computer_stood_still(tmp_path):
-    (tmp_path / 'test').mkdir()
-    (tmp_path / 'test' / 'test_cases.py').write_text(CASES)
-    (tmp_path / 'test' / 'conftest.py').write_text((HERE / 'conftest.py').read_text())
-    (tmp_path / 'pytest.ini').write_text(f'[pytest]\npythonpath = {HERE / "support"}\n')
-    environment = {
-        name: value for name, value in os.environ.items() if not name.startswith('PYTEST_')
-    }
-    done = subprocess.run(
-        [sys.executable, '-m', 'pytest', '-q', 'test'],
-        cwd=tmp_path,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=60.0,
-        check=False,
-    )
+    done = run_small_suite(tmp_path, {'test_cases.py': CASES})
     assert '2 failed, 2 passed, 3 rerun' in done.stdout, done.stdout + done.stderr
     runs = {
         name: len((tmp_path / name).read_text().splitlines())

@@ -5,8 +5,9 @@ A test with deadlines tells nothing of a computer that stands still.
 
 A virtual machine may get no processor for seconds, and on two processors robot, driver and several
 tests at once may leave one of them none. Timeouts then pass that are much longer than what they
-wait for, and a test fails without a defect. Such a test, and no other, runs once more; the summary
-counts it as rerun.
+wait for, and a test fails without a defect. A test runs once more if its own process stood still,
+or if a driver in it says that its robot loop was silent for 5 s or ended; no other does. The
+summary counts it as rerun.
 """
 
 from threading import Thread
