@@ -137,7 +137,7 @@ class CartesianDriverNode(Node):
         )
 
     def _is_idle(self) -> bool:
-        """Return whether no goal or session depends on the present TCP and payload."""
+        """Return whether no goal or session depends on the present TCP, payload and gravity."""
         return self.action_server.idle and not self.action_server.arbiter.holder
 
     def _warn_of_neighbours(self) -> None:

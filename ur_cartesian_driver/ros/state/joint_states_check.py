@@ -45,7 +45,7 @@ class JointStatesCheck:
             f'{info.node_namespace.rstrip("/")}/{info.node_name}'
             for info in self._node.get_publishers_info_by_topic('joint_states')
         } - {own}
-        named = ' and '.join(sorted(others)) or 'Another node'
+        named = min(others) if len(others) == 1 else 'Another node'
         self._node.get_logger().warning(
             f'{named} publishes joint_states with {joint}, too: subscribers get both. Give the '
             'driver a namespace or a tf_prefix, or remap its topic '

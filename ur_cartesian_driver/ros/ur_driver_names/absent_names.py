@@ -54,8 +54,8 @@ _ROWS = (
         'action',
         'tool_contact_controller/detect_tool_contact',
         'ur_msgs/action/ToolContact',
-        'the robot program watches for contact only where a goal asks for it, which the contact '
-        'then ends: `trajectory_until_node/execute`, or `presses` of a goal',
+        'the robot program watches for contact only during a goal that asks for it, and contact '
+        'ends that goal: `trajectory_until_node/execute`, or `presses` of a goal',
     ),
 )
 

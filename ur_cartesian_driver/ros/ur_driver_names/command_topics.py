@@ -73,13 +73,15 @@ class _FreedriveSwitch:
     """
     Switches freedrive with the messages, and off when they stop.
 
-    One call at a time: the driver would answer a request for freedrive that it is just about to
-    end with success.
+    One call at a time: while it still switches off, the driver would answer 'on' with success.
+    'Off' is repeated until the driver confirms it.
     """
 
     def __init__(self, name: str, driver: DriverNode, timeout: float) -> None:
         self._name, self._driver = name, driver
-        self._is_wanted = self._is_on = self._is_calling = False
+        self._is_wanted = self._is_calling = False
+        #: What the driver has confirmed; None = unknown.
+        self._confirmed: bool | None = False
         self._watchdog = driver.node.create_timer(
             timeout, self._late, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
@@ -89,22 +91,23 @@ class _FreedriveSwitch:
         """Take a request."""
         if message.data:
             self._watchdog.reset()
-            self._is_on = False  # for all that is known: a stop of the program ends freedrive
+            self._confirmed = None  # a stop of the program ends freedrive
         else:
             self._watchdog.cancel()
         self._is_wanted = message.data
         self._follow()
 
     def _late(self) -> None:
-        self._driver.warn(f'{self._name}: no message for too long, freedrive ends.')
         self._watchdog.cancel()
+        if self._is_wanted:
+            self._driver.warn(f'{self._name}: no message for too long, freedrive ends.')
         self._is_wanted = False
         self._follow()
 
     def _follow(self) -> None:
         """Make the driver do what is wanted, unless it is being told something already."""
         on = self._is_wanted
-        if self._is_calling or on == self._is_on:
+        if self._is_calling or on == self._confirmed:
             return
         self._is_calling = True
         answer = self._driver.call(SetBool, 'freedrive_mode', SetBool.Request(data=on))
@@ -112,12 +115,13 @@ class _FreedriveSwitch:
 
     def _switched(self, on: bool, answer: ServiceAnswer) -> None:
         self._is_calling = False
-        if answer.ok:
-            self._is_on = on
-        else:
-            self._is_wanted = self._is_on  # the next message tries again
+        self._confirmed = on if answer.ok else None
+        if not answer.ok:
             self._driver.warn(f'{self._name}: {answer.text}')
-        self._follow()
+            if not self._is_wanted and not on:
+                self._watchdog.reset()  # it tries again
+        if self._is_wanted is not on:
+            self._follow()
 
 
 COMMAND_TOPICS: tuple[UrName, ...] = (ScriptTopic(), FreedriveTopic())

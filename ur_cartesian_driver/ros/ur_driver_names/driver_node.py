@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, InvalidStateError
+from contextlib import suppress
 from dataclasses import dataclass, field
 import threading
 from time import monotonic
@@ -156,7 +157,7 @@ class DriverNode:
         return answer
 
     def warn(self, text: str) -> None:
-        """Log why a call failed whose response has no field for a sentence."""
+        """Log a failure that no response can carry."""
         self.node.get_logger().warning(text)
 
     def _keep_status(self, message: DriverStatus) -> None:
@@ -178,26 +179,32 @@ class DriverNode:
         """Send a call when its service is there, or give it up when it is late."""
         if self._is_closed:
             _finish(call.future, DriverSilent('The node with the names of the UR driver ends.'))
-        elif not call.is_sent and call.client.service_is_ready():
-            call.is_sent, call.deadline = True, monotonic() + call.timeout
+        elif self._takes_for_sending(call):
             call.client.call_async(call.request).add_done_callback(
                 lambda done: _finish(call.future, done.result())
             )
         elif monotonic() > call.deadline:
-            problem = (
-                f'did not answer within {call.timeout:g} s'
-                if call.is_sent
-                else 'is not there: does the driver run, and is its node called so'
-            )
-            end = '.' if call.is_sent else '?'
-            _finish(call.future, DriverSilent(f'The service {call.service} {problem}{end}'))
+            text = f'The service {call.service} did not answer within {call.timeout:g} s.'
+            if not call.is_sent:
+                text = (
+                    f'The service {call.service} is not there: does the driver run, and is its '
+                    'node called so?'
+                )
+            _finish(call.future, DriverSilent(text))
+
+    def _takes_for_sending(self, call: _PendingCall) -> bool:
+        """Return whether this thread sends a call, as one does once the service is there."""
+        with self._lock:
+            if call.is_sent or not call.client.service_is_ready():
+                return False
+            call.is_sent, call.deadline = True, monotonic() + call.timeout
+            return True
 
 
 def _finish(future: Future[Message], outcome: Message | DriverSilent) -> None:
     """Complete a future unless its call was given up meanwhile."""
-    if future.done():
-        return
-    if isinstance(outcome, DriverSilent):
-        future.set_exception(outcome)
-    else:
-        future.set_result(outcome)
+    with suppress(InvalidStateError):
+        if isinstance(outcome, DriverSilent):
+            future.set_exception(outcome)
+        else:
+            future.set_result(outcome)

@@ -123,7 +123,8 @@ class _ModeServer:
                 handle.succeed()
             else:
                 handle.abort()
-            return self._action.Result(success=success, message=text)
+            succeeded = success and not handle.is_cancel_requested
+            return self._action.Result(success=succeeded, message=text)
 
         self._server.finish(handle, end)
 
@@ -172,6 +173,8 @@ class ModeRun:
             self._finish(True, self._go())
         except (_Ended, DriverSilent) as error:
             self._finish(False, str(error))
+        except Exception as error:  # a goal without a result would refuse all later ones
+            self._finish(False, f'A defect of set_mode: {type(error).__name__}: {error}.')
 
     def _go(self) -> str:
         """
@@ -183,6 +186,7 @@ class ModeRun:
         target = _target(goal.target_robot_mode)
         if goal.stop_program and self._status.program_running:
             self._do('dashboard/stop')
+            self._wait(lambda: not self._status.program_running, 'The program has not ended')
         if self._mode is not target or self._safety not in _SAFE:
             self._recover()
             self._change_mode(target)

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
-from math import isfinite, nan
+from math import nan
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidGoal
@@ -28,6 +28,8 @@ LINEAR_JOINT, LINEAR_CARTESIAN, CIRCULAR_CARTESIAN = 0, 50, 51
 #: The additional arguments.
 VELOCITY, ACCELERATION, MOVE_TIME = 'velocity', 'acceleration', 'move_time'
 _ARGUMENTS = (VELOCITY, ACCELERATION, MOVE_TIME)
+#: Greater speeds, accelerations and times must be mistakes.
+_MAX_ARGUMENT = 1e5
 _TYPES = {
     LINEAR_JOINT: 'LINEAR_JOINT',
     LINEAR_CARTESIAN: 'LINEAR_CARTESIAN',
@@ -170,8 +172,12 @@ def _arguments(index: int, message: Message) -> Mapping[str, float]:
         field = f"{_field(index, 'additional_arguments')} '{argument.name}'"
         if argument.name not in found:
             raise InvalidGoal(field, 'is unknown', f'use {", ".join(_ARGUMENTS)}')
-        if not (isfinite(argument.value) and argument.value >= 0.0):
-            raise InvalidGoal(field, f'is {argument.value:g}, but must be 0 or more', 'correct it')
+        if not 0.0 <= argument.value <= _MAX_ARGUMENT:  # NaN fails, too
+            raise InvalidGoal(
+                field,
+                f'is {argument.value:g}, but must be from 0 to {_MAX_ARGUMENT:g}',
+                'correct it',
+            )
         found[argument.name] = argument.value
     return found
 

@@ -121,7 +121,7 @@ def _response(
     try:
         path = _file(settings.program_directory, request.target_path)
         path.write_text(answer.text, 'utf-8')
-    except OSError as error:
+    except (_Refused, OSError, ValueError) as error:
         return kind.Response(success=False, answer=str(error))
     response.answer = f'The program is in {path}.'
     return response

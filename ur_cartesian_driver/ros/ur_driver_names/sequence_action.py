@@ -77,8 +77,9 @@ class _SequenceForwarder(GoalForwarder):
 
     def _send(self, run: ForwardedGoal, answer: Future[Message]) -> None:
         try:
-            (prefix,) = answer.result().values
-            goal = goal_of_sequence(run.handle.request.trajectory.motions, prefix.string_value)
+            values = answer.result().values
+            prefix = values[0].string_value if values else ''
+            goal = goal_of_sequence(run.handle.request.trajectory.motions, prefix)
         except (DriverSilent, InvalidGoal) as error:
             self.refuse(run, str(error))
         else:

@@ -9,6 +9,7 @@ the tolerances that the UR driver's configuration gives them.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 import copy
 from dataclasses import dataclass
@@ -149,9 +150,11 @@ class ForwardedGoal:
         #: The driver's goal; None = the driver has not accepted it yet.
         self.forwarded: Any = None
         self.seconds_lost = 0.0
+        #: Who published feedback when the goal was sent; a driver that is started again differs.
+        self.publishers: frozenset[tuple[int, ...]] = frozenset()
 
 
-class GoalForwarder:
+class GoalForwarder(ABC):
     """
     An action server whose goals an action of the driver executes.
 
@@ -206,14 +209,15 @@ class GoalForwarder:
         """Return the result of the goal for that of the driver's goal."""
         return result
 
+    @abstractmethod
     def failure(self, text: str) -> Message:
         """Return the result of a goal that the driver does not execute to its end."""
-        raise NotImplementedError
 
     # -- the same for all ------------------------------------------------------------------------
 
     def send(self, run: ForwardedGoal, goal: Message) -> None:
         """Send the driver's goal for a goal."""
+        run.publishers = self._publishers()
         self._client.send_goal_async(
             goal,
             feedback_callback=lambda message: run.handle.publish_feedback(
@@ -283,12 +287,22 @@ class GoalForwarder:
         self._server.finish(run.handle, finish)
 
     def _look_for_driver(self) -> None:
-        """Abort the goals of a driver that has been gone for some seconds."""
-        ready = self._client.server_is_ready()
-        for run in list(self._runs.values()):
+        """Abort the goals of a driver that is gone, or that was started again meanwhile."""
+        runs = list(self._runs.values())
+        if not runs:
+            return
+        ready, publishers = self._client.server_is_ready(), self._publishers()
+        for run in runs:
             run.seconds_lost = 0.0 if ready else run.seconds_lost + LOOK_PERIOD
             if run.seconds_lost >= LOST_TIMEOUT:
                 self.refuse(run, 'The driver is gone: whether the arm moves is not known.')
+            elif run.publishers and publishers and not publishers & run.publishers:
+                self.refuse(run, 'The driver was started again, and knows nothing of this goal.')
+
+    def _publishers(self) -> frozenset[tuple[int, ...]]:
+        """Return who publishes feedback of the driver's action, as numbers that nobody repeats."""
+        found = self.driver.node.get_publishers_info_by_topic(f'{self._target}/_action/feedback')
+        return frozenset(tuple(each.endpoint_gid) for each in found)
 
 
 def _key(handle: Any) -> bytes:
