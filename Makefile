@@ -17,7 +17,7 @@ unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH
 # Tests start hundreds of processes; each would compile all modules anew, numpy's too.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup lock hooks demo demo-two test random lint format docs bench release-check clean
+.PHONY: help setup lock hooks demo demo-two test interfaces random lint format docs bench release-check clean
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 15
@@ -43,9 +43,13 @@ demo: $(stamp)  ## Simulated robot, driver and a client that moves it; draws the
 demo-two: $(stamp)  ## The same with two arms at once, each with a goal of its own
 	$(bin)/ur-cartesian demo --arms 2
 
-test: lint  ## Lint, then all tests (PYTEST_ARGS='-k name' chooses)
-	$(bin)/python test/support/ur_interfaces.py  # once, two minutes: longer than a test may take
+test: $(stamp)  ## Lint, then all tests (PYTEST_ARGS='-k name' chooses)
+	$(MAKE) --no-print-directory --jobs 2 --output-sync lint interfaces
 	$(bin)/pytest --no-skips $(PYTEST_ARGS)
+
+# The UR driver's messages, for tests. Their build takes longer than a test may.
+interfaces: $(stamp)
+	$(bin)/python test/support/ur_interfaces.py
 
 random: $(stamp)  ## The random tests with all their cases (RANDOM_SEED=N draws others)
 	RANDOM_SHARE=1 $(bin)/pytest -m random -n 2 --timeout 3600
