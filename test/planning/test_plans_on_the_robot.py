@@ -336,6 +336,7 @@ def test_a_report_says_where_blends_leave_an_end_less_certain_than_the_tolerance
         assert re.fullmatch(
             r'blends: the end may be up to 1\.\d{3} s off'
             + re.escape(clause)
-            + ', because how the robot passes them is not published',
+            + ', because how the robot passes them is not published; planned as assumed for '
+            'motion version 1',
             said,
         )
