@@ -66,6 +66,10 @@ async def hang_up(cell):
     await cell.start_driver()
 
 
+async def hand_back(cell):
+    await inject_cause(cell, 'hand back')
+
+
 async def fall_silent(cell):
     await inject_cause(cell, 'freeze reverse')
 
@@ -78,7 +82,7 @@ async def cut_setpoints(cell):
     await inject_cause(cell, 'freeze set-points')
 
 
-@pytest.mark.parametrize('end', [hang_up, fall_silent, cut_setpoints])
+@pytest.mark.parametrize('end', [hang_up, hand_back, fall_silent, cut_setpoints])
 def test_a_version_that_is_asked_for_is_set_and_set_back(end):
     async def scenario(cell):
         assert await known(cell) == 1
@@ -164,18 +168,28 @@ def test_a_goal_with_blends_that_are_reduced_stays_within_its_tolerance(figures)
     run_cell(scenario, robot=SECOND | {'second_motion_version': FIGURES[figures]})
 
 
-def test_a_goal_that_leaves_its_tolerance_says_which_versions_differ():
+CLAUSE = (
+    '; the robot moves by motion version 2, but the plan follows the laws of version 1 '
+    '(motion_version: 1 sets version 1)'
+)
+
+
+@pytest.mark.parametrize('robot', [FIRST, SECOND])
+@pytest.mark.parametrize(
+    ('phase', 'fault', 'code'),
+    [
+        ('mid-segment', 'offset pose y 0.01', ErrorCode.PATH_TOLERANCE_VIOLATED),
+        ('last point', 'offset pose z 0.002', ErrorCode.GOAL_TOLERANCE_VIOLATED),
+    ],
+)
+def test_a_goal_that_leaves_its_tolerance_says_if_the_versions_differ(phase, fault, code, robot):
     async def scenario(cell):
         goal = BlendGoal(cell)
         goal.send()
-        await cell.until(lambda: goal.is_in('mid-segment'), 2.0)
-        cell.robot.inject('offset pose y 0.01')
-        await cell.until(lambda: goal.motion.outcome, 2.0)
-        outcome = goal.motion.outcome
-        assert outcome.code is ErrorCode.PATH_TOLERANCE_VIOLATED
-        assert (
-            'the robot moves by motion version 2, but the plan follows the laws of version 1 '
-            '(motion_version: 1 sets version 1)'
-        ) in outcome.text
+        await cell.until(lambda: goal.is_in(phase), 2.0)
+        cell.robot.inject(fault)
+        await cell.until(lambda: goal.motion.outcome, 3.0)
+        assert goal.motion.outcome.code is code
+        assert goal.motion.outcome.text.count(CLAUSE) == (robot is SECOND)
 
-    run_cell(scenario, robot=SECOND)
+    run_cell(scenario, robot=robot)

@@ -68,5 +68,4 @@ def _why_not_settled(monitor: GoalMonitor) -> Meaning:
         return GoalSignal.NOT_SETTLED, no_rest
     if missed := monitor.missed_end(packet):
         return GoalSignal.DEVIATION, missed
-    clause = monitor.goal_violation(packet) or no_rest
-    return GoalSignal.NOT_SETTLED, clause + monitor.law_clause(packet)
+    return GoalSignal.NOT_SETTLED, monitor.goal_violation(packet) or no_rest

@@ -124,8 +124,8 @@ class PathQueue:
         move_path = call.move_path(start)
         parameters = call.parameters_of(move_path, start)
         if call.version is not None:
-            way = _distance_to_waypoint(start.pose, move_path)
-            call = call._replace(radius=call.version.reduced_radii(0.0, call.radius, way)[1])
+            travel = _distance_to_waypoint(start.pose, move_path)
+            call = call._replace(radius=call.version.reduced_radii(0.0, call.radius, travel)[1])
         path_motion = start_from_rest(move_path, parameters, call.radius, call.move, self._spare)
         margin = _distance_to_waypoint(start.pose, move_path) - call.radius
         self._follow(None, path_motion, call, margin)

@@ -68,15 +68,15 @@ class SecondMotionVersion:
             jerk=acceleration / self.ramp_rise if self.ramp_rise > 0.0 else None,
         )
 
-    def reduced_radii(self, before: float, after: float, way: float) -> tuple[float, float]:
+    def reduced_radii(self, before: float, after: float, distance: float) -> tuple[float, float]:
         """
         Return the radii of the blends at both ends of a move [m], in proportion if too large.
 
         :param before: radius at the waypoint where the move begins [m].
         :param after: radius at its own waypoint [m].
-        :param way: distance between the two waypoints [m].
+        :param distance: distance between the two waypoints [m].
         """
-        most, both = self.blend_share * way, before + after
+        most, both = self.blend_share * distance, before + after
         if both <= most:
             return before, after
         return before * most / both, after * most / both
