@@ -80,6 +80,8 @@ async def cut_setpoints(cell):
     goal.send()
     await cell.until(lambda: goal.is_in('between points'), 2.0)
     await inject_cause(cell, 'freeze set-points')
+    log = cell.robot.controller.messages.log
+    await cell.until(lambda: [line for line in log if 'buffered servo' in line])
 
 
 @pytest.mark.parametrize('end', [hang_up, hand_back, fall_silent, cut_setpoints])
@@ -145,27 +147,29 @@ def test_software_without_versions_is_told_in_a_sentence(polyscope):
     run_cell(scenario, robot={'polyscope': polyscope})
 
 
-#: The second version as it may be: as assumed, without any difference but clamping, at its worst.
+#: The second version as it may be, and the smallest blend radius that the goal then gets [m].
 FIGURES = {
-    'as assumed': SecondMotionVersion(),
-    'like version 1': SecondMotionVersion(ramp_rise=0.0, blend_fraction=1.0),
-    'small blends': SecondMotionVersion(blend_fraction=0.1),
-    'blends reduced for space': SecondMotionVersion(blend_share=0.1),
-    'slow ramps': SecondMotionVersion(ramp_rise=0.2),
+    'as assumed': (SecondMotionVersion(), 0.9 * BLEND),
+    'like version 1': (SecondMotionVersion(ramp_rise=0.0, blend_fraction=1.0), BLEND),
+    'small blends': (SecondMotionVersion(blend_fraction=0.1), 0.1 * BLEND),
+    # 0.1 of 50 mm for two blends: the first had got 5 mm, the second one asks for 13.5.
+    'little room': (SecondMotionVersion(blend_share=0.1), 0.005 * 5.0 / (5.0 + 13.5)),
+    'slow ramps': (SecondMotionVersion(ramp_rise=0.2), 0.9 * BLEND),
 }
 
 
-@pytest.mark.parametrize('figures', FIGURES)
-def test_a_goal_with_blends_that_are_reduced_stays_within_its_tolerance(figures):
+@pytest.mark.parametrize(('figures', 'radius'), FIGURES.values(), ids=FIGURES)
+def test_a_goal_with_blends_that_are_reduced_stays_within_its_tolerance(figures, radius):
     async def scenario(cell):
         goal, trace = BlendGoal(cell), JointTrace(cell)
         goal.send()
         await trace.until(lambda: goal.motion.outcome, 5.0)
         assert goal.motion.outcome.succeeded, goal.motion.outcome
-        # A corner that is not rounded at all is this far from the parabola of the plan.
-        assert trace.max_path_deviation(goal) < BLEND / sqrt(8.0) + 1e-4
+        # The parabola in a right corner passes it at the radius / sqrt(8).
+        off = (BLEND - radius) / sqrt(8.0)
+        assert trace.max_path_deviation(goal) == pytest.approx(off, abs=5e-5)
 
-    run_cell(scenario, robot=SECOND | {'second_motion_version': FIGURES[figures]})
+    run_cell(scenario, robot=SECOND | {'second_motion_version': figures})
 
 
 CLAUSE = (

@@ -71,6 +71,9 @@ def test_blends_that_would_overlap_are_reduced_and_no_waypoint_is_skipped(second
         nearest = np.linalg.norm(r.positions - corner, axis=1).min()
         leg = min(np.linalg.norm(corner - before), np.linalg.norm(after - corner))
         assert nearest <= leg / sqrt(8.0) + 1e-4
+    # Both legs' shares of a blend, each within a, and a change of the rate by half of that.
+    accelerations = np.linalg.norm(np.diff(r.tool_speeds(), axis=0), axis=1) / CYCLE
+    assert accelerations.max() <= 3.0 * 1.2
     # What is left of the middle of the legs belongs to no blend: the radii fit.
     assert off.max() <= 0.02 / sqrt(8.0) + 1e-9
 
