@@ -45,6 +45,7 @@ SOURCES = [
     *tracked_files(PACKAGE, 'robot/**/*.py'),
     *tracked_files(PACKAGE, 'driver/**/*.py'),
     PACKAGE / 'motion' / 'state' / 'state_age.py',
+    PACKAGE / 'program' / 'render.py',
     PACKAGE / 'protocol' / 'rtde' / 'rtde_client.py',
     PACKAGE / 'ros' / 'node.py',
     PACKAGE / 'ros' / 'state' / 'joint_states_check.py',

@@ -101,6 +101,44 @@ def test_local_control_is_noted(check):
     assert findings['remote_control']['data']['remote_control'] == 'false'
 
 
+@pytest.mark.parametrize(
+    ('number', 'verdict', 'text'),
+    [
+        pytest.param(1, 'ok', 'The software has motion version 1 only.'),
+        pytest.param(
+            1,
+            'ok',
+            'The robot moves by motion version 1.',
+            marks=pytest.mark.ur_sim(polyscope='5.22'),
+        ),
+        pytest.param(
+            2,
+            'note',
+            'The robot moves by motion version 2, but plans are made for version 1',
+            marks=pytest.mark.ur_sim(polyscope='5.22', motion_version=2),
+        ),
+        pytest.param(
+            0,
+            'note',
+            'The motion version of the robot is unknown',
+            marks=pytest.mark.ur_sim(polyscope='5.22', motion_version=2, remote_control=False),
+        ),
+        pytest.param(
+            0,
+            'note',
+            'The motion version of the robot is unknown',
+            marks=pytest.mark.ur_sim(model='ur20', polyscope='10.14'),
+        ),
+    ],
+)
+def test_the_motion_version_is_read_where_the_robot_tells_it(check, number, verdict, text):
+    _, _, findings = check()
+    found = findings['motion_version']
+    assert found['verdict'] == verdict
+    assert found['text'].startswith(text)
+    assert found['data']['motion_version'] == number
+
+
 @pytest.mark.ur_sim(polyscope='5.9.1')
 def test_software_that_is_too_old_is_a_problem(check):
     status, _, findings = check()

@@ -75,3 +75,8 @@ def test_our_own_program_is_not_sent_to_a_robot_with_an_older_one(dialect):
 def test_programs_of_others_have_the_upper_registers():
     with pytest.raises(ValueError, match='set lower_registers to false'):
         DriverConfig(wire_dialect='2.12', lower_registers=True)
+
+
+def test_programs_of_others_set_no_motion_version():
+    with pytest.raises(ValueError, match='set motion_version to 0'):
+        DriverConfig(wire_dialect='2.12', motion_version=1)

@@ -128,6 +128,7 @@ def test_a_recording_equals_what_happened(eventful):
     np.testing.assert_array_equal(found.planned_time, made.reference.time)
     assert found.metadata['outcome']['text'] == outcome.text
     assert found.metadata['robot']['model'] == 'ur5e'
+    assert found.metadata['robot']['motion_version'] == 1  # as all software before 5.22
     assert [text for _, _, text in found.events] == [
         'PRIMITIVES, 2 points',
         'on the way to point 0',

@@ -336,6 +336,16 @@ def test_a_report_says_where_blends_leave_an_end_less_certain_than_the_tolerance
         assert re.fullmatch(
             r'blends: the end may be up to 1\.\d{3} s off'
             + re.escape(clause)
-            + ', because how the robot passes them is not published',
+            + ', because how the robot passes them is not published; planned as assumed for '
+            'motion version 1',
             said,
         )
+
+
+@pytest.mark.parametrize('version', [0, 1, 2])
+def test_a_report_says_that_the_robot_moves_by_other_laws_than_the_plan(robot, version):
+    goal = corners(robot, np.random.default_rng(12), TYPE.LINEAR, (0.06, 0.06), (0.02, 0.0))
+    options = PlanningOptions(robot_motion_version=version)
+    made = plan(goal, robot.place(HOME, TOOL), robot.controller.arm, options)
+    said = [line for line in made.report if line.startswith('the robot moves by motion version 2')]
+    assert len(said) == (version == 2)

@@ -96,6 +96,10 @@ def test_statements_contain_no_numbers_of_the_protocol():
         ('optimove', (5, 21, 0), True),
         ('optimove', (10, 7, 9), False),
         ('optimove', (10, 8, 0), True),
+        ('motion_version', (3, 15, 8), False),
+        ('motion_version', (5, 21, 9), False),
+        ('motion_version', (5, 22, 0), True),
+        ('motion_version', (10, 12, 0), False),
         ('path_offset', (3, 15, 8), False),
         ('path_offset', (5, 6, 0), True),
         ('path_offset', (10, 12, 0), False),
@@ -107,6 +111,7 @@ def test_functions_are_called_only_if_the_controller_has_them(feature, version, 
     assert has_feature(feature, version) == known
     name = {
         'optimove': 'optimovej(',
+        'motion_version': ' motion_version_get(',
         'path_offset': 'path_offset_',
         'target_payload': 'set_target_payload(',
     }[feature]

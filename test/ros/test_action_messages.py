@@ -192,7 +192,17 @@ def test_the_status_without_a_robot_knows_no_modes():
     message = status_message(ConnectionStatus(), None, STAMP)
     assert message.robot_mode == DriverStatus.ROBOT_MODE_UNKNOWN
     assert message.safety_mode == DriverStatus.SAFETY_MODE_UNKNOWN
+    assert message.motion_version == 0
     assert isnan(message.speed_scaling)
+
+
+def test_the_motion_version_is_that_of_the_program_that_is_ours():
+    left_behind = RobotState(timestamp=1.0, actual_q=(0.0,) * 6, motion_version=2)
+    for connection, shown in (
+        (ConnectionStatus(), 0),
+        (ConnectionStatus(program_is_own=True, motion_version=2), 2),
+    ):
+        assert status_message(connection, left_behind, STAMP).motion_version == shown
 
 
 @pytest.mark.parametrize('more', [0, 1, 90_000])

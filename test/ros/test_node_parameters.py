@@ -101,6 +101,7 @@ def test_every_option_is_a_parameter_but_for_what_is_found_out():
         'optimove_known',
         'path_offset_known',
         'target_payload_known',
+        'robot_motion_version',
         'acceleration_known',
         'dialect',
         'prelude',

@@ -63,6 +63,8 @@ async def inject_cause(cell: RobotCell, cause: str):
     elif cause == 'hand back':
         cell.owner.send(CallRobot(number=1, call=HandBackCall()))
         await cell.sleep(2.0 * CYCLE)
+    elif kind == 'motion_version':
+        cell.robot.controller.programs.submit(f'sec f():\n  motion_version_set({what})\nend\n')
     elif kind == 'script':
         cell.owner.send(CallRobot(number=1, call=RunScriptCall(script=what)))
     elif kind == 'freeze':

@@ -236,6 +236,10 @@ HEADLESS = (
         'reset_safeguard',
         'release_emergency_stop',
     ),
+    _harmless(
+        'another client sets motion version 2 (blends are reduced, ramps are longer)',
+        'motion_version 2',
+    ),
     Row(
         fault='the controller crashes',
         cause=('crash',),

@@ -414,6 +414,7 @@ class Driver(RobotServices, InteractiveMotions):
             optimove_known=has_feature('optimove', status.software()),
             path_offset_known=has_feature('path_offset', status.software()),
             target_payload_known=has_feature('target_payload', status.software()),
+            robot_motion_version=status.motion_version,
             acceleration_known=state.actual_tcp_acceleration is not None
             and state.target_tcp_acceleration is not None,
         )

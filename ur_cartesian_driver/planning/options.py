@@ -112,6 +112,8 @@ class PlanningOptions:
     path_offset_known: Detected[bool] = True
     #: Whether the robot's software has payloads with inertia (PolyScope 5.10, PolyScope X).
     target_payload_known: Detected[bool] = True
+    #: The motion version of the robot's movej and movel; 0 = unknown.
+    robot_motion_version: Detected[int] = 1
     #: Whether the robot reports TCP accelerations; if not, tolerances on them are refused.
     acceleration_known: Detected[bool] = True
     #: The wire dialect of the robot program.

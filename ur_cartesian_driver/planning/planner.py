@@ -44,6 +44,7 @@ from ur_cartesian_driver.planning.min_speed import (
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner
 from ur_cartesian_driver.planning.moves.plan_report import (
     blend_remarks,
+    motion_version_remarks,
     segment_lines,
     stop_remarks,
 )
@@ -207,6 +208,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     )
     remarks = [
         *ignored_remarks(goal),
+        *motion_version_remarks(options.robot_motion_version),
         *(remark for _, remark in sorted(timings.requests.remarks.items())),
         *blend_remarks(goal, geometries, timings),
         *lines,

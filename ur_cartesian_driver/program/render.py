@@ -83,6 +83,7 @@ _NO_VERSION = (1000, 0, 0)
 #: For each feature, the first version of CB3/e-Series and of PolyScope X software that has it.
 FEATURES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     'optimove': ((5, 21, 0), (10, 8, 0)),
+    'motion_version': ((5, 22, 0), _NO_VERSION),
     'path_offset': ((5, 6, 0), _NO_VERSION),
     'target_payload': ((5, 10, 0), (10, 0, 0)),
 }
@@ -206,15 +207,23 @@ class ProgramSettings:
     allow_freedrive: bool = False
     #: Whether the program uses the int and double registers from 0 on, not those from 24 on.
     lower_registers: bool = False
+    #: The motion version that the program sets for itself; 0 = none.
+    motion_version: int = 0
     #: The user's functions that the program contains.
     prelude: Prelude = NO_PRELUDE
 
     def __post_init__(self) -> None:
-        """Refuse an empty host, and a host with characters that could end its quoted string."""
+        """Refuse a host that could end its quoted string, and an impossible motion version."""
         if not self.host or not all(c.isalnum() or c in '.-_:' for c in self.host):
             raise LocalProtocolError(
                 f'reverse_ip: {self.host!r} is not a host name or address; set it to the address '
                 'at which the robot reaches this computer.'
+            )
+        if self.motion_version and not has_feature('motion_version', self.version):
+            raise LocalProtocolError(
+                f'motion_version is {self.motion_version}, but the software of the robot, '
+                f'{".".join(map(str, self.version))}, is not known to have motion versions '
+                '(PolyScope 5 has them from 5.22 on); set motion_version to 0.'
             )
 
 
@@ -323,6 +332,9 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield from _register_constants(settings)
     yield f'PROGRAM_VERSION = {registers.PROGRAM_VERSION}'
     yield f'PROGRAM_NUMBER = {settings.number}'
+    yield f'MOTION_VERSION = {settings.motion_version}'
+    # Motion version 1 is the name of the only behaviour that PolyScope 3 and 5 had before 5.22.
+    yield f'ONLY_MOTION_VERSION = {1 if settings.version[0] < 10 else 0}'
     yield from _servo_constants(settings)
     yield from _message_constants()
     yield from _output_constants()
@@ -339,6 +351,7 @@ def _register_constants(settings: ProgramSettings) -> Iterator[str]:
         output.PROGRAM_VERSION,
         output.PROGRAM_NUMBER,
         output.PROGRAM_RUN,
+        output.MOTION_VERSION,
     ):
         yield f'REGISTER_{register.name} = {register + shift}'
     for prefix, members in (

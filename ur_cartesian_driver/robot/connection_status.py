@@ -36,6 +36,8 @@ class ConnectionStatus:
     program_running: bool = False
     #: The connected program has proved that this driver rendered it.
     program_is_own: bool = False
+    #: The motion version of movej and movel that this program reports; 0 = unknown.
+    motion_version: int = 0
     calibration_known: bool = False
     #: The open ports, by the names of their parameters.
     ports: Mapping[str, int] = field(default_factory=dict)
@@ -66,6 +68,18 @@ class LinkGaps:
     reports: float = nan
     keepalives: float = nan
     state_age: float = nan
+
+
+def motion_version_text(version: int) -> str:
+    """Return a sentence about the motion version of movej and movel; 0 = unknown."""
+    return {
+        0: 'The motion version of the robot is unknown; plans are made for version 1.',
+        1: 'The robot moves by motion version 1.',
+    }.get(
+        version,
+        f'The robot moves by motion version {version}, but plans are made for version 1: times '
+        'and blends will differ (motion_version: 1 sets version 1).',
+    )
 
 
 def timestamped(text: str, before: str = '') -> str:

@@ -38,6 +38,7 @@ from ur_cartesian_driver.robot.connection_status import (
     ConnectionStatus,
     is_paused,
     is_stopped,
+    motion_version_text,
     required_action,
     timestamped,
 )
@@ -281,7 +282,8 @@ class RobotLink:
             self.event_log.note(change)
         self.control.tracker.observe(robot)
         if self.control.tracker.is_own and not self.status.program_is_own:
-            self._status.update(program_is_own=True)
+            self._status.update(program_is_own=True, motion_version=robot.motion_version)
+            self._callbacks.log(logging.INFO, motion_version_text(robot.motion_version))
         self._state_time = asyncio.get_running_loop().time() - robot.state_age
         self.check_age()
         if status_may_change:
@@ -360,7 +362,10 @@ class RobotLink:
             )
         self.control.tcp_setter.program_lost()
         self._status.apply(
-            ConnectionEvent.PROGRAM_LOST, program_running=False, program_is_own=False
+            ConnectionEvent.PROGRAM_LOST,
+            program_running=False,
+            program_is_own=False,
+            motion_version=0,
         )
         self._callbacks.event(LinkLost(link='program', reason=reason))
 

@@ -81,6 +81,10 @@ class LinkSettings:
     #: another client needs those from 24 on. A fieldbus (EtherNet/IP, PROFINET) of the robot has
     #: the lower ones if the installation enables it. false: they use those from 24 on.
     lower_registers: bool = False
+    #: Motion version that the robot program sets for its movej and movel, and sets back when it
+    #: ends: 1 or 2, on PolyScope 5 from 5.22 on; 0: leave it as it is. Plans are made for 1. A
+    #: program that is stopped from outside cannot set it back.
+    motion_version: Annotated[int, Range(0, 2)] = 0
     #: Rate at which ~/io_states and ~/tool_data are checked for changes [Hz]; 0.0: never.
     io_publish_rate: Annotated[float, Range(0.0, 125.0)] = 25.0
     #: Deceleration of the leading axis when a goal is stopped [rad/s^2].
@@ -167,6 +171,12 @@ class LinkSettings:
             raise ValueError(
                 f"wire_dialect is '{self.wire_dialect}' and lower_registers is true, but such "
                 'programs use the registers from 24 on; set lower_registers to false.'
+            )
+        if self.motion_version and not self.runs_own_program:
+            raise ValueError(
+                f"wire_dialect is '{self.wire_dialect}' and motion_version is "
+                f'{self.motion_version}, but such programs set no motion version; set '
+                'motion_version to 0.'
             )
 
 

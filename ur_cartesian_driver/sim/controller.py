@@ -123,6 +123,8 @@ class Controller:
         self.arm = Arm(config.robot_model, config.geometry)
         self.motion = MotionGenerator(self.arm, self.cycle, config.q)
         self.motion.turn_ratio = config.turn_ratio
+        self.motion.motion_version = config.motion_version
+        self.motion.second_version = config.second_motion_version
         #: The bodies that the tool can touch, and the compliance of the arm.
         self.contact = ContactMotion(self.motion, config.contact_bodies)
         #: The measured motion, which equals the targets unless something disturbs the arm.
@@ -358,6 +360,10 @@ class Controller:
             self.ownership.let_go()
         else:
             self.ownership.brake()
+
+    def run_preamble(self) -> None:
+        """Set what the installation sets in front of a program that the pendant starts."""
+        self.motion.motion_version = self.config.motion_version
 
     def begin_program(self) -> None:
         """Make the first motion of a program start slowly."""

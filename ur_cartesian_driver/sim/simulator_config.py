@@ -20,6 +20,7 @@ from ur_cartesian_driver.motion.goal.declared_types import declare_types
 from ur_cartesian_driver.sim.faults.fault_values import Fault
 from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
+from ur_cartesian_driver.sim.motion.paths.second_motion_version import SecondMotionVersion
 from ur_cartesian_driver.sim.pendant_programs.program_tree import BUILT_IN_PROGRAMS, ProgramTree
 from ur_cartesian_driver.sim.state.controller_io import DigitalPort
 
@@ -34,6 +35,8 @@ MAX_RATE = 1e4
 _PRIMARY_PORT = 30001
 #: Not port 80 as on a real robot, because only root can open it.
 _ROBOT_API_PORT = 8000
+#: The first software with motion version 2.
+_SECOND_MOTION_VERSION = (5, 22)
 _DEFAULT_VERSIONS = {'CB3': '3.15.8', 'e': '5.21.0'}
 
 
@@ -77,6 +80,11 @@ class SimulatorConfig:
     has_remote_control: bool = True
     #: Rotation [rad] that takes as long in a movel as a metre; 4 was recorded, the manual has 1.
     turn_ratio: float = TURN_RATIO
+    #: Motion version of movej and movel at the start, and of programs that are played: 1 or, from
+    #: PolyScope 5.22 on, 2. Programs can set another one.
+    motion_version: int = 1
+    #: Figures of motion version 2, which are assumed.
+    second_motion_version: SecondMotionVersion = field(default_factory=SecondMotionVersion)
     #: Denavit-Hartenberg parameters of this arm; None = the nominal parameters of the model.
     geometry: DhTable | None = None
     #: Joint limits of this arm, if they are tighter than the model's; None = the model's. The arm
@@ -175,6 +183,13 @@ class SimulatorConfig:
             raise ValueError(
                 f'polyscope {self.polyscope} does not run a {self.model}; use 3.x '
                 'for CB3 models and 5.x for all others.'
+            )
+        if self.motion_version not in (1, 2):
+            raise ValueError(f'motion_version is {self.motion_version}; use 1 or 2.')
+        if self.motion_version == 2 and self.version[:2] < _SECOND_MOTION_VERSION:
+            raise ValueError(
+                f'motion_version is 2, but polyscope is {".".join(map(str, self.version[:2]))}; '
+                'use 5.22 or newer.'
             )
 
     @property

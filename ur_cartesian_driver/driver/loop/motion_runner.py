@@ -376,6 +376,7 @@ class MotionRunner:
             robot={
                 'model': status.robot_model,
                 'polyscope_version': status.polyscope_version,
+                'motion_version': status.motion_version,
                 'serial_number': status.serial_number,
             },
         )

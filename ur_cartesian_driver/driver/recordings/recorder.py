@@ -69,7 +69,7 @@ def plan_metadata(plan: Plan, options: PlanningOptions) -> str:
 def motion_metadata(
     job: MotionJob,
     *,
-    robot: Mapping[str, str],
+    robot: Mapping[str, str | int],
     parameters: DriverConfig,
     plan_metadata_json: str = '',
     mode: str = '',
@@ -77,7 +77,7 @@ def motion_metadata(
     """
     Return the metadata of a motion that begins now.
 
-    :param robot: the robot's model, PolyScope version and serial number.
+    :param robot: the robot's model, PolyScope version, motion version and serial number.
     :param parameters: the configuration of the driver.
     :param plan_metadata_json: the result of :func:`plan_metadata`; '' = there is none.
     :param mode: the kind of a motion without a plan; '' = the motion has a plan.

@@ -492,12 +492,12 @@ class GoalMachine:
 
     def _failure_text(self) -> str:
         """Return the sentence of a goal that failed: the cause, and the place."""
-        location = 'before anything moved'
+        location, laws = 'before anything moved', ''
         if self._code is ErrorCode.GOAL_TOLERANCE_VIOLATED:
-            location = 'at the last point'
+            location, laws = 'at the last point', self._monitor.law_clause()
         elif own := self.can.phrasing.location(started=self._has_moved):
             location = own
         elif self._has_moved:
             location = self._monitor.location()
         text = self._text if location in self._text else f'{self._text} ({location})'
-        return text[:1].upper() + text[1:] + '.'
+        return f'{text[:1].upper()}{text[1:]}{laws}.'

@@ -290,14 +290,26 @@ class GoalMonitor:
         :param may_stand_still: whether a still arm is no fault.
         """
         if clause := self._plan_deviation(state) or self._late_call() or self._wrong_speed(state):
-            return GoalSignal.DEVIATION, clause
+            return GoalSignal.DEVIATION, clause + self.law_clause()
         if self._standstill.is_long and not may_stand_still:
             longest_wait = max(self._input_wait()[0], self.script_call()[0])
             if clause := self._standstill.violation(longest_wait):
                 return GoalSignal.STANDSTILL, clause
         if clause := self._path_violation(state):
+            clause += self.law_clause()
             return GoalSignal.VIOLATION, f'on the way to point {self.waypoint()} {clause}'
         return None
+
+    def law_clause(self) -> str:
+        """Return a clause if the robot's moves follow other laws than the plan, else ''."""
+        job, version = self.job, 0 if self.latest is None else self.latest.motion_version
+        is_moves = job.reports_points_begun and not job.execution.traits.is_spline
+        if not is_moves or version <= 1:
+            return ''
+        return (
+            f'; the robot moves by motion version {version}, but the plan follows the laws of '
+            'version 1 (motion_version: 1 sets version 1)'
+        )
 
     def start_offset(self, state: RobotState) -> str | None:
         """Return a clause if the arm is away from the start of the plan, else None."""

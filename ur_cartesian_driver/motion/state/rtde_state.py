@@ -164,6 +164,8 @@ class RobotState:
     program_run: Annotated[int, Rtde('output_int_register_34', optional=True)] = 0
     #: Token of the last request to set safe outputs that our robot program has carried out.
     safe_outputs_token: Annotated[int, Rtde('output_int_register_35', optional=True)] = 0
+    #: Motion version of movej and movel when our robot program connected; 0 = unknown.
+    motion_version: Annotated[int, Rtde('output_int_register_36', optional=True)] = 0
     #: How fast the motion of the program runs, 0 to 1; :mod:`~.effective_speed` computes it from
     #: this packet and the earlier ones.
     effective_speed: Annotated[float, None] = 1.0

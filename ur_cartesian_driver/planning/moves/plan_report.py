@@ -79,7 +79,18 @@ def blend_remarks(goal: Goal, geometries: SegmentGeometries, timings: SegmentTim
         clause = f', more than goal_time_tolerance ({tolerance:g} s)'
     return [
         f'blends: the end may be up to {off:.3f} s off{clause}, because how the robot passes them '
-        'is not published'
+        'is not published; planned as assumed for motion version 1'
+    ]
+
+
+def motion_version_remarks(motion_version: int) -> list[str]:
+    """Return the remark on a robot whose moves follow other laws than plans do; 0 = unknown."""
+    if motion_version <= 1:
+        return []
+    return [
+        f'the robot moves by motion version {motion_version}, but the plan follows the laws of '
+        'version 1: times will differ a little, and blends may be smaller (motion_version: 1 sets '
+        'version 1)'
     ]
 
 

@@ -253,8 +253,8 @@ class _SlowMoves:
                 (row, path.u_leave[row], row + 1, path.u_join[row + 1]),
                 low,
                 SlowCause.IN_BLEND,
-                f'of the blend at point {self._geometries.begin + row} (as assumed: how fast the '
-                'robot passes blends is not published)',
+                f'of the blend at point {self._geometries.begin + row} (as assumed for motion '
+                'version 1: how fast the robot passes blends is not published)',
                 self._geometries.begin + row,
                 asked=wish,
             )

@@ -34,6 +34,7 @@ from the program   int         32         version of the program (:data:`PROGRAM
 from the program   int         33         random number, drawn when the program was rendered
 from the program   int         34         count of connections, changes with each connection
 from the program   int         35         token of the last SET_SAFE_OUTPUTS that was carried out
+from the program   int         36         motion version of movej and movel; 0 = unknown
 =================  ==========  =========  ====================================================
 
 The program's ints from 26 up are ours; a program that follows the guide lacks them. The counts in
@@ -42,7 +43,8 @@ path offsets are ours, too. They share numbers with the servo's, which are unuse
 
 The ints 32 to 34 prove to the driver that the program is its own. The program writes them, the
 count last, when it has read the first message on the reverse socket. Register values outlive
-programs, so version and number are valid only after the count has changed on this connection.
+programs, so version and number are valid only after the count has changed on this connection; so
+is the motion version, which the program writes before the count.
 """
 
 from __future__ import annotations
@@ -86,6 +88,7 @@ class OutputInteger(IntEnum):
     PROGRAM_NUMBER = 33
     PROGRAM_RUN = 34
     SAFE_OUTPUTS_TOKEN = 35
+    MOTION_VERSION = 36
 
 
 class OutputDouble(IntEnum):

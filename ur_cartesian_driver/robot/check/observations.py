@@ -3,8 +3,8 @@
 """
 Observations of a robot that neither move it nor change its settings.
 
-Two of them leave a trace: RTDE inputs are requested and released without a write, and a secondary
-program writes one line to the robot's log.
+Some leave a trace: RTDE inputs are requested and released without a write, and secondary programs
+write one or two lines to the robot's log.
 """
 
 from __future__ import annotations

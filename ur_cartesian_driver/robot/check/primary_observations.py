@@ -13,6 +13,7 @@ from typing import Any
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model
 from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.program.render import has_feature
 from ur_cartesian_driver.protocol.client_interfaces.primary_state import ConfigurationData
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.check.finding import (
@@ -23,12 +24,20 @@ from ur_cartesian_driver.robot.check.finding import (
     RobotAddress,
     skipped,
 )
+from ur_cartesian_driver.robot.connection_status import motion_version_text
 from ur_cartesian_driver.robot.link import model_names
 from ur_cartesian_driver.robot.primary_client import PrimaryCallbacks, PrimaryClient
+from ur_cartesian_driver.robot.services.dashboard_connection import POLYSCOPE_X
 
 #: A line for the log, and a secondary program that only writes this line.
 RIGHTS_MARK = 'ur-cartesian check-robot'
 RIGHTS_PROGRAM = f'sec ur_check_rights():\n  textmsg("{RIGHTS_MARK}")\nend\n'.encode()
+#: A secondary program that writes the motion version behind this text.
+MOTION_VERSION_MARK = f'{RIGHTS_MARK}: motion version '
+MOTION_VERSION_PROGRAM = (
+    'sec ur_check_motion_version():\n'
+    f'  textmsg("{MOTION_VERSION_MARK}", motion_version_get())\nend\n'
+).encode()
 #: Error code of a request that the robot refuses because it is in local control.
 LOCAL_CONTROL = 'C210'
 #: How long the robot may take to report its configuration, then its kinematics, and to run
@@ -137,7 +146,10 @@ async def observe_primary(
             yield _model(models)
             yield _limits(configuration)
             yield _calibration(models[0], await probe.find_geometry(), state)
-        yield await _rights(probe)
+        rights = await _rights(probe)
+        yield rights
+        if version is not None:
+            yield await _motion_version(probe, version, takes_scripts=rights.data['accepted'])
     finally:
         await probe.close()
 
@@ -214,3 +226,20 @@ async def _rights(probe: PrimaryProbe) -> Finding:
         'remote control.',
         accepted=False,
     )
+
+
+async def _motion_version(
+    probe: PrimaryProbe, version: ControllerVersion, *, takes_scripts: bool
+) -> Finding:
+    """Ask for the motion version of movej and movel where the software has several."""
+    check = 'motion_version'
+    known = has_feature(check, (version.major, version.minor, version.bugfix))
+    if not known and version.major < POLYSCOPE_X:
+        return ok(check, 'The software has motion version 1 only.', motion_version=1)
+    if not (known and takes_scripts):
+        return note(check, motion_version_text(0), motion_version=0)
+    probe.send(MOTION_VERSION_PROGRAM)
+    line = await probe.find_line(MOTION_VERSION_MARK)
+    number = line.removeprefix(MOTION_VERSION_MARK).strip()
+    found = int(number) if number.isdecimal() else 0
+    return (ok if found == 1 else note)(check, motion_version_text(found), motion_version=found)

@@ -147,6 +147,7 @@ class ProgramSockets:
                 servo_buffer_depth=s.servo_buffer_depth,
                 allow_freedrive=s.allow_freedrive,
                 lower_registers=s.lower_registers,
+                motion_version=s.motion_version,
                 prelude=s.prelude,
             )
         )

@@ -32,6 +32,7 @@ def diagnostics_message(driver: Driver, node_name: str, stamp: Time) -> Diagnost
         'program': 'UNKNOWN' if state is None else state.runtime_state.name,
         'robot program connected': str(status.program_running),
         'robot program made by this driver': str(status.program_is_own),
+        'motion version': str(status.motion_version or 'UNKNOWN'),
         'speed scaling': '' if state is None else f'{state.effective_speed:.3f}',
         'robot address': driver.config.robot_ip,
         'robot model': status.robot_model,

@@ -133,17 +133,16 @@ class StoredSettingsBuiltins(BuiltinGroup):
     """
     Settings that programs can read back, and that outlive them.
 
-    Motions do not depend on them: they are those of motion version 1, because all recordings are
-    of software before 5.22.
+    Motions depend on the motion version alone.
     """
 
     def motion_version_set(self, version: Value) -> None:
-        """Choose the version of the motion generator; both versions move alike here."""
-        self._controller.stored.motion_version = one_of(version, 'version', (1, 2))
+        """Choose the motion version by which `movej` and `movel` run from now on: 1 or 2."""
+        self._controller.motion.motion_version = one_of(version, 'version', (1, 2))
 
     def motion_version_get(self) -> int:
-        """Return the version of the motion generator."""
-        return self._controller.stored.motion_version
+        """Return the motion version of `movej` and `movel`."""
+        return self._controller.motion.motion_version
 
     def jerk_gain_scaling_set(self, scaling: Value) -> None:
         """Set the factor (0.01..1) on the jerk of smooth moves; they move alike here."""

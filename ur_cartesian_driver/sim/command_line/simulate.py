@@ -60,6 +60,7 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
         contacts=arguments.contacts,
         inputs=arguments.inputs,
         answers=arguments.answers,
+        motion_version=arguments.motion_version,
         imperfections=imperfections(arguments),
         geometry=calibration(arguments, robot_model(arguments.model)),
         programs=dict(map(_read_program, files)),

@@ -60,6 +60,13 @@ def _add_arm(command: argparse.ArgumentParser) -> None:
         'recorded on real robots',
     )
     command.add_argument(
+        '--motion-version',
+        type=int,
+        default=1,
+        choices=(1, 2),
+        help='how movej and movel run, as the installation sets it; 2 needs --polyscope 5.22',
+    )
+    command.add_argument(
         '--rate',
         type=float,
         default=1.0,

@@ -51,6 +51,7 @@ from ur_cartesian_driver.sim.motion.paths.move_paths import (
 )
 from ur_cartesian_driver.sim.motion.paths.path_motion import PathMotion, ProfileParameters
 from ur_cartesian_driver.sim.motion.paths.path_queue import PathQueue
+from ur_cartesian_driver.sim.motion.paths.second_motion_version import SecondMotionVersion
 from ur_cartesian_driver.sim.motion.running_motion import RunningMotion
 from ur_cartesian_driver.sim.motion.servo_motions import (
     JointSpeedMotion,
@@ -90,6 +91,9 @@ class MotionGenerator:
         self.max_tool_speed = MAX_TOOL_SPEED
         #: Speed at which movel turns the tool for each m/s of its ``v`` [rad/s].
         self.turn_ratio = 1.0
+        #: The motion version of movej and movel, 1 or 2; and what version 2 does.
+        self.motion_version = 1
+        self.second_version = SecondMotionVersion()
         #: The target of the motion, without the path offset.
         self._target = ArmTarget(arm, cycle, q)
         #: The offset that a program adds to the target.
@@ -252,8 +256,25 @@ class MotionGenerator:
         if not 0.0 <= radius < inf:
             raise MotionError(f'{name}: the blend radius is {radius:g} m, it must be 0 or more.')
         call = MotionCall(name, move_path, parameters, radius, Move())
+        if self.motion_version == 2 and isinstance(parameters, ProfileParameters):
+            call = self._by_second_version(call, parameters)
         self._paths.begin(call)
         return call.move
+
+    def _by_second_version(self, call: MotionCall, asked: ProfileParameters) -> MotionCall:
+        """Return a call as motion version 2 carries it out, if it is a movej or movel."""
+        if call.name not in ('movej', 'movel'):
+            return call
+        version, target = self.second_version, self._target
+
+        def parameters(move_path: MovePath, start: PathStart) -> ProfileParameters:
+            most = target.kinematics.fastest_parameters(
+                move_path, start.q, target.T_tcp_flange, 1.0, 1.0
+            )
+            return version.parameters(asked, move_path.length, most)
+
+        radius = version.blend_fraction * call.radius
+        return call._replace(parameters=parameters, radius=radius, version=version)
 
     def _joint_path(self, name: str, q: Vector6) -> Callable[[PathStart], MovePath]:
         for i, (angle, (low, high)) in enumerate(

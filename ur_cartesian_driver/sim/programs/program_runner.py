@@ -82,6 +82,9 @@ class ProgramArm(Protocol):
     def brake(self) -> None:
         """Stop the arm because the program has ended."""
 
+    def run_preamble(self) -> None:
+        """Set what the installation sets in front of a program that the pendant starts."""
+
     def begin_program(self) -> None:
         """Get ready for the first motion of a program."""
 
@@ -300,6 +303,7 @@ class ProgramRunner:
         elif not self.running:
             if self._loaded is None:
                 return 'no program is loaded'
+            self._arm.run_preamble()
             if isinstance(self._loaded, ScriptProgram):
                 self._queue_start(self.loaded, self._compile(self._loaded))
             elif self._awaited is None:

@@ -47,7 +47,6 @@ class Pendant:
 class StoredSettings:
     """Settings that programs make and read back; they outlive programs, and change no motion."""
 
-    motion_version: int = 1
     #: 0.01 to 1.
     jerk_gain_scaling: float = 1.0
     #: 0 to 1.

@@ -13,6 +13,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.sim.motion.motion_values import MotionError, Move
 from ur_cartesian_driver.sim.motion.paths.move_paths import MovePath
 from ur_cartesian_driver.sim.motion.paths.path_motion import ProfileParameters
+from ur_cartesian_driver.sim.motion.paths.second_motion_version import SecondMotionVersion
 
 
 class PathStart(NamedTuple):
@@ -33,6 +34,8 @@ class MotionCall(NamedTuple):
     parameters: ProfileParameters | ParameterFunction
     radius: float
     move: Move
+    #: The law by which blend radii are reduced; None = motion version 1, which does not.
+    version: SecondMotionVersion | None = None
 
     def parameters_of(self, move_path: MovePath, start: PathStart) -> ProfileParameters:
         """Return the profile parameters of this call for its path."""

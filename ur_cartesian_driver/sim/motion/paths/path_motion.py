@@ -192,6 +192,13 @@ def start_from_rest(
     return PathMotion((section,), LastMove(move_path, parameters, radius, entry, call), 0, spare)
 
 
+def with_blend_radius(path_motion: PathMotion, radius: float) -> PathMotion:
+    """Return the motion with another blend radius [m] at its last waypoint."""
+    last_move = path_motion.last_move
+    entry = _blend_entry_time(path_motion.sections[-1], last_move.move_path, radius)
+    return replace(path_motion, last_move=replace(last_move, radius=radius, entry=entry))
+
+
 def append_move_path(
     path_motion: PathMotion,
     move_path: MovePath,

@@ -27,6 +27,7 @@ from ur_cartesian_driver.sim.motion.paths.path_motion import (
     append_move_path,
     PathMotion,
     start_from_rest,
+    with_blend_radius,
 )
 from ur_cartesian_driver.sim.motion.running_motion import RunningMotion, UNATTENDED_DECELERATION
 
@@ -122,6 +123,9 @@ class PathQueue:
         start = PathStart(target.q, target.T_base_tcp)
         move_path = call.move_path(start)
         parameters = call.parameters_of(move_path, start)
+        if call.version is not None:
+            travel = _distance_to_waypoint(start.pose, move_path)
+            call = call._replace(radius=call.version.reduced_radii(0.0, call.radius, travel)[1])
         path_motion = start_from_rest(move_path, parameters, call.radius, call.move, self._spare)
         margin = _distance_to_waypoint(start.pose, move_path) - call.radius
         self._follow(None, path_motion, call, margin)
@@ -137,6 +141,11 @@ class PathQueue:
             return
         start = PathStart(q or self._target.q, pose)
         move_path = call.move_path(start)
+        travel = _distance_to_waypoint(pose, move_path)
+        if call.version is not None:
+            before, after = call.version.reduced_radii(last.radius, call.radius, travel)
+            path_motion, call = with_blend_radius(path_motion, before), call._replace(radius=after)
+            last = path_motion.last_move
         blended, is_blended = append_move_path(
             path_motion,
             move_path,
@@ -145,7 +154,6 @@ class PathQueue:
             call.move,
             circular=call.name == 'movep' and self._after_movep,
         )
-        travel = _distance_to_waypoint(pose, move_path)
         if not is_blended and call.radius <= 0.0 and travel <= last.radius:
             self._reports.waypoint_within_blend(call.name)
         margin = travel - call.radius - (last.radius if call.radius > 0.0 else 0.0)
