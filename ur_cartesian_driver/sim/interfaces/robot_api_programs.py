@@ -19,10 +19,12 @@ from ur_cartesian_driver.sim.programs.stored_programs import read_urpx
 
 
 def list_programs(controller: Controller, _: Body) -> Fields:
-    """Return the information about each program."""
+    """Return the information about each program, in the order of their names."""
     files = controller.stored_programs
     return {
-        'programs': [files.urpx(name)['program']['programInformation'] for name in files.names()],
+        'programs': [
+            files.urpx(name)['program']['programInformation'] for name in sorted(files.names())
+        ],
         'message': None,
     }
 
