@@ -12,10 +12,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 import json
 from pathlib import PurePosixPath
-import re
 from typing import Any
 
-from ur_cartesian_driver.sim.pendant_programs.program_tree import FetchedScript, ProgramTree
+from ur_cartesian_driver.sim.pendant_programs.program_tree import (
+    FetchedScript,
+    function_name,
+    ProgramTree,
+)
 
 #: Suffix of the programs of PolyScope X.
 URPX_SUFFIX = '.urpx'
@@ -100,4 +103,4 @@ def _script_of(name: str, content: Mapping[str, Any]) -> str:
     if script.lstrip().startswith('def '):
         return script
     application = _text_in(content, 'application', 'urscript', 'script')
-    return f'def {re.sub(r"[^A-Za-z0-9_]", "_", f"p_{name}")}():\n{application}\n{script}\nend\n'
+    return f'def {function_name(name)}():\n{application}\n{script}\nend\n'
