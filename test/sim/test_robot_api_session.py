@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from robot_ports import FREE, HOST
+from urp_text import urpx
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode
@@ -197,20 +198,6 @@ def test_popups_log_and_identity():
     assert not user.controller.popups
     assert user.ask('DELETE', '/popup/v1/safety')[0] == 404
     assert user.ask('POST', '/system/v1/log', {'message': 'a line'})[0] == 200
-
-
-def urpx(name, script, **application):
-    """Return the content of a file as PolyScope X writes it, without what nobody reads."""
-    information = {'name': name, 'description': '', 'programState': 'FINAL'}
-    return {
-        'application': application,
-        'program': {
-            'id': '5',
-            'programContent': {'children': []},
-            'programInformation': information,
-            'urscript': {'script': script, 'nodeIDList': []},
-        },
-    }
 
 
 def form(method, content, path=API + '/programs/v1/', field='file'):

@@ -15,6 +15,7 @@ from ur_cartesian_driver.sim.interfaces.robot_api_fields import (
     Refused,
     text_field,
 )
+from ur_cartesian_driver.sim.pendant_programs.program_tree import UnreadableProgram
 from ur_cartesian_driver.sim.programs.stored_programs import read_urpx
 
 
@@ -32,9 +33,13 @@ def list_programs(controller: Controller, _: Body) -> Fields:
 def download_program(controller: Controller, body: Body) -> Fields:
     """Return the content of a program's file."""
     name = text_field(body, 'name')
-    if name not in controller.stored_programs.names():
+    files = controller.stored_programs
+    if name not in files.names():
         raise Refused(HTTPStatus.NOT_FOUND, 'Program not found', details=name)
-    return controller.stored_programs.urpx(name)
+    program = files.program(files.names()[name])
+    if isinstance(program, UnreadableProgram):
+        raise Refused(HTTPStatus.INTERNAL_SERVER_ERROR, 'Error', details=program.reason)
+    return files.urpx(name)
 
 
 def upload_program(controller: Controller, body: Body) -> Fields:

@@ -82,6 +82,18 @@ class ProgramTree:
         return '\n'.join([*lines, 'end', ''])
 
 
+@dataclass(frozen=True, slots=True)
+class UnreadableProgram:
+    """A program that the robot has on its disk, but refuses to load."""
+
+    #: Why, as a sentence without its full stop.
+    reason: str
+
+
+#: A program on the disk of a robot: URScript, a tree, or why it is neither.
+SavedProgram: TypeAlias = str | ProgramTree | UnreadableProgram
+
+
 def function_name(program: str) -> str:
     """Return the name of a program's function: that of the program, as far as URScript allows."""
     name = re.sub(r'\W', '_', program, flags=re.ASCII) or 'program'
