@@ -48,7 +48,7 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
     programs, loaded = {}, ''
     if arguments.programs:
         found = [file for file in arguments.programs.iterdir() if file.suffix in _READERS]
-        # Of two files with one name the last one counts: PolyScope writes a .script beside a .urp.
+        # PolyScope writes a .script beside each .urp, which comes later and takes its place.
         programs = dict(map(_read_if_possible, sorted(found, key=lambda file: file.suffix)))
     if arguments.program and _is_built_in(arguments.program):
         loaded = str(arguments.program)
@@ -119,7 +119,7 @@ def _read_urp(file: Path) -> tuple[str, SavedProgram]:
 
 
 def _read_urpx(file: Path) -> tuple[str, str]:
-    """Return a program of PolyScope X by the name that its file contains."""
+    """Return the name in a file of PolyScope X, with the suffix, and the URScript."""
     try:
         name, content = read_urpx(file.read_bytes())
     except (ValueError, RecursionError) as error:
