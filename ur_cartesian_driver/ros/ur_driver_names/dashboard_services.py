@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
-import re
 from typing import Any
 
 from std_srvs.srv import Trigger
@@ -23,6 +22,7 @@ from ur_cartesian_driver.protocol.dashboard import (
     DashboardRequest,
     parse_reply,
 )
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
 from ur_cartesian_driver.ros.message_fields import Message
 from ur_cartesian_driver.ros.services.deferred_service import completed_answer
@@ -105,22 +105,18 @@ def _remote_control(response: Message, value: str) -> None:
 
 
 def _version(response: Message, value: str) -> None:
-    numbers = version_numbers(value)
-    response.version.major, response.version.minor = numbers[:2]
-    response.version.bugfix, response.version.build = numbers[2:]
+    fill_version(response.version, value)
 
 
-def version_numbers(text: str) -> tuple[int, int, int, int]:
+def fill_version(message: Message, text: str) -> None:
     """
-    Return major, minor, bugfix and build of a text like ``5.21.0.1``; missing ones are 0.
+    Write the version in a text into the fields of a message.
 
     :raises ValueError: the text has no version.
     """
-    found = re.search(r'(\d+)\.(\d+)(?:\.(\d+))?(?:\.(\d+))?', text)
-    if found is None:
-        raise ValueError(text)
-    major, minor, bugfix, build = (int(number or 0) for number in found.groups())
-    return major, minor, bugfix, build
+    version = ControllerVersion.parse(text)
+    message.major, message.minor = version.major, version.minor
+    message.bugfix, message.build = version.bugfix, version.build
 
 
 def _model(response: Message, value: str) -> None:
