@@ -5,7 +5,7 @@
 from dataclasses import replace
 
 import pytest
-from robot_cell import PENDANT_PROGRAM, RobotCell, run_cell
+from robot_cell import PENDANT_PROGRAM, run_cell
 
 from ur_cartesian_driver.driver.ipc.channel import CallAnswered, CallRobot
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -23,6 +23,17 @@ from ur_cartesian_driver.sim.pendant_programs.program_tree import (
 pytestmark = [pytest.mark.acceptance]
 
 ARM = Arm(robot_model('ur5e'))
+#: A program of the pendant with a motion of its own behind the node.
+MOTION_BEHIND_NODE = ProgramTree(
+    (
+        ExternalControlNode(),
+        ScriptText(
+            'set_standard_digital_out(3, True)\n'
+            'movej(get_target_joint_positions() + [0.1, 0, 0, 0, 0, 0], a=5, v=2)'
+        ),
+    ),
+    loops=True,
+)
 
 
 def start(cell, dy):
@@ -50,18 +61,6 @@ async def call(cell):
     return answers[0]
 
 
-class LoopingCell(RobotCell):
-    """The pendant's program has a node of ours, and goes on behind it with a motion of its own."""
-
-    async def start_robot(self, config):
-        motion = ScriptText(
-            'set_standard_digital_out(3, True)\n'
-            'movej(get_target_joint_positions() + [0.1, 0, 0, 0, 0, 0], a=5, v=2)'
-        )
-        tree = ProgramTree((ExternalControlNode(), motion), loops=True)
-        await super().start_robot(replace(config, programs={PENDANT_PROGRAM: tree}))
-
-
 def test_the_pendants_program_goes_on_and_brings_the_arm_back():
     async def scenario(cell):
         motion = start(cell, 0.05)
@@ -82,7 +81,7 @@ def test_the_pendants_program_goes_on_and_brings_the_arm_back():
         await cell.until(lambda: motion.outcome, 5.0)
         assert motion.outcome.code is ErrorCode.SUCCESSFUL
 
-    run_cell(scenario, headless=False, cell=LoopingCell)
+    run_cell(scenario, headless=False, robot={'programs': {PENDANT_PROGRAM: MOTION_BEHIND_NODE}})
 
 
 def test_headless_there_is_nothing_behind_the_program():

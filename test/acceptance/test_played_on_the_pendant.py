@@ -45,17 +45,12 @@ TREES = (
 
 
 class PendantCell(RobotCell):
-    """A robot whose program on the pendant is drawn, and a person in front of it."""
-
-    tree = TREES[0]
+    """A robot, a driver that comes and goes, and a person in front of the pendant."""
 
     def __init__(self, *args, **more):
         super().__init__(*args, **more)
         #: How many drivers there were, and whether the last one runs.
         self.drivers, self.driver_runs = 1, True
-
-    async def start_robot(self, config):
-        await super().start_robot(replace(config, programs={PENDANT_PROGRAM: self.tree}))
 
     # ---- what happens -------------------------------------------------------------------------
 
@@ -161,8 +156,11 @@ def test_whatever_happens_the_driver_is_ready_or_says_what_to_do(case):
     steps = [(draw.choice(ACTIONS), draw.uniform(0.0, 1.5)) for _ in range(draw.randint(6, 10))]
     print(f'RANDOM_SEED={SEED}:', *(f'{do.__name__}, {wait:.2f} s;' for do, wait in steps))
 
-    class Cell(PendantCell):
-        tree = draw.choice(TREES)
+    robot = {
+        **ROBOTS[case % 3],
+        'frequency': 125.0,
+        'programs': {PENDANT_PROGRAM: draw.choice(TREES)},
+    }
 
     async def scenario(cell):
         for do, wait in steps:
@@ -184,4 +182,4 @@ def test_whatever_happens_the_driver_is_ready_or_says_what_to_do(case):
         print('followed:', followed)
         await run_goal(cell)
 
-    run_cell(scenario, headless=False, robot=ROBOTS[case % 3] | {'frequency': 125.0}, cell=Cell)
+    run_cell(scenario, headless=False, robot=robot, cell=PendantCell)

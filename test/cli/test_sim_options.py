@@ -5,9 +5,10 @@
 from __future__ import annotations
 
 import contextlib
+import json
 
 import pytest
-from urp_text import script_line, urp_text
+from urp_text import script_line, urp_text, urpx
 
 from ur_cartesian_driver.cli import main, parser
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -20,6 +21,8 @@ from ur_cartesian_driver.sim.faults.fault_values import (
     EventFault,
     FaultEvent,
 )
+from ur_cartesian_driver.sim.interfaces.dashboard_session import DashboardHandlers
+from ur_cartesian_driver.sim.interfaces.robot_api_session import BASE_PATH, RobotApiSession
 from ur_cartesian_driver.sim.pendant_programs.program_tree import ScriptText
 
 
@@ -149,6 +152,71 @@ def test_every_simulated_robot_has_external_control():
     config = simulator_config(arguments)
     assert config.program == 'external_control.urp'
     assert config.saved_programs[config.program].has_external_control
+
+
+def config_of(*words):
+    return simulator_config(parser().parse_args(['sim', *map(str, words)]))
+
+
+def test_a_program_of_polyscope_x_has_the_name_in_its_file(tmp_path):
+    file = tmp_path / '17.urpx'
+    file.write_text(json.dumps(urpx('weld it', 'textmsg("arc")')))
+    config = config_of('--polyscope', '10.14', '--program', file)
+    assert config.program == 'weld it.urpx'
+    controller = assemble(config).controller
+    assert controller.programs.play() == ''
+    controller.step()
+    assert list(controller.messages.log) == ['arc']
+    assert config_of('--programs', tmp_path).programs == config.programs
+
+
+def test_a_program_of_polyscope_x_is_refused_by_older_software(tmp_path, capsys):
+    file = tmp_path / 'weld.urpx'
+    file.write_text(json.dumps(urpx('weld', 'textmsg("arc")')))
+    assert main(['sim', '--polyscope', '5.21', '--program', str(file)]) == 1
+    sentence = 'weld.urpx is a program of PolyScope X, and the robot has PolyScope 5.21'
+    assert sentence in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('name', 'data', 'reason'),
+    [
+        ('a.urp', urp_text('<MoveJ/>').encode(), 'has a node <MoveJ>, which'),
+        ('a.urpx', b'def a():\nend\n', 'is no program file of PolyScope X: '),
+        ('a.urpx', b'[' * 100_000, 'is no program file of PolyScope X: '),
+        ('a.script', b'textmsg("\xe4")', 'is no text in UTF-8'),
+        ('a.urp', None, 'No such file'),
+    ],
+)
+def test_a_directory_lists_the_programs_that_cannot_be_loaded(
+    tmp_path, caplog, name, data, reason
+):
+    """The other programs are loaded, as on a robot, and the reason is given when one asks."""
+    file = tmp_path / name
+    if data is None:
+        file.symlink_to(tmp_path / 'nowhere')
+    else:
+        file.write_bytes(data)
+    (tmp_path / 'good.urp').write_text(urp_text(script_line('sync()')))
+    config = config_of('--polyscope', '10.14', '--programs', tmp_path)
+    controller = assemble(config).controller
+    session = RobotApiSession(controller)
+    assert {'a', 'good'} <= set(controller.stored_programs.names())
+    body = b'{"name": "a"}'
+    head = f'PUT {BASE_PATH}/program/v1/loaded HTTP/1.1\r\nContent-Length: {len(body)}\r\n\r\n'
+    answers = [session.feed(head.encode() + body).decode()]
+    answers.append(
+        session.feed(f'GET {BASE_PATH}/programs/v1/a HTTP/1.1\r\n\r\n'.encode()).decode()
+    )
+    for answer in answers:
+        assert '500' in answer.splitlines()[0]
+        assert str(file) in answer
+        assert reason in answer
+    [key] = set(config.programs) - {'good.urp'}
+    assert DashboardHandlers(controller).load(key) == f'Error while loading program: {key}'
+    assert reason in controller.messages.log[-1]
+    assert reason in caplog.text
+    assert controller.load_program('good.urp') == ''
 
 
 def test_a_program_of_polyscope_with_other_nodes_is_refused_in_one_sentence(tmp_path, capsys):

@@ -304,3 +304,23 @@ def test_random_bytes_from_a_controller_raise_nothing_but_a_remote_error(chunks,
         for chunk in chunks:
             client.feed(chunk or b'\0')
             assert len(client.data_to_send()) < 200
+
+
+@pytest.mark.parametrize(
+    ('text', 'numbers'),
+    [
+        ('5.21.0.1', (5, 21, 0, 1)),
+        ('3.15', (3, 15, 0, 0)),
+        ('URSoftware 5.12.4.1101661 (Aug 10 2022)', (5, 12, 4, 1101661)),
+    ],
+)
+def test_a_version_is_found_in_a_text(text, numbers):
+    version = ControllerVersion.parse(text)
+    assert (*version.release, version.build) == numbers
+    assert ControllerVersion.parse(str(version)) == version
+
+
+@pytest.mark.parametrize('text', ['', '5', 'PolyScope X'])
+def test_a_text_without_a_version_is_refused(text):
+    with pytest.raises(ValueError, match='has no version like'):
+        ControllerVersion.parse(text)

@@ -10,12 +10,11 @@ library and of a documentation of the Robot API by others.
 import asyncio
 from collections.abc import Mapping
 from email import message_from_bytes
-import http.server
 import json
-import threading
 from types import SimpleNamespace
 from typing import Any, cast
 
+from documented_robot import documented_robot
 import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
@@ -29,49 +28,16 @@ from ur_cartesian_driver.robot.services.service_calls import (
     UploadProgramCall,
 )
 
-PROGRAMS = '/universal-robots/robot-api/programs/v1/'
+PROGRAMS = '/programs/v1/'
 PROGRAM = json.dumps({'program': {'programInformation': {'name': 'weld ä'}}}, ensure_ascii=False)
 
 
-class Robot(http.server.ThreadingHTTPServer):
-    """Gives one answer to all requests, and keeps them."""
-
-    daemon_threads = True
-
-    def __init__(self, status, answer):
-        super().__init__(('127.0.0.1', 0), Handler)
-        self.status, self.answer, self.requests = status, answer, []
-
-
-class Handler(http.server.BaseHTTPRequestHandler):
-    server: Robot
-
-    def _serve(self):
-        body = self.rfile.read(int(self.headers.get('Content-Length', '0')))
-        self.server.requests.append((self.command, self.path, self.headers, body))
-        self.send_response(self.server.status)
-        self.end_headers()
-        self.wfile.write(self.server.answer)
-
-    do_GET = do_PUT = do_POST = _serve
-
-    def log_message(self, *_):
-        """Be quiet."""
-
-
 def carry_out(call, status=200, answer: Mapping[str, Any] | bytes = b'', version=(10, 12)):
-    """Return the answer to a call, and the requests that the robot got."""
-    raw = answer if isinstance(answer, bytes) else json.dumps(answer).encode()
+    """Return the answer to a call, and the robot that got its requests."""
     link = SimpleNamespace(version=ControllerVersion(major=version[0], minor=version[1], bugfix=0))
-    with Robot(status, raw) as robot:
-        thread = threading.Thread(target=robot.serve_forever, args=(0.01,))
-        thread.start()
-        try:
-            files = ProgramFiles('127.0.0.1', robot.server_address[1], cast(Any, link))
-            return asyncio.run(asyncio.wait_for(files.carry_out(call), 10.0)), robot.requests
-        finally:
-            robot.shutdown()
-            thread.join()
+    with documented_robot((status, answer)) as robot:
+        files = ProgramFiles('127.0.0.1', robot.server_address[1], cast(Any, link))
+        return asyncio.run(asyncio.wait_for(files.carry_out(call), 10.0)), robot
 
 
 def test_programs_are_listed_by_their_names():
@@ -79,9 +45,9 @@ def test_programs_are_listed_by_their_names():
         {'name': 'weld', 'description': None, 'createdDate': 1, 'programState': 'FINAL'},
         {'name': 'Default program'},
     ]
-    answer, requests = carry_out(ListProgramsCall(), answer={'programs': programs})
+    answer, robot = carry_out(ListProgramsCall(), answer={'programs': programs})
     assert (answer.ok, answer.text) == (True, 'weld\nDefault program')
-    assert [(method, path) for method, path, *_ in requests] == [('GET', PROGRAMS)]
+    assert robot.requests == [('GET', PROGRAMS, None)]
 
 
 @pytest.mark.parametrize('answer', [b'', b'[]', b'{"programs": null}', b'{"programs": [{}]}'])
@@ -92,12 +58,12 @@ def test_a_list_without_names_is_an_error(answer):
 
 @pytest.mark.parametrize(('replaces', 'method'), [(False, 'POST'), (True, 'PUT')])
 def test_a_program_is_sent_as_the_file_of_a_form(replaces, method):
-    answer, requests = carry_out(
+    answer, robot = carry_out(
         UploadProgramCall(program=PROGRAM, replaces=replaces), answer={'programName': 'weld ä'}
     )
     assert (answer.ok, answer.text) == (True, 'weld ä')
-    [(sent_method, path, headers, body)] = requests
-    assert (sent_method, path) == (method, PROGRAMS)
+    assert robot.requests == [(method, PROGRAMS, None)]
+    [(headers, body)] = robot.contents
     form = message_from_bytes(f'Content-Type: {headers["Content-Type"]}\r\n\r\n'.encode() + body)
     [part] = cast(Any, form.get_payload())
     assert part.get_param('name', header='content-disposition') == 'file'
@@ -107,11 +73,9 @@ def test_a_program_is_sent_as_the_file_of_a_form(replaces, method):
 
 @pytest.mark.parametrize('name', ['weld it/ä', 'weld it/ä.urpx'])
 def test_a_program_is_downloaded_unchanged(name):
-    answer, requests = carry_out(DownloadProgramCall(program_name=name), answer=PROGRAM.encode())
+    answer, robot = carry_out(DownloadProgramCall(program_name=name), answer=PROGRAM.encode())
     assert (answer.ok, answer.text) == (True, PROGRAM)
-    assert [(method, path) for method, path, *_ in requests] == [
-        ('GET', PROGRAMS + 'weld%20it%2F%C3%A4')
-    ]
+    assert robot.requests == [('GET', PROGRAMS + 'weld%20it%2F%C3%A4', None)]
 
 
 @pytest.mark.parametrize(
@@ -135,10 +99,10 @@ def test_a_refusal_has_the_words_of_the_robot_and_a_remedy(call, status, remedy)
 
 @pytest.mark.parametrize('version', [(3, 15), (5, 21), (10, 11)])
 def test_other_software_is_not_asked(version):
-    answer, requests = carry_out(ListProgramsCall(), version=version)
+    answer, robot = carry_out(ListProgramsCall(), version=version)
     assert not answer.ok
     assert f'from software 10.12 on, but the robot runs {version[0]}.{version[1]}' in answer.text
-    assert not requests
+    assert not robot.requests
 
 
 def test_a_program_that_is_too_long_is_refused_in_both_directions(monkeypatch):

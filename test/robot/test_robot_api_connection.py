@@ -1,78 +1,20 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The Robot API's client with a server that knows nothing of our code.
-
-It is Python's own, and answers as the manufacturer's client library and its tests have it.
-"""
+"""The Robot API's client, with a server that knows nothing of our code."""
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import http.server
-import json
 import threading
 
+from documented_robot import API, documented_robot
 import pytest
 
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.services import robot_api_connection
 from ur_cartesian_driver.robot.services.robot_api_connection import RobotApiConnection
 
-API = '/universal-robots/robot-api'
 NEWEST = ControllerVersion(major=10, minor=14, bugfix=0)
-
-
-class DocumentedRobot(http.server.ThreadingHTTPServer):
-    """Answers each request as it was told to, and keeps the requests."""
-
-    daemon_threads = True
-
-    def __init__(self, answers):
-        super().__init__(('127.0.0.1', 0), _Handler)
-        self.answers, self.requests = dict(answers), []
-
-
-class _Handler(http.server.BaseHTTPRequestHandler):
-    protocol_version = 'HTTP/1.1'
-    server: DocumentedRobot
-
-    def _serve(self):
-        body = self.rfile.read(int(self.headers.get('Content-Length', '0')))
-        path = self.path.removeprefix(API)
-        self.server.requests.append((self.command, path, json.loads(body) if body else None))
-        answer = self.server.answers.get((self.command, path), (404, {'detail': 'Not Found'}))
-        if callable(answer):
-            answer = answer(self)
-        if answer is None:
-            self.close_connection = True
-            return
-        status, fields, *headers = answer
-        data = json.dumps(fields).encode()
-        self.send_response(status)
-        self.send_header('Content-Length', str(len(data)))
-        for name, value in headers:
-            self.send_header(name, value)
-        self.end_headers()
-        self.wfile.write(data)
-
-    do_GET = do_PUT = do_POST = do_DELETE = _serve
-
-    def log_message(self, *_):
-        """Be quiet."""
-
-
-@contextlib.contextmanager
-def robot(answers):
-    with DocumentedRobot(answers) as server:
-        thread = threading.Thread(target=server.serve_forever, args=(0.01,))
-        thread.start()
-        try:
-            yield server
-        finally:
-            server.shutdown()
-            thread.join()
 
 
 def connection(server, version=NEWEST):
@@ -171,14 +113,14 @@ DONE = (200, {'message': None})
 )
 def test_each_command_is_one_request(command, argument, request_, answer, value):
     method, path, _ = request_
-    with robot({(method, path): (200, {'message': None, **answer})}) as server:
+    with documented_robot({(method, path): (200, {'message': None, **answer})}) as server:
         reply = ask(server, command, argument)
         assert reply.value == value
         assert server.requests == [request_]
 
 
 def test_play_of_a_paused_program_is_resume():
-    with robot({('PUT', '/program/v1/state'): DONE}) as server:
+    with documented_robot({('PUT', '/program/v1/state'): DONE}) as server:
         for state, action in ('PAUSED', 'resume'), ('STOPPED', 'play'), ('PLAYING', 'play'):
             server.answers['GET', '/program/v1/state'] = (200, {'state': state})
             assert ask(server, 'play').ok
@@ -188,7 +130,7 @@ def test_play_of_a_paused_program_is_resume():
 def test_a_load_ends_when_the_robot_names_the_program(monkeypatch):
     monkeypatch.setattr(robot_api_connection, 'LOAD_POLL_PERIOD', 0.001)
     names = iter(['before', 'before', 'mine'])
-    with robot(
+    with documented_robot(
         {
             ('PUT', '/program/v1/loaded'): DONE,
             ('GET', '/program/v1/loaded'): lambda _: (200, {'name': next(names)}),
@@ -203,7 +145,7 @@ def test_a_program_that_is_never_loaded_is_an_error(monkeypatch):
     monkeypatch.setattr(robot_api_connection, 'LOAD_POLL_PERIOD', 0.001)
     monkeypatch.setattr(robot_api_connection, 'LOAD_TIMEOUT', 0.02)
     with (
-        robot(
+        documented_robot(
             {
                 ('PUT', '/program/v1/loaded'): DONE,
                 ('GET', '/program/v1/loaded'): (200, {'name': 'another'}),
@@ -215,7 +157,7 @@ def test_a_program_that_is_never_loaded_is_an_error(monkeypatch):
 
 
 def test_software_that_does_not_name_it_is_not_asked():
-    with robot({('PUT', '/program/v1/load'): DONE}) as server:
+    with documented_robot({('PUT', '/program/v1/load'): DONE}) as server:
         version = ControllerVersion(major=10, minor=11, bugfix=0)
         assert ask(server, 'load', 'mine', version).ok
         assert server.requests == [('PUT', '/program/v1/load', {'programName': 'mine'})]
@@ -235,7 +177,7 @@ def test_software_that_does_not_name_it_is_not_asked():
     ],
 )
 def test_a_refusal_is_an_answer(status, fields, text):
-    with robot({('PUT', '/robotstate/v1/state'): (status, fields)}) as server:
+    with documented_robot({('PUT', '/robotstate/v1/state'): (status, fields)}) as server:
         reply = ask(server, 'power on')
         assert not reply.ok
         assert text in reply.text
@@ -245,7 +187,7 @@ def test_a_refusal_is_an_answer(status, fields, text):
 @pytest.mark.parametrize('status', [301, 302, 307, 308])
 def test_a_request_follows_a_path_that_has_moved(status):
     old, new = '/robotstate/v1/state', '/robotstate/v2/state'
-    with robot(
+    with documented_robot(
         {('PUT', old): (status, {}, ('Location', API + new)), ('PUT', new): DONE}
     ) as server:
         assert ask(server, 'power on').ok
@@ -255,7 +197,7 @@ def test_a_request_follows_a_path_that_has_moved(status):
 def test_redirects_end():
     path = '/robotstate/v1/state'
     with (
-        robot({('PUT', path): (307, {}, ('Location', API + path))}) as server,
+        documented_robot({('PUT', path): (307, {}, ('Location', API + path))}) as server,
         pytest.raises(OSError, match='redirects more than 3 times'),
     ):
         ask(server, 'power on')
@@ -265,14 +207,14 @@ def test_redirects_end():
 def test_no_redirect_leads_away_from_the_robot(target):
     path = '/robotstate/v1/state'
     with (
-        robot({('PUT', path): (307, {}, ('Location', target))}) as server,
+        documented_robot({('PUT', path): (307, {}, ('Location', target))}) as server,
         pytest.raises(OSError, match='redirects to another host, or to HTTPS'),
     ):
         ask(server, 'power on')
 
 
 def test_a_robot_that_hangs_up_is_named():
-    with robot({('GET', '/robotstate/v1/robotmode'): lambda _: None}) as server:
+    with documented_robot({('GET', '/robotstate/v1/robotmode'): lambda _: None}) as server:
         port = server.server_address[1]
         with pytest.raises(OSError, match=rf'127\.0\.0\.1 port {port} \(Robot API\): it hangs up'):
             ask(server, 'robotmode')
@@ -297,7 +239,7 @@ def test_a_robot_that_does_not_answer_holds_neither_the_caller_nor_the_loop(monk
         is_free.set()
         assert (await waiting).value == 'RUNNING'
 
-    with robot({('GET', '/robotstate/v1/robotmode'): wait}) as server:
+    with documented_robot({('GET', '/robotstate/v1/robotmode'): wait}) as server:
         asyncio.run(asyncio.wait_for(test(), 10.0))
 
 
@@ -309,7 +251,9 @@ def test_nobody_there_is_named(closed_port):
 def test_an_answer_without_end_is_not_read(monkeypatch):
     monkeypatch.setattr(robot_api_connection, 'MAX_ANSWER_SIZE', 100)
     with (
-        robot({('GET', '/robotstate/v1/robotmode'): (200, {'mode': 'x' * 1000})}) as server,
+        documented_robot(
+            {('GET', '/robotstate/v1/robotmode'): (200, {'mode': 'x' * 1000})}
+        ) as server,
         pytest.raises(OSError, match='longer than 100 bytes'),
     ):
         ask(server, 'robotmode')
@@ -318,5 +262,7 @@ def test_an_answer_without_end_is_not_read(monkeypatch):
 def test_a_proxy_of_the_environment_is_not_asked(monkeypatch):
     for name in 'http_proxy', 'HTTP_PROXY', 'all_proxy':
         monkeypatch.setenv(name, 'http://127.0.0.1:1')
-    with robot({('GET', '/robotstate/v1/robotmode'): (200, {'mode': 'IDLE'})}) as server:
+    with documented_robot(
+        {('GET', '/robotstate/v1/robotmode'): (200, {'mode': 'IDLE'})}
+    ) as server:
         assert ask(server, 'robotmode').value == 'IDLE'

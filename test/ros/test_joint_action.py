@@ -59,11 +59,14 @@ def goal_to(q, seconds=1.0, **fields):
 def test_the_action_is_there_only_where_control_msgs_is(monkeypatch):
     monkeypatch.setitem(sys.modules, 'control_msgs', None)
     assert [type(action) for action in installed_actions()] == [CartesianAction]
+    monkeypatch.setitem(sys.modules, 'ur_msgs', None)  # it may be installed
     package, module = ModuleType('control_msgs'), ModuleType('control_msgs.action')
     vars(module)['FollowJointTrajectory'] = FollowJointTrajectory
     monkeypatch.setitem(sys.modules, 'control_msgs', package)
     monkeypatch.setitem(sys.modules, 'control_msgs.action', module)
-    _, joint_action, *_ = installed_actions()
+    cartesian_action, joint_action = installed_actions()
+    assert type(cartesian_action) is CartesianAction
+    assert type(joint_action) is JointAction
     assert joint_action.name == NAME
     assert joint_action.action_type is FollowJointTrajectory
 

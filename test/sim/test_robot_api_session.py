@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from robot_ports import FREE, HOST
+from urp_text import urpx
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode
@@ -101,6 +102,52 @@ def test_power_brakes_program_and_stop_in_one_conversation():
     assert user.value('/robotstate/v1/robotmode') == {'mode': 'POWER_OFF'}
 
 
+def play_external_control(*events):
+    """Play a program that is being fetched when the events happen; return status and details."""
+    user = ApiUser()
+    hosts = []
+    user.controller.external_control.request = hosts.append
+    assert user.ask('PUT', '/program/v1/loaded', {'name': 'external_control'})[0] == 200
+    play = request_bytes('PUT', f'{API}/program/v1/state', {'action': 'play'})
+    assert not user.session.feed(play)
+    for event in events:
+        event(user.controller, hosts[0])
+    user.controller.step()
+    status, fields, _ = parse(user.session.answers())
+    return status, fields.get('details', '')
+
+
+def answer(text):
+    return lambda _, host: host(text)
+
+
+def test_play_succeeds_when_the_fetched_program_runs():
+    assert play_external_control(answer('sleep(1)')) == (200, '')
+
+
+@pytest.mark.parametrize(
+    ('events', 'reason'),
+    [
+        ([answer('nothing(1)')], 'nothing'),
+        ([lambda controller, _: controller.programs.stop()], 'a stop or another program'),
+        ([lambda controller, _: controller.programs.submit(LOOP)], 'a stop or another program'),
+        ([lambda controller, _: controller.load_program('a.urpx')], 'a stop or another program'),
+        (
+            [
+                lambda controller, _: controller.safety_event(SafetyEvent.PROTECTIVE_STOP),
+                answer('sleep(1)'),
+            ],
+            'the safety mode is PROTECTIVE_STOP',
+        ),
+    ],
+)
+def test_play_fails_when_the_program_does_not_start(events, reason):
+    status, details = play_external_control(*events)
+    assert status == 500
+    assert details.startswith('The program did not start: ')
+    assert reason in details
+
+
 def test_a_fault_is_left_without_power():
     user = ApiUser()
     user.controller.safety_event(SafetyEvent.VIOLATION)
@@ -151,20 +198,6 @@ def test_popups_log_and_identity():
     assert not user.controller.popups
     assert user.ask('DELETE', '/popup/v1/safety')[0] == 404
     assert user.ask('POST', '/system/v1/log', {'message': 'a line'})[0] == 200
-
-
-def urpx(name, script, **application):
-    """Return the content of a file as PolyScope X writes it, without what nobody reads."""
-    information = {'name': name, 'description': '', 'programState': 'FINAL'}
-    return {
-        'application': application,
-        'program': {
-            'id': '5',
-            'programContent': {'children': []},
-            'programInformation': information,
-            'urscript': {'script': script, 'nodeIDList': []},
-        },
-    }
 
 
 def form(method, content, path=API + '/programs/v1/', field='file'):

@@ -1,7 +1,8 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Program files of PolyScope 5 as XML, with the tags and attributes of public files."""
+"""Program files of PolyScope 5 (XML) and X (JSON), with the names that public files have."""
 
+from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
 EXTERNAL_CONTROL = (
@@ -34,3 +35,17 @@ def urp_text(*nodes: str, once: bool = True) -> str:
         f'<children><MainProgram runOnlyOnce="{str(once).lower()}" InitVariablesNode="false">'
         f'<children>{"".join(nodes)}</children></MainProgram></children></URProgram>'
     )
+
+
+def urpx(name: str, script: str, **application: object) -> dict[str, Any]:
+    """Return the content of a program of PolyScope X, without what no robot needs to run it."""
+    information = {'name': name, 'description': '', 'programState': 'FINAL'}
+    return {
+        'application': application,
+        'program': {
+            'id': '5',
+            'programContent': {'children': []},
+            'programInformation': information,
+            'urscript': {'script': script, 'nodeIDList': []},
+        },
+    }

@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.program.render import has_feature
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.robot.check.experiment_runner import motion_refusal, run_experiment
 from ur_cartesian_driver.robot.check.experiments import Experiment, EXPERIMENTS
@@ -94,9 +95,8 @@ def _is_known_by(experiment: Experiment, observed: list[Finding]) -> bool:
     if not experiment.feature:
         return True
     versions = [finding.data['version'] for finding in observed if finding.check == 'software']
-    numbers = [int(part) for version in versions for part in str(version).split('.')[:3]]
-    return len(numbers) < 3 or has_feature(
-        experiment.feature, (numbers[0], numbers[1], numbers[2])
+    return not versions or has_feature(
+        experiment.feature, ControllerVersion.parse(str(versions[0])).release
     )
 
 

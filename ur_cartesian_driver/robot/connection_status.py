@@ -15,6 +15,7 @@ from ur_cartesian_driver.motion.state.rtde_state import (
     RuntimeState,
     SafetyMode,
 )
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
 
@@ -50,9 +51,9 @@ class ConnectionStatus:
 
     def software(self) -> tuple[int, int, int]:
         """Return major, minor and bugfix of, for example, ``5.21.0.1``; zeros while unknown."""
-        numbers = [int(part) for part in self.polyscope_version.split('.') if part.isdigit()][:3]
-        major, minor, bugfix = numbers + [0] * (3 - len(numbers))
-        return major, minor, bugfix
+        if not self.polyscope_version:
+            return 0, 0, 0
+        return ControllerVersion.parse(self.polyscope_version).release
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

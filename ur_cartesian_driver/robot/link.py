@@ -389,6 +389,7 @@ class RobotLink:
         self._status.apply(
             ConnectionEvent.ROBOT_LOST,
             calibration_known=False,
+            program_is_own=False,
             last_error=last_error,
             message=f'No connection to the robot: {status_text.rstrip(".")}.',
         )

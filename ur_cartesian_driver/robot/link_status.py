@@ -19,8 +19,8 @@ from ur_cartesian_driver.robot.transport import AttemptLog
 OUT_OF_REACH = frozenset({ConnectionState.DISCONNECTED, ConnectionState.REFUSED})
 #: The states through which each attempt to connect passes.
 ATTEMPTING = frozenset({*OUT_OF_REACH, ConnectionState.CONNECTING})
-#: How long the next step in the state CONNECTED must persist before it is logged [s], because a
-#: program that is about to connect makes it unnecessary.
+#: Delay before the next step in the state CONNECTED is logged [s]: a program that is about to
+#: connect makes the step unnecessary.
 LOG_DELAY = 1.0
 
 

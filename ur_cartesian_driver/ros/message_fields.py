@@ -1,10 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Times, poses and vectors of ROS messages, in both directions."""
+"""Times, poses and vectors of ROS messages, in both directions; the classes of types."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+import importlib
+from typing import Any
 
 from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import Point, Quaternion, Vector3
@@ -16,6 +18,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 
 __all__ = [
     'Message',
+    'class_of',
     'duration_message',
     'nanoseconds',
     'pose_from_message',
@@ -52,3 +55,19 @@ def vector_message(vector: Sequence[float]) -> Vector3:
     """Return three numbers as a message."""
     x, y, z = vector
     return Vector3(x=x, y=y, z=z)
+
+
+def class_of(type_name: str) -> Any:
+    """
+    Return the class of a type; None if its package is not installed, or lacks the type.
+
+    An installed package that is broken raises its own exception.
+    """
+    package, kind, name = type_name.split('/')
+    module = f'{package}.{kind}'
+    try:
+        return getattr(importlib.import_module(module), name, None)
+    except ModuleNotFoundError as error:
+        if error.name not in (package, module):
+            raise
+        return None

@@ -37,11 +37,15 @@ from ur_cartesian_driver.sim.pendant_programs.external_control import (
     UrCap,
     UrCapX,
 )
-from ur_cartesian_driver.sim.pendant_programs.program_tree import FetchedScript, ProgramTree
+from ur_cartesian_driver.sim.pendant_programs.program_tree import (
+    FetchedScript,
+    ProgramTree,
+    UnreadableProgram,
+)
 from ur_cartesian_driver.sim.programs.interpreter_mode import InterpreterMode
 from ur_cartesian_driver.sim.programs.program_runner import ProgramRunner
 from ur_cartesian_driver.sim.programs.rtde_watchdog import Watchdogs
-from ur_cartesian_driver.sim.programs.stored_programs import StoredPrograms
+from ur_cartesian_driver.sim.programs.stored_programs import StoredPrograms, URPX_SUFFIX
 from ur_cartesian_driver.sim.programs.timed_function_guard import Builtins
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets, ScriptSockets
@@ -419,6 +423,11 @@ class Controller:
         program = self.stored_programs.program(file := PurePosixPath(name).name)
         if program is None:
             return f'File not found: {name}'
+        if isinstance(program, UnreadableProgram):
+            return program.reason
+        if file.endswith(URPX_SUFFIX) and self.config.version[0] < POLYSCOPE_X:
+            software = '.'.join(map(str, self.config.version[:2]))
+            return f'{file} is a program of PolyScope X, and the robot has PolyScope {software}'
         if isinstance(program, ProgramTree) and not program.has_external_control:
             program = program.script(file, FetchedScript())
         if isinstance(program, ProgramTree):

@@ -21,7 +21,7 @@ from ur_cartesian_driver.sim.faults.fault_values import Fault
 from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
 from ur_cartesian_driver.sim.motion.paths.second_motion_version import SecondMotionVersion
-from ur_cartesian_driver.sim.pendant_programs.program_tree import BUILT_IN_PROGRAMS, ProgramTree
+from ur_cartesian_driver.sim.pendant_programs.program_tree import BUILT_IN_PROGRAMS, SavedProgram
 from ur_cartesian_driver.sim.state.controller_io import DigitalPort
 
 #: Joint positions with room to move in all directions, away from every singularity [rad].
@@ -125,8 +125,8 @@ class SimulatorConfig:
     #: threads switch only when the running thread calls a function that takes time.
     interleaving_seed: int | None = None
     #: Programs that can be loaded: file name -> URScript, or the tree of a program on the pendant.
-    #: Without one of that name, `external_control.urp` has a node of External Control.
-    programs: Mapping[str, str | ProgramTree] = field(default_factory=dict)
+    #: `external_control.urp` is a node of External Control unless a program here has that name.
+    programs: Mapping[str, SavedProgram] = field(default_factory=dict)
     #: Name of the program that is loaded from the start; empty = an empty, unnamed program.
     program: str = ''
     #: Host and port of External Control in the installation: from there its node fetches its
@@ -214,8 +214,8 @@ class SimulatorConfig:
         return major, minor, bugfix, build
 
     @property
-    def saved_programs(self) -> Mapping[str, str | ProgramTree]:
-        """Return the programs that can be loaded: file name -> URScript or tree."""
+    def saved_programs(self) -> Mapping[str, SavedProgram]:
+        """Return the programs on the robot's disk: file name -> program."""
         return {**BUILT_IN_PROGRAMS, **self.programs}
 
     @property

@@ -8,12 +8,17 @@ from typing import Any
 from builtin_interfaces.msg import Duration
 import pytest
 
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.ros.ur_driver_names.io_services import IO_SERVICES
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import Service
+from ur_cartesian_driver.sim import HOME
 
 pytestmark = pytest.mark.slow
 
 IO_STATES = '/io_and_status_controller/io_states', 'ur_msgs/msg/IOStates'
+#: Height of the TCP of the simulated robot at its start [m].
+HEIGHT = Arm(robot_model('ur5e')).forward(HOME).position[2]
 #: SetIO: FUN_SET_DIGITAL_OUT, FUN_SET_FLAG, FUN_SET_ANALOG_OUT, FUN_SET_TOOL_VOLTAGE.
 DIGITAL, FLAG, ANALOG, TOOL_VOLTAGE = 1, 2, 3, 4
 
@@ -150,8 +155,16 @@ def test_the_speed_slider_is_a_fraction_and_never_0(ur, service):
     assert ur.cell.sim.state().speed_slider == pytest.approx(0.4)
 
 
+@pytest.mark.parametrize(
+    'sim', [{'contacts': [f'plane 0 0 {HEIGHT + 0.001} 0 0 1']}], indirect=True
+)
 def test_the_force_sensor_is_zeroed(ur):
+    def force():
+        return ur.cell.sim.call(lambda controller: controller.contact.measured[2])
+
+    assert force() > 10.0
     assert ur.io('zero_ftsensor').success
+    ur.cell.spin_until(lambda: abs(force()) < 0.1)
 
 
 @pytest.mark.parametrize(

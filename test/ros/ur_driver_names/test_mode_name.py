@@ -100,23 +100,33 @@ def test_a_protective_stop_is_left_to_a_person(helper):
     assert helper.ur.cell.sim.state().safety_mode is SafetyMode.PROTECTIVE_STOP
 
 
-def test_a_parameter_takes_the_responsibility_for_unlocking(make_ur):
+@pytest.fixture
+def stopped_helper(make_ur):
+    """Return a helper that may unlock the protective stop in which the robot is."""
     ur = make_ur({'unlock_protective_stop': True})
     ur.cell.wait_ready()
     helper = Helper(ur)
     ur.cell.sim.protective_stop()
     helper.wait_for_safety(SafetyMode.PROTECTIVE_STOP)
-    status, message = helper.set(RobotMode.RUNNING, stop=True)
-    if status == ABORTED:
-        assert '5 s' in message  # the robot refuses to be unlocked earlier
+    return helper
 
-    def unlocked():
-        return helper.set(RobotMode.RUNNING, stop=True)[0] == SUCCEEDED
 
-    ur.cell.spin_until(unlocked)
-    assert ur.cell.sim.state().safety_mode is SafetyMode.NORMAL
-    status, message = helper.set(RobotMode.RUNNING, play=True)
+@pytest.mark.parametrize('sim', [{'unlock_delay': 0.0}], indirect=True)
+def test_a_parameter_takes_the_responsibility_for_unlocking(stopped_helper):
+    sim = stopped_helper.ur.cell.sim
+    status, message = stopped_helper.set(RobotMode.RUNNING, stop=True)
     assert status == SUCCEEDED, message
+    assert sim.state().safety_mode is SafetyMode.NORMAL
+    status, message = stopped_helper.set(RobotMode.RUNNING, play=True)
+    assert status == SUCCEEDED, message
+
+
+@pytest.mark.parametrize('sim', [{'unlock_delay': 1e6}], indirect=True)
+def test_a_robot_that_refuses_to_be_unlocked_yet_ends_the_goal(stopped_helper):
+    status, message = stopped_helper.set(RobotMode.RUNNING, stop=True)
+    assert status == ABORTED
+    assert 'Wait until 5 s have passed since the stop' in message
+    assert stopped_helper.ur.cell.sim.state().safety_mode is SafetyMode.PROTECTIVE_STOP
 
 
 @pytest.mark.parametrize('fault', ['fault', 'violation'])

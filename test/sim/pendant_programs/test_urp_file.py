@@ -11,10 +11,13 @@ from urp_text import EXTERNAL_CONTROL, script_file, script_line, urp_text
 from ur_cartesian_driver.sim.pendant_programs.program_tree import (
     ExternalControlNode,
     FetchedScript,
+    function_name,
     ProgramTree,
     ScriptText,
 )
 from ur_cartesian_driver.sim.pendant_programs.urp_file import read_urp
+from ur_cartesian_driver.sim.programs.stored_programs import StoredPrograms
+from ur_cartesian_driver.urscript import parse
 
 CODE = 'if 1 < 2 and "a&b" == "c":\n  x = 3\nend\n'
 NODES = (
@@ -52,6 +55,8 @@ def test_a_program_may_loop():
     [
         (b'def p():\nend\n', 'is no program file of PolyScope 3 or 5: '),
         (b'\x1f\x8bno gzip', 'is no program file of PolyScope 3 or 5: '),
+        (gzip.compress(b'<a/>')[:12], 'is no program file of PolyScope 3 or 5: '),
+        (b'<?xml version="1.0" encoding="martian"?><a/>', 'unknown encoding'),
         (gzip.compress(b' ' * 10_000_001), 'larger than 10000000 bytes'),
         (b'<!DOCTYPE a><a/>', 'it has a DOCTYPE'),
         (b'<Installation/>', 'it has no <URProgram> with a <MainProgram>'),
@@ -82,6 +87,14 @@ def test_the_header_stands_where_the_software_puts_it():
     assert tree.script('my seam-2.urp', first) == loop.format('h\n', '', '')
 
 
-@pytest.mark.parametrize(('name', 'function'), [('1.urp', '_1'), ('.urp', 'program')])
-def test_every_file_name_makes_a_function(name, function):
-    assert ProgramTree(()).script(name, FetchedScript()).startswith(f'def {function}():')
+@pytest.mark.parametrize(
+    ('name', 'function'), [('1', '_1'), ('', 'program'), ('end', '_end'), ('weld it', 'weld_it')]
+)
+def test_every_name_makes_a_function_in_trees_and_uploaded_programs(name, function):
+    assert ProgramTree(()).script(f'{name}.urp', FetchedScript()).startswith(f'def {function}():')
+    assert parse(f'def {function_name(name)}():\nend\n').name == function
+    programs = StoredPrograms({})
+    programs.put(name, {'program': {'urscript': {'script': 'sync()'}}})
+    script = programs.program(f'{name}.urpx')
+    assert isinstance(script, str)
+    assert script.startswith(f'def {function}():')

@@ -35,6 +35,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+import re
 import struct
 from typing import ClassVar, TypeAlias
 
@@ -217,6 +218,24 @@ class ControllerVersion(_Package):
     def __str__(self) -> str:
         """Return the version with dots."""
         return f'{self.major}.{self.minor}.{self.bugfix}.{self.build}'
+
+    @classmethod
+    def parse(cls, text: str) -> ControllerVersion:
+        """
+        Return the first version in a text like ``URSoftware 5.21.0.1``; missing numbers are 0.
+
+        :raises ValueError: the text has no version.
+        """
+        found = re.search(r'(\d+)\.(\d+)(?:\.(\d+))?(?:\.(\d+))?', text)
+        if found is None:
+            raise ValueError(f'{text!r} has no version like 5.21.0')
+        major, minor, bugfix, build = (int(number or 0) for number in found.groups())
+        return cls(major=major, minor=minor, bugfix=bugfix, build=build)
+
+    @property
+    def release(self) -> tuple[int, int, int]:
+        """Major, minor and bugfix."""
+        return self.major, self.minor, self.bugfix
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -50,7 +50,7 @@ RECORDED = (
     'speed_scaling', 'target_speed_fraction', 'runtime_state', 'safety_mode',
     _PIECES_BEGUN, _SPLINE_TIME,
 )  # fmt: skip
-#: Longest time until a program moves the arm [s]; until the program ends [s].
+#: Longest time until a program moves the arm, and longest time until it ends [s].
 START_TIMEOUT, END_TIMEOUT = 3.0, 30.0
 #: How long a program is paused [s].
 PAUSE = 0.5
@@ -138,7 +138,7 @@ async def _move(experiment: Experiment, recorder: RtdeRecorder, probe: PrimaryPr
 async def _follow_corner(
     experiment: Experiment, recorder: RtdeRecorder, probe: PrimaryProbe
 ) -> None:
-    """Run the program that follows a corner, and be the other end of its socket."""
+    """Run the program that follows a corner, and send it the messages for its socket."""
     first, rest = corner_messages(vector6(recorder.newest['target_q']))
 
     def send(robot: TcpConnection) -> None:
@@ -238,7 +238,7 @@ def _samples(recorder: RtdeRecorder, stop_sent: float) -> MotionSamples:
 
 
 def _distance(recorder: RtdeRecorder, name: str) -> Floats:
-    """Return the distances (n,) [m] of the recorded positions of a pose from the first one."""
+    """Return the distance (n,) [m] of each recorded position of a pose from the first."""
     positions = recorder.column(name)[:, :3]
     distances: Floats = np.linalg.norm(positions - positions[0], axis=1)
     return distances

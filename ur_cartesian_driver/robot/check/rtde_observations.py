@@ -62,7 +62,7 @@ async def observe_rtde(
 
 
 def _software(version: ControllerVersion) -> Finding:
-    number = (version.major, version.minor, version.bugfix)
+    number = version.release
     needed = MIN_VERSIONS.get(version.major)
     data = {'version': str(version)}
     if needed is not None and number < needed:

@@ -140,7 +140,7 @@ class ProgramSockets:
                 trajectory_port=ports['trajectory_port'],
                 script_command_port=ports['script_command_port'],
                 number=self.program_number,
-                version=(version.major, version.minor, version.bugfix),
+                version=version.release,
                 stop_deceleration=s.stop_deceleration,
                 servoj_gain=s.servoj_gain,
                 servoj_lookahead_time=s.servoj_lookahead_time,

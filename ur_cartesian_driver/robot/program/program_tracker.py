@@ -35,8 +35,7 @@ class ProgramTracker:
         #: inf = it does not report this now.
         self._dead_since = inf
         self._has_shown_itself = False
-        #: The robot program's count of its connections, as last reported: by now; before the
-        #: present connection.
+        #: The last reported count of the robot program's connections, now and when it connected.
         self._run = self._run_at_connection = 0
         self._identity = asyncio.Event()
         self._connected_at = -inf
@@ -48,14 +47,25 @@ class ProgramTracker:
 
     def program_connected(self) -> None:
         """Require a new proof of identity, which a program has to give on each connection."""
-        self.is_ending = self._has_shown_itself = self._may_have_ended = False
+        self.is_ending = self._may_have_ended = False
         self._run_at_connection = self._run
         self._connected_at = asyncio.get_running_loop().time()
-        self._identity.clear()
+        self._forget_identity()
 
     def robot_lost(self) -> None:
-        """Forget which program runs, because another one can start unseen."""
+        """
+        Forget what the robot has reported of its program, because another one can start unseen.
+
+        The count of connections stays: a program that connects meanwhile proves itself by raising
+        it.
+        """
         self._has_called, self._may_have_ended = False, True
+        self._dead_since = inf
+        self._forget_identity()
+
+    def _forget_identity(self) -> None:
+        self._has_shown_itself = False
+        self._identity.clear()
 
     async def wait_for_identity(self) -> bool:
         """Return whether the connected program is ours, as soon as that is known."""

@@ -39,9 +39,9 @@ from ur_cartesian_driver.robot.services.service_calls import (
     succeeded,
 )
 
-#: How long the recovery waits for the robot until a next step is possible [s].
+#: Longest wait for the robot while no step is possible [s].
 STEP_TIMEOUT = 35.0
-#: The same for a robot that is not connected when the recovery begins [s].
+#: The same, for a robot that is not connected when the recovery begins [s].
 DISCONNECTED_TIMEOUT = 2.0
 #: How long the reports of a robot may contradict each other after a change [s].
 SETTLING_TIMEOUT = 0.3
@@ -140,10 +140,10 @@ class RecoveryRunner:
 
     async def _settled_step(self, situation: Callable[[], RecoverySituation]) -> NextStep:
         """
-        Return the next step; one that needs a person only if it is still next after a while.
+        Return the next step; wait a while before one for a person, which may prove unnecessary.
 
-        Sockets and robot state reflect a change at different times, and a program that has just
-        been started has not connected yet.
+        Sockets and robot state show a change at different times, and a program that has just been
+        started has not connected yet.
         """
         loop = asyncio.get_running_loop()
         upcoming = next_step(situation())

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-import importlib
 from typing import Any, Protocol, TypeAlias
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
@@ -21,7 +20,7 @@ from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.goal.joint_goal import JointGoal
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.ros.goals.goal_context import GoalContext
-from ur_cartesian_driver.ros.message_fields import Message
+from ur_cartesian_driver.ros.message_fields import class_of, Message
 from ur_cartesian_driver.ros.messages.action_messages import (
     feedback_message,
     FeedbackFrame,
@@ -177,16 +176,12 @@ class JointUntilAction(JointAction):
 def installed_actions() -> list[GoalAction]:
     """Return the actions that the node can serve with the installed packages."""
     actions: list[GoalAction] = [CartesianAction()]
-    for package, name, kind in (
-        ('control_msgs', 'FollowJointTrajectory', JointAction),
-        ('ur_msgs', 'FollowJointTrajectoryUntil', JointUntilAction),
+    for type_name, kind in (
+        ('control_msgs/action/FollowJointTrajectory', JointAction),
+        ('ur_msgs/action/FollowJointTrajectoryUntil', JointUntilAction),  # an older one lacks it
     ):
-        try:
-            module = importlib.import_module(f'{package}.action')
-        except ModuleNotFoundError as error:
-            if error.name not in (package, f'{package}.action'):
-                raise  # it is installed, but broken
+        action_type = class_of(type_name)
+        if action_type is None:
             break  # ur_msgs needs control_msgs
-        if action_type := getattr(module, name, None):  # an older ur_msgs lacks it
-            actions.append(kind(action_type))
+        actions.append(kind(action_type))
     return actions

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
-import re
 from typing import Any
 
 from std_srvs.srv import Trigger
@@ -23,6 +22,7 @@ from ur_cartesian_driver.protocol.dashboard import (
     DashboardRequest,
     parse_reply,
 )
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
 from ur_cartesian_driver.ros.message_fields import Message
 from ur_cartesian_driver.ros.services.deferred_service import completed_answer
@@ -105,22 +105,18 @@ def _remote_control(response: Message, value: str) -> None:
 
 
 def _version(response: Message, value: str) -> None:
-    numbers = version_numbers(value)
-    response.version.major, response.version.minor = numbers[:2]
-    response.version.bugfix, response.version.build = numbers[2:]
+    fill_version(response.version, value)
 
 
-def version_numbers(text: str) -> tuple[int, int, int, int]:
+def fill_version(message: Message, text: str) -> None:
     """
-    Return major, minor, bugfix and build of a text like ``5.21.0.1``; missing ones are 0.
+    Write the version in a text into the fields of a message.
 
     :raises ValueError: the text has no version.
     """
-    found = re.search(r'(\d+)\.(\d+)(?:\.(\d+))?(?:\.(\d+))?', text)
-    if found is None:
-        raise ValueError(text)
-    major, minor, bugfix, build = (int(number or 0) for number in found.groups())
-    return major, minor, bugfix, build
+    version = ControllerVersion.parse(text)
+    message.major, message.minor = version.major, version.minor
+    message.bugfix, message.build = version.bugfix, version.build
 
 
 def _model(response: Message, value: str) -> None:
@@ -194,35 +190,31 @@ def _words(command: str) -> Callable[[str], str]:
     return lambda value: reply.replace('{}', value) if '{}' in reply else value
 
 
-def _query(name: str, kind: str, command: str, fill: Fill) -> UrName:
-    return Service(
-        name=f'{DASHBOARD}/{name}',
-        type=_type(kind),
-        source=f'dashboard/{name}',
-        source_type=Trigger,
-        call=same_request,
-        fill=fill,
-        words=_words(command),
-    )
-
-
-def _with_argument(
-    source_type: Any,
+def _row(
     name: str,
-    command: str,
+    command: str = '',
     *,
+    kind: str = '',
+    source_type: Any = Trigger,
     call: Call = same_request,
     fill: Fill = _nothing,
 ) -> UrName:
-    """Return the row of a command with an argument, which the driver has too."""
+    """
+    Return the row of a service that the driver has too.
+
+    :param command: of the dashboard, whose reply is the text of the response; empty = the text of
+        the driver's answer is.
+    :param kind: the type, without its package; empty = it is called like the driver's.
+    """
+    same_kind = _NO_FIELDS if source_type is Trigger else source_type.__name__
     return Service(
         name=f'{DASHBOARD}/{name}',
-        type=_type(source_type.__name__),
+        type=_type(kind or same_kind),
         source=f'dashboard/{name}',
         source_type=source_type,
         call=call,
         fill=fill,
-        words=_words(command),
+        words=_words(command) if command else str,
     )
 
 
@@ -276,46 +268,33 @@ def _judged(answer: Future[ServiceAnswer], sent: DashboardRequest) -> Future[Ser
 
 
 def _services() -> Iterable[UrName]:
-    for name in _COMMANDS:
-        yield Service(
-            name=f'{DASHBOARD}/{name}',
-            type=_NO_FIELDS,
-            source=f'dashboard/{name}',
-            source_type=Trigger,
-            call=same_request,
-        )
-    yield _query('clear_operational_mode', _NO_FIELDS, 'clear operational mode', _nothing)
-    yield _with_argument(Load, 'load_program', 'load')
-    yield _with_argument(Load, 'load_installation', 'load installation')
-    yield _with_argument(Popup, 'popup', 'popup')
-    yield _with_argument(
-        SetOperationalMode,
+    yield from map(_row, _COMMANDS)
+    yield _row('clear_operational_mode', 'clear operational mode')
+    yield _row('load_program', 'load', source_type=Load)
+    yield _row('load_installation', 'load installation', source_type=Load)
+    yield _row('popup', 'popup', source_type=Popup)
+    yield _row(
         'set_operational_mode',
         'set operational mode',
+        source_type=SetOperationalMode,
         call=_set_operational_mode,
     )
-    yield _with_argument(SetUserRole, 'set_user_role', 'setUserRole', call=_set_user_role)
-    yield _with_argument(
-        GenerateFlightReport,
+    yield _row('set_user_role', 'setUserRole', source_type=SetUserRole, call=_set_user_role)
+    yield _row(
         'generate_flight_report',
         'generate flight report',
+        source_type=GenerateFlightReport,
         call=_slow_request(FLIGHT_REPORT_TIMEOUT),
         fill=_report_id,
     )
-    yield _with_argument(
-        GenerateSupportFile,
+    yield _row(
         'generate_support_file',
         'generate support file',
+        source_type=GenerateSupportFile,
         call=_slow_request(SUPPORT_FILE_TIMEOUT),
         fill=_file_name,
     )
-    yield Service(
-        name=f'{DASHBOARD}/raw_request',
-        type=_type('RawRequest'),
-        source='dashboard/raw_request',
-        source_type=RawRequest,
-        call=same_request,
-    )
+    yield _row('raw_request', source_type=RawRequest)
     yield Service(
         name=f'{DASHBOARD}/connect',
         type=_NO_FIELDS,
@@ -326,7 +305,7 @@ def _services() -> Iterable[UrName]:
         words=lambda value: 'The robot answers.',
     )
     for name, (kind, command, fill) in _QUERIES.items():
-        yield _query(name, kind, command, fill)
+        yield _row(name, command, kind=kind, fill=fill)
     for name, (kind, command, argument) in _LINES.items():
         yield _line(name, kind, command, argument)
 

@@ -14,7 +14,7 @@ from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
 from ur_cartesian_driver.ros.message_fields import Message, seconds, vector_message
 from ur_cartesian_driver.ros.services.deferred_service import completed_answer
-from ur_cartesian_driver.ros.ur_driver_names.dashboard_services import version_numbers
+from ur_cartesian_driver.ros.ur_driver_names.dashboard_services import fill_version
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import same_request, Service, UrName
 from ur_cartesian_driver.ros.ur_driver_names.state_topics import IO
@@ -144,10 +144,6 @@ def _version(row: Service, driver: DriverNode, request: Message) -> Future[Servi
     return completed_answer(text, ok=True)
 
 
-def _fill_version(response: Message, text: str) -> None:
-    response.major, response.minor, response.bugfix, response.build = version_numbers(text)
-
-
 def _services() -> Iterable[UrName]:
     for name in ('resend_robot_program', 'hand_back_control', 'zero_ftsensor'):
         yield Service(
@@ -195,7 +191,7 @@ def _services() -> Iterable[UrName]:
         source='status',
         source_type=None,
         call=_version,
-        fill=_fill_version,
+        fill=fill_version,
     )
 
 

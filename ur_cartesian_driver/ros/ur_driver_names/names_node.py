@@ -15,6 +15,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.utilities import try_shutdown
 
+from ur_cartesian_driver.ros.message_fields import class_of
 from ur_cartesian_driver.ros.parameters.node_parameters import as_overrides, declared_values
 from ur_cartesian_driver.ros.parameters.parameter_table import (
     declarations_of,
@@ -24,7 +25,7 @@ from ur_cartesian_driver.ros.parameters.parameter_table import (
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.name_table import NAMES
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
-from ur_cartesian_driver.ros.ur_driver_names.offered_name import Absent, class_of
+from ur_cartesian_driver.ros.ur_driver_names.offered_name import Absent
 
 NODE_NAME = 'ur_driver_names'
 #: Makes :func:`main` end when its standard input does: the driver that started it has ended.

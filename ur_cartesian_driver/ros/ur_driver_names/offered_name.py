@@ -12,7 +12,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
-import importlib
 from typing import Any, TypeAlias
 
 from rclpy.clock import Clock
@@ -234,19 +233,3 @@ def same_request(
     for field in ours.get_fields_and_field_types().keys() & request.get_fields_and_field_types():
         setattr(ours, field, getattr(request, field))
     return driver.call(row.source_type, row.source, ours, timeout)
-
-
-def class_of(type_name: str) -> Any:
-    """
-    Return the class of a type; None if its package is not installed, or lacks the type.
-
-    An installed package that is broken raises its own exception.
-    """
-    package, kind, name = type_name.split('/')
-    module = f'{package}.{kind}'
-    try:
-        return getattr(importlib.import_module(module), name, None)
-    except ModuleNotFoundError as error:
-        if error.name not in (package, module):
-            raise
-        return None

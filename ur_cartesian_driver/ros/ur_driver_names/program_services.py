@@ -18,13 +18,12 @@ from typing import Any
 from std_srvs.srv import Trigger
 
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
-from ur_cartesian_driver.ros.message_fields import Message
+from ur_cartesian_driver.ros.message_fields import class_of, Message
 from ur_cartesian_driver.ros.services.deferred_service import DeferredService
 from ur_cartesian_driver.ros.ur_driver_names.dashboard_services import DASHBOARD
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import (
-    class_of,
     same_request,
     Service,
     UrName,

@@ -12,9 +12,9 @@ from std_msgs.msg import Bool, Float64
 
 from ur_cartesian_driver.motion.goal.known_frames import TCP, TOOL0
 from ur_cartesian_driver.msg import IOStates, RobotMode, SafetyMode, ToolData
-from ur_cartesian_driver.ros.message_fields import Message
+from ur_cartesian_driver.ros.message_fields import class_of, Message
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
-from ur_cartesian_driver.ros.ur_driver_names.offered_name import ByDriver, class_of, Topic, UrName
+from ur_cartesian_driver.ros.ur_driver_names.offered_name import ByDriver, Topic, UrName
 
 IO = 'io_and_status_controller'
 _WRENCH = 'force_torque_sensor_broadcaster'

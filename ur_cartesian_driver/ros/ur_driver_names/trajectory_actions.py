@@ -27,10 +27,10 @@ from rclpy.clock_type import ClockType
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer
-from ur_cartesian_driver.ros.message_fields import duration_message, Message, nanoseconds
+from ur_cartesian_driver.ros.message_fields import class_of, duration_message, Message, nanoseconds
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
-from ur_cartesian_driver.ros.ur_driver_names.offered_name import class_of, UrName
+from ur_cartesian_driver.ros.ur_driver_names.offered_name import UrName
 
 #: From the UR driver's configuration of its controllers: how far a joint may be off its path [rad]
 #: and, at the end, off its last point [rad], and how fast it may still be there [rad/s].

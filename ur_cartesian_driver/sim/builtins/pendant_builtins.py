@@ -74,9 +74,9 @@ class PendantBuiltins(BuiltinGroup):
     """
     Messages, popups, and questions to the person at the pendant.
 
-    A question waits without a time limit; only a person answers it (`SimulatedRobot.answer`),
-    because it is not known what a client would have to send. The pendant's button Cancel stops the
-    program, as `SimulatedRobot.stop_program` does. `close popup` does not close the question.
+    A question waits without a time limit. Only a person answers it (`SimulatedRobot.answer`): how
+    a client answers a real robot is unknown. The pendant's button Cancel stops the program, as
+    `SimulatedRobot.stop_program` does. `close popup` does not close the question.
     """
 
     request_boolean_from_primary_client = _request(_Requested('boolean', 0, _boolean))

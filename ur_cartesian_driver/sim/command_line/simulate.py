@@ -14,8 +14,17 @@ from types import MappingProxyType
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model, RobotModel
 from ur_cartesian_driver.sim.calibration import random_calibration, read_calibration
 from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections, typical_imperfections
-from ur_cartesian_driver.sim.pendant_programs.program_tree import BUILT_IN_PROGRAMS, ProgramTree
+from ur_cartesian_driver.sim.pendant_programs.program_tree import (
+    BUILT_IN_PROGRAMS,
+    SavedProgram,
+    UnreadableProgram,
+)
 from ur_cartesian_driver.sim.pendant_programs.urp_file import read_urp
+from ur_cartesian_driver.sim.programs.stored_programs import (
+    read_urpx,
+    urpx_script,
+    URPX_SUFFIX,
+)
 from ur_cartesian_driver.sim.simulated_robot import SimulatedRobot
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 
@@ -31,16 +40,20 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
     """
     Return the configuration of the simulated robot.
 
-    :raises ValueError: an option has an impossible value, or the calibration has a mistake.
-    :raises OSError: the calibration or a program cannot be read.
+    :raises ValueError: an option has an impossible value, or the calibration or the program to
+        load has a mistake.
+    :raises OSError: the calibration, the program to load or the directory of programs cannot be
+        read.
     """
-    files = []
+    programs, loaded = {}, ''
     if arguments.programs:
         found = [file for file in arguments.programs.iterdir() if file.suffix in _READERS]
-        # Of two files with one name the last one counts: PolyScope writes a .script beside a .urp.
-        files += sorted(found, key=lambda file: file.suffix)
-    if arguments.program and not _is_built_in(arguments.program):
-        files.append(arguments.program)
+        # PolyScope writes a .script beside each .urp, which comes later and takes its place.
+        programs = dict(map(_read_if_possible, sorted(found, key=lambda file: file.suffix)))
+    if arguments.program and _is_built_in(arguments.program):
+        loaded = str(arguments.program)
+    elif arguments.program:
+        loaded, programs[loaded] = _read_program(arguments.program)
     return SimulatorConfig(
         model=arguments.model,
         host=arguments.host,
@@ -63,8 +76,8 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
         motion_version=arguments.motion_version,
         imperfections=imperfections(arguments),
         geometry=calibration(arguments, robot_model(arguments.model)),
-        programs=dict(map(_read_program, files)),
-        program=_program_name(arguments.program) if arguments.program else '',
+        programs=programs,
+        program=loaded,
         external_control_host=arguments.external_control_host,
         external_control_port=arguments.external_control_port,
         **({'q': arguments.joints} if arguments.joints else {}),
@@ -76,21 +89,49 @@ def _is_built_in(file: Path) -> bool:
     return str(file) in BUILT_IN_PROGRAMS and not file.exists()
 
 
-def _read_program(file: Path) -> tuple[str, str | ProgramTree]:
-    """Return the name by which a program file is loaded, and the program."""
-    read = _READERS.get(file.suffix, Path.read_text)
-    return _program_name(file), read(file)
+def _read_if_possible(file: Path) -> tuple[str, SavedProgram]:
+    """Read a program file; if that fails, list it all the same, and refuse to load it."""
+    try:
+        return _read_program(file)
+    except (OSError, ValueError) as error:
+        suffix = URPX_SUFFIX if file.suffix == URPX_SUFFIX else '.urp'
+        return file.stem + suffix, UnreadableProgram(str(error).removesuffix('.'))
+
+
+def _read_program(file: Path) -> tuple[str, SavedProgram]:
+    """
+    Return the name by which a program file is loaded, and the program.
+
+    :raises ValueError: the file is no program, or has a node that the simulator does not run.
+    :raises OSError: the file cannot be read.
+    """
+    return _READERS.get(file.suffix, _read_script)(file)
+
+
+def _read_script(file: Path) -> tuple[str, str]:
+    try:
+        return f'{file.stem}.urp', file.read_text('utf-8')
+    except UnicodeDecodeError:
+        raise ValueError(f'{file} is no text in UTF-8.') from None
+
+
+def _read_urp(file: Path) -> tuple[str, SavedProgram]:
+    return file.name, read_urp(file.read_bytes(), str(file))
+
+
+def _read_urpx(file: Path) -> tuple[str, str]:
+    """Return the name in a file of PolyScope X, with the suffix, and the URScript."""
+    try:
+        name, content = read_urpx(file.read_bytes())
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f'{file} is no program file of PolyScope X: {error}.') from None
+    return name + URPX_SUFFIX, urpx_script(name, content)
 
 
 #: Suffix of a program file -> its reader.
-_READERS: Mapping[str, Callable[[Path], str | ProgramTree]] = MappingProxyType(
-    {'.script': Path.read_text, '.urp': lambda file: read_urp(file.read_bytes(), str(file))}
+_READERS: Mapping[str, Callable[[Path], tuple[str, SavedProgram]]] = MappingProxyType(
+    {'.script': _read_script, '.urp': _read_urp, URPX_SUFFIX: _read_urpx}
 )
-
-
-def _program_name(file: Path) -> str:
-    """Return the name by which the dashboard loads a file."""
-    return f'{file.stem}.urp'
 
 
 def imperfections(arguments: argparse.Namespace) -> Imperfections | None:

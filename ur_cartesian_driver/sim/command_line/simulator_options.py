@@ -118,13 +118,14 @@ def _add_start(command: argparse.ArgumentParser) -> None:
         type=Path,
         metavar='FILE',
         help='program that is loaded from the start: URScript (NAME.script is NAME.urp), a file '
-        'of PolyScope 3 or 5 (NAME.urp), or external_control.urp, which every robot has',
+        'of PolyScope 3 or 5 (NAME.urp) or of PolyScope X (NAME.urpx), or external_control.urp, '
+        'which every robot has',
     )
     command.add_argument(
         '--programs',
         type=Path,
         metavar='DIR',
-        help='directory of such files, which the dashboard can load',
+        help='directory of such files, which the dashboard and the Robot API can load',
     )
     command.add_argument(
         '--external-control-host',

@@ -9,6 +9,7 @@ A command that this version of the robot's software lacks is answered like an un
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+import logging
 from pathlib import PurePosixPath
 from types import MappingProxyType
 
@@ -25,6 +26,8 @@ from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.interfaces.tcp_server import ClientSession, HangUp
 from ur_cartesian_driver.sim.state.controller_state import Popup
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
+
+_log = logging.getLogger(__name__)
 
 _RUNTIME_WORDS = {
     RuntimeState.STOPPING: 'STOPPED',
@@ -107,6 +110,9 @@ class DashboardHandlers:
         refusal = self.controller.load_program(name)
         if not refusal or refusal.startswith('File not found'):
             return refusal or None
+        # The reply of a real robot has no reason; its pendant shows it.
+        self.controller.messages.note(f'Program {name} was not loaded: {refusal}.')
+        _log.warning('Program %s was not loaded: %s.', name, refusal)
         return f'Error while loading program: {name}'
 
     def load_installation(self, name: str) -> str | None:

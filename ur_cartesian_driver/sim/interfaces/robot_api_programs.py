@@ -15,14 +15,17 @@ from ur_cartesian_driver.sim.interfaces.robot_api_fields import (
     Refused,
     text_field,
 )
+from ur_cartesian_driver.sim.pendant_programs.program_tree import UnreadableProgram
 from ur_cartesian_driver.sim.programs.stored_programs import read_urpx
 
 
 def list_programs(controller: Controller, _: Body) -> Fields:
-    """Return the information about each program."""
+    """Return the information about each program, in the order of their names."""
     files = controller.stored_programs
     return {
-        'programs': [files.urpx(name)['program']['programInformation'] for name in files.names()],
+        'programs': [
+            files.urpx(name)['program']['programInformation'] for name in sorted(files.names())
+        ],
         'message': None,
     }
 
@@ -30,9 +33,13 @@ def list_programs(controller: Controller, _: Body) -> Fields:
 def download_program(controller: Controller, body: Body) -> Fields:
     """Return the content of a program's file."""
     name = text_field(body, 'name')
-    if name not in controller.stored_programs.names():
+    files = controller.stored_programs
+    if name not in files.names():
         raise Refused(HTTPStatus.NOT_FOUND, 'Program not found', details=name)
-    return controller.stored_programs.urpx(name)
+    program = files.program(files.names()[name])
+    if isinstance(program, UnreadableProgram):
+        raise Refused(HTTPStatus.INTERNAL_SERVER_ERROR, 'Error', details=program.reason)
+    return files.urpx(name)
 
 
 def upload_program(controller: Controller, body: Body) -> Fields:

@@ -71,8 +71,9 @@ _FORBIDDEN = {
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A request whose answer is due when the robot has carried it out."""
+    """A request whose answer is due when the robot has carried it out, or cannot."""
 
+    #: Raises `Refused` if the request has failed.
     is_done: Callable[[Controller], bool]
     message: str
 
@@ -127,6 +128,24 @@ def _play(controller: Controller, state: RuntimeState) -> None:
     _refuse_if(controller.programs.play())
 
 
+def _has_started(controller: Controller) -> bool:
+    """
+    Return whether the program has started; a short one may have ended since.
+
+    :raises Refused: it will not start.
+    """
+    programs = controller.programs
+    if programs.starting:
+        return False
+    if programs.start_failure:
+        raise Refused(
+            HTTPStatus.INTERNAL_SERVER_ERROR,
+            'Error',
+            details=f'The program did not start: {programs.start_failure}',
+        )
+    return True
+
+
 #: Action on the program -> its effect, and whether the action is done and can be answered.
 _PROGRAM_ACTIONS: Mapping[
     str, tuple[Callable[[Controller], object], Callable[[Controller], bool]]
@@ -134,7 +153,7 @@ _PROGRAM_ACTIONS: Mapping[
     {
         'play': (
             lambda c: _play(c, RuntimeState.STOPPED),
-            lambda c: not c.programs.starting,  # a short program may have ended
+            _has_started,
         ),
         'resume': (
             lambda c: _play(c, RuntimeState.PAUSED),
@@ -312,8 +331,11 @@ class RobotApiSession(ClientSession):
 
     def _due_answer(self, waiting: Waiting) -> bytes:
         """Return the answer to an action; empty while the robot carries the action out."""
-        if waiting.is_done(self._controller):
-            return _response(HTTPStatus.OK, {'message': waiting.message})
+        try:
+            if waiting.is_done(self._controller):
+                return _response(HTTPStatus.OK, {'message': waiting.message})
+        except Refused as refused:
+            return _response(refused.status, refused.fields)
         if self._controller.time >= self._waits_until:
             return _response(HTTPStatus.GATEWAY_TIMEOUT, {'message': 'Gateway Timeout'})
         return b''

@@ -29,17 +29,17 @@ ROUNDING = 1.0 + 1e-6
 # A step is shortened this many times before its end is considered out of reach.
 _ATTEMPTS = 12
 # Near a singularity, half a step turns the joints almost as far as the whole step. A step that is
-# too long by some factor is therefore divided by a power of this factor, but at most by the power
-# with this exponent, and at most by this multiple of the factor.
+# too long by a factor is therefore divided by a power of the factor: the largest exponent, and the
+# largest divisor as a multiple of the factor.
 _MAX_POWER, _MAX_OVERCUT = 4.0, 2.0
-# A tool motion is stuck if its speed stays below this fraction of the planned speed
+# A tool motion is stuck if it stays slower than this fraction of the planned speed, ...
 _STALLED = 0.01
-# for longer than this [s],
+# ... for longer than this [s], ...
 _STALLED_AFTER = 1.0
-# unless a joint is faster than this fraction of its limit, as when the arm passes a singularity.
+# ... while no joint is faster than this fraction of its limit, as in passing a singularity.
 _TURNING = 0.2
-# If the first step of a joint line is too long by this factor, the line does not begin at the
-# joints with which the preceding tool path ends.
+# A joint line whose first step is too long by more than this factor jumps: it does not begin at
+# the joints where the tool path before it ends.
 _JUMP_RATIO = 50.0
 
 

@@ -15,6 +15,8 @@ import re
 from types import MappingProxyType
 from typing import TypeAlias
 
+from ur_cartesian_driver.urscript.parsing.scanner import KEYWORDS
+
 
 @dataclass(frozen=True, slots=True)
 class ScriptText:
@@ -60,10 +62,9 @@ class ProgramTree:
         """
         Return the program as URScript.
 
-        :param name: the name of the file; the function gets the same, as far as URScript allows.
+        :param name: the name of the file.
         """
-        function = re.sub(r'\W', '_', name.removesuffix('.urp'), flags=re.ASCII) or 'program'
-        lines = [f'def {"" if function[0].isalpha() else "_"}{function}():']
+        lines = [f'def {function_name(name.removesuffix(".urp"))}():']
         header = fetched.header
         if fetched.header_first:
             lines.append(header)
@@ -79,6 +80,24 @@ class ProgramTree:
         if self.loops:
             lines.append('end')
         return '\n'.join([*lines, 'end', ''])
+
+
+@dataclass(frozen=True, slots=True)
+class UnreadableProgram:
+    """A program that the robot has on its disk, but refuses to load."""
+
+    #: Why, as a sentence without its full stop.
+    reason: str
+
+
+#: A program on the disk of a robot: URScript, a tree, or why it is neither.
+SavedProgram: TypeAlias = str | ProgramTree | UnreadableProgram
+
+
+def function_name(program: str) -> str:
+    """Return the name of a program's function: that of the program, as far as URScript allows."""
+    name = re.sub(r'\W', '_', program, flags=re.ASCII) or 'program'
+    return name if name[0].isalpha() and name not in KEYWORDS else f'_{name}'
 
 
 #: The programs that every simulated robot has saved: file name -> tree.

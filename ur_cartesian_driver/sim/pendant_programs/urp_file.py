@@ -48,7 +48,7 @@ def read_urp(data: bytes, name: str) -> ProgramTree:
         if b'<!DOCTYPE' in xml:  # declares entities, which can grow without bound
             raise ValueError('it has a DOCTYPE')
         root = ElementTree.fromstring(xml)
-    except (OSError, EOFError, zlib.error, ElementTree.ParseError, ValueError) as error:
+    except (zlib.error, ElementTree.ParseError, LookupError, ValueError) as error:
         raise ValueError(f'{name} is no program file of PolyScope 3 or 5: {error}.') from None
     main = root.find('children/MainProgram')
     if root.tag != 'URProgram' or main is None:

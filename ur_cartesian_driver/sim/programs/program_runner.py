@@ -132,6 +132,8 @@ class ProgramRunner:
         self._loaded: ScriptProgram | GenerateScript | None = None
         #: Marks the start that waits for its generated program; None = no start does.
         self._awaited: object | None = None
+        #: Why the program that `play` should start has not started; empty = it has.
+        self.start_failure = ''
         #: Names of the program that was compiled last, for reuse if the same program follows.
         self._newest_scope: Scope | None = None
         #: Name of the program that was loaded for `play`, empty if none was.
@@ -205,6 +207,7 @@ class ProgramRunner:
         reason = self._arm.start_refusal()
         if reason:
             self._messages.text(f'Program {name} was not started: {reason}.')
+            self.start_failure = reason
             return
         self._queue_start(name, interpreter)
 
@@ -246,6 +249,7 @@ class ProgramRunner:
             self._awaited = None
             if isinstance(compiled, CompileError):
                 self._messages.exception(compiled.line, compiled.column, compiled.text)
+                self.start_failure = str(compiled)
             else:
                 self._start_compiled(name, compiled.interpreter)
 
@@ -287,6 +291,8 @@ class ProgramRunner:
         interpreter = self._interpreter
         interpreter.on_thread_end = lambda number: self._arm.release((id(interpreter), number))
         self.state = RuntimeState.PLAYING
+        if self.name == self.loaded:
+            self.start_failure = ''
         self._arm.begin_program()
         # A real controller writes XXX, too; the text of the message is the name of the program.
         self._messages.key('PROGRAM_XXX_STARTED', self.name)
@@ -304,6 +310,7 @@ class ProgramRunner:
             if self._loaded is None:
                 return 'no program is loaded'
             self._arm.run_preamble()
+            self.start_failure = 'a stop or another program came first'
             if isinstance(self._loaded, ScriptProgram):
                 self._queue_start(self.loaded, self._compile(self._loaded))
             elif self._awaited is None:

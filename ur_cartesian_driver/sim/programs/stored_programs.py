@@ -12,10 +12,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 import json
 from pathlib import PurePosixPath
-import re
 from typing import Any
 
-from ur_cartesian_driver.sim.pendant_programs.program_tree import FetchedScript, ProgramTree
+from ur_cartesian_driver.sim.pendant_programs.program_tree import (
+    FetchedScript,
+    function_name,
+    SavedProgram,
+    UnreadableProgram,
+)
 
 #: Suffix of the programs of PolyScope X.
 URPX_SUFFIX = '.urpx'
@@ -23,18 +27,18 @@ _SCRIPT = ('program', 'urscript', 'script')
 
 
 class StoredPrograms:
-    """The programs on the disk of a robot, as URScript or as trees."""
+    """The programs on the disk of a robot."""
 
-    def __init__(self, programs: Mapping[str, str | ProgramTree]) -> None:
+    def __init__(self, programs: Mapping[str, SavedProgram]) -> None:
         """
         Begin with these files.
 
-        :param programs: file name -> URScript or tree.
+        :param programs: file name -> program.
         """
         self._programs = dict(programs)
         self._uploaded: dict[str, Mapping[str, Any]] = {}
 
-    def program(self, file: str) -> str | ProgramTree | None:
+    def program(self, file: str) -> SavedProgram | None:
         """Return the program of a file; None = there is no such file."""
         return self._programs.get(file)
 
@@ -47,12 +51,15 @@ class StoredPrograms:
         Return the content of a program's `.urpx` file.
 
         A program that was not uploaded gets one without a tree, and with nothing at its nodes of
-        External Control.
+        External Control; one that cannot be read gets an empty script.
         """
         if (content := self._uploaded.get(name)) is not None:
             return content
         program = self._programs[self.names()[name]]
-        script = program if isinstance(program, str) else program.script(name, FetchedScript())
+        if isinstance(program, UnreadableProgram):
+            script = ''
+        else:
+            script = program if isinstance(program, str) else program.script(name, FetchedScript())
         return {
             'application': {},
             'program': {
@@ -71,7 +78,7 @@ class StoredPrograms:
     def put(self, name: str, content: Mapping[str, Any]) -> None:
         """Add or replace a program; the content has been read by :func:`read_urpx`."""
         self._uploaded[name] = content
-        self._programs[self.names().get(name, name + URPX_SUFFIX)] = _script_of(name, content)
+        self._programs[self.names().get(name, name + URPX_SUFFIX)] = urpx_script(name, content)
 
 
 def read_urpx(data: bytes) -> tuple[str, Mapping[str, Any]]:
@@ -94,10 +101,10 @@ def _text_in(content: object, *keys: str) -> str:
     return content if isinstance(content, str) else ''
 
 
-def _script_of(name: str, content: Mapping[str, Any]) -> str:
+def urpx_script(name: str, content: Mapping[str, Any]) -> str:
     """Return the URScript of a program, as one function, behind the application's script."""
     script = _text_in(content, *_SCRIPT)
     if script.lstrip().startswith('def '):
         return script
     application = _text_in(content, 'application', 'urscript', 'script')
-    return f'def {re.sub(r"[^A-Za-z0-9_]", "_", f"p_{name}")}():\n{application}\n{script}\nend\n'
+    return f'def {function_name(name)}():\n{application}\n{script}\nend\n'

@@ -123,9 +123,9 @@ class JointKinematics:
 
     def kept_rows(self, q: Floats, on_branch: bool) -> Flags:
         """
-        Return for each step from row to row whether the arm can make it in one cycle (n,).
+        Return a mask (n,) of the steps between rows that the arm can make in one cycle.
 
-        The joint limits are as in :meth:`overspeed_factor`.
+        The limits of the joints are those of :meth:`overspeed_factor`.
 
         :param q: joint positions (n + 1, 6) [rad]; the first row is the arm's present position.
         :param on_branch: whether a step must also stay on the IK branch.
@@ -186,7 +186,7 @@ class JointKinematics:
         self, move_path: MovePath, q: Vector6, T_tcp_flange: Pose, a: float, v: float
     ) -> ProfileParameters:
         """
-        Return the highest acceleration and speed within the joint limits, times ``a`` and ``v``.
+        Return the fractions ``a`` and ``v`` of the highest acceleration and speed of the joints.
 
         The joint travel per path length is computed at a few samples of the path, from ``q`` on.
         """
