@@ -19,6 +19,7 @@ from ur_cartesian_driver.motion.goal.goal import Goal, IOCommand, OutputKind, Wa
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.registers import PROGRAM_VERSION
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
+from ur_cartesian_driver.robot.services.service_calls import WatchContactCall
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
@@ -79,6 +80,11 @@ def test_a_foreign_program_executes_what_it_can_and_nothing_else():
             cell, 'another TCP than the robot has', T_flange_controlled=Pose((0.0, 0.0, 0.01))
         )
         assert registers(cell) == left_behind
+        call = cell.owner.call(WatchContactCall())
+        await cell.until(lambda: call in cell.owner.call_answers)
+        refusal = cell.owner.call_answers[call]
+        assert not refusal.ok
+        assert refusal.text.startswith('This is a watch for contact, for which the robot has to ')
         outcome = await run_goal(cell)
         assert outcome.code is ErrorCode.SUCCESSFUL, outcome.text
 
@@ -107,8 +113,11 @@ def test_our_program_of_another_driver_is_foreign(register):
 
     async def scenario(cell):
         text, (version, number, _) = await cell.fetch_program(), registers(cell)
-        old = {'version': f'PROGRAM_VERSION = {version}', 'number': f'PROGRAM_NUMBER = {number}'}
-        new = {'version': 'PROGRAM_VERSION = 0', 'number': f'PROGRAM_NUMBER = {number ^ 1}'}
+        old = {
+            'version': f'PROGRAM_VERSION = {version}\n',
+            'number': f'PROGRAM_NUMBER = {number}\n',
+        }
+        new = {'version': 'PROGRAM_VERSION = 0\n', 'number': f'PROGRAM_NUMBER = {number ^ 1}\n'}
         assert text.count(old[register]) == 1
         await play(cell, text.replace(old[register], new[register]))
         await check_refusal(cell, 'outputs (io_commands)', io_commands=(OUTPUT,))

@@ -725,11 +725,23 @@ def test_a_cancel_before_the_motion_waits_until_no_tcp_is_on_its_way():
     assert 'before anything moved' in end.text
 
 
-@pytest.mark.parametrize('result', list(TrajectoryResult))
+@pytest.mark.parametrize('result', set(TrajectoryResult) - {TrajectoryResult.TOUCHED})
 def test_a_late_result_of_the_goal_before_does_not_arm(result):
     machine, _ = lent()
     assert machine.step(TrajectoryEnded(result=result), 0.1) == []
     assert machine.state is GoalState.ARMING
+
+
+def test_a_contact_ends_a_goal_that_has_not_moved_yet():
+    machine, _ = lent()
+    machine.step(with_tcp(OWN), 0.0)
+    touched = TrajectoryEnded(result=TrajectoryResult.TOUCHED)
+    assert machine.step(touched, 0.01) == [RestoreTcp(T_flange_tcp=OWN)]
+    assert machine.step(with_tcp(OWN), 0.02) == []
+    end = outcome(machine.step(with_tcp(OWN), SET_TIMEOUT))
+    assert end.code is ErrorCode.EXECUTION_FAILED
+    assert end.text.startswith('The tool touched, ')
+    assert end.text.endswith('(before anything moved).')
 
 
 def test_a_tcp_that_does_not_come_back_is_said_and_left_to_the_owner():

@@ -178,7 +178,7 @@ def test_handles_of_threads_are_killed_and_not_compared():
 def test_one_function_stops_the_motion_of_another_thread_in_one_critical_section():
     lines = [line.strip() for line in text(allow_freedrive=True).splitlines()]
     assert sum('stopj(' in line for line in lines) == 1
-    begin = lines.index('def stop_arm():')
+    begin = lines.index('def stop_arm(at_contact):')
     section = lines[begin : lines.index('exit_critical', begin)]
     assert section[1] == 'enter_critical'
     assert section[-1] == 'brake()'

@@ -474,6 +474,7 @@ RESULTS = [
     (TrajectoryResult.INPUT_MISSING, '00000003'),
     (TrajectoryResult.CONTACT, '00000004'),
     (TrajectoryResult.NO_CONTACT, '00000005'),
+    (TrajectoryResult.TOUCHED, '00000006'),
 ]
 
 
@@ -494,7 +495,7 @@ def test_results_are_read_when_joined_or_in_pieces():
     assert decoder.feed(b'') == []
 
 
-@pytest.mark.parametrize('text', ['00000006', 'ffffffff', '7fffffff'])
+@pytest.mark.parametrize('text', ['00000007', 'ffffffff', '7fffffff'])
 def test_an_unknown_result_is_refused_with_its_bytes(text):
     with pytest.raises(RemoteProtocolError, match=text):
         TrajectoryResultDecoder().feed(bytes.fromhex(text))

@@ -57,6 +57,7 @@ def test_a_peer_at_the_ports_does_not_get_between_driver_and_program(attack, han
                 connected=connected.set,
                 lost=lost.append,
                 result=results.put_nowait,
+                contact=results.put_nowait,
                 warning=lambda _: None,
             ),
         )

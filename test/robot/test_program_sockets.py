@@ -47,6 +47,7 @@ class Cell:
                 connected=lambda: tell('connected'),
                 lost=lambda reason: tell(f'lost, {reason}'),
                 result=tell,
+                contact=tell,
                 warning=lambda text: tell(f'warning, {text}'),
             ),
         )
@@ -463,7 +464,9 @@ def test_a_port_that_is_taken_is_named_with_its_parameter():
                     script_command_port=0,
                     script_sender_port=0,
                 ),
-                ProgramCallbacks(connected=Mock(), lost=Mock(), result=Mock(), warning=Mock()),
+                ProgramCallbacks(
+                    connected=Mock(), lost=Mock(), result=Mock(), contact=Mock(), warning=Mock()
+                ),
             )
             with pytest.raises(OSError, match='set reverse_port to a free port or to 0'):
                 await other.open(HOST, frozenset())

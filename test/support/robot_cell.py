@@ -27,6 +27,8 @@ from ur_cartesian_driver.driver.ipc import state_memory
 from ur_cartesian_driver.driver.ipc.channel import (
     AppendAnswered,
     AppendToMotion,
+    CallAnswered,
+    CallRobot,
     CancelMotion,
     Configure,
     LENGTH,
@@ -87,6 +89,9 @@ class Owner:
         self.motions = {}
         #: Answers to appended points.
         self.answers = []
+        #: Answers to service calls, by their numbers.
+        self.call_answers = {}
+        self._calls = 0
         self.log = []
         self.silent = False
         self._writer = None
@@ -124,6 +129,12 @@ class Owner:
     def append(self, points, append_job):
         self.send(AppendToMotion(motion=len(self.motions), points=points, append_job=append_job))
 
+    def call(self, call):
+        """Make a service call; return the number of its answer."""
+        self._calls += 1
+        self.send(CallRobot(number=self._calls, call=call))
+        return self._calls
+
     def cancel(self):
         self.send(CancelMotion(motion=len(self.motions)))
 
@@ -139,6 +150,8 @@ class Owner:
                 self.motions[number].progress.append(progress)
             case AppendAnswered(answer=answer):
                 self.answers.append(answer)
+            case CallAnswered(number=number, answer=answer):
+                self.call_answers[number] = answer
             case MotionEnded(motion=number, outcome=outcome):
                 motion = self.motions[number]
                 assert motion.outcome is None, 'a goal ends once'

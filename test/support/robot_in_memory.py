@@ -175,11 +175,17 @@ class RobotInMemory:
         """Return the results that come within some cycles after the end of a trajectory."""
         for _ in range(cycles):
             self.controller.step()
-        return TrajectoryResultDecoder().feed(self._socket(TRAJECTORY).take())
+        said = self._socket(TRAJECTORY).take()
+        return TrajectoryResultDecoder().feed(said) if said else []
 
     def send_command(self, command):
         """Let a script command come."""
         self._socket(COMMAND).feed(script_command.encode(command))
+
+    def contact_answers(self):
+        """Return the answers of the watch for contact since the last call."""
+        said = self._socket(COMMAND).take()
+        return script_command.ToolContactResultDecoder().feed(said) if said else []
 
     # -- between trajectories --------------------------------------------------------------------
 

@@ -16,6 +16,7 @@ from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,
     DownloadProgramCall,
+    EndContactWatchCall,
     HandBackCall,
     ListProgramsCall,
     RecoverCall,
@@ -29,6 +30,7 @@ from ur_cartesian_driver.robot.services.service_calls import (
     SetSpeedSliderCall,
     SetTcpCall,
     UploadProgramCall,
+    WatchContactCall,
     ZeroFtSensorCall,
 )
 
@@ -37,8 +39,9 @@ class RobotServices(ABC):
     """
     Service calls; each method waits for the answer: at most 40 s, for a recovery 120 s.
 
-    For a script, its ``timeout`` is added to the 40 s. A refusal is an answer too. A value that
-    cannot be sent raises :class:`~ur_cartesian_driver.motion.errors.LocalProtocolError`.
+    For a script, its ``timeout`` is added to the 40 s; :meth:`watch_contact` returns at once. A
+    refusal is an answer too. A value that cannot be sent raises
+    :class:`~ur_cartesian_driver.motion.errors.LocalProtocolError`.
     """
 
     @abstractmethod
@@ -101,6 +104,20 @@ class RobotServices(ABC):
     def zero_ftsensor(self) -> ServiceAnswer:
         """Zero the force-torque sensor at the force and torque that it measures now."""
         return self.call(ZeroFtSensorCall()).result()
+
+    def watch_contact(self) -> Future[ServiceAnswer]:
+        """
+        Stop every motion, also one that is started later, where the tool touches.
+
+        The arm goes back to where the tool did not touch yet; then the answer comes. A motion that
+        ran ends with ``EXECUTION_FAILED``, unless it was to end at contact itself. The watch also
+        ends, without success, by :meth:`end_contact_watch` and with the robot program.
+        """
+        return self.call(WatchContactCall())
+
+    def end_contact_watch(self) -> ServiceAnswer:
+        """End the watch for contact, which is answered then; nothing happens without one."""
+        return self.call(EndContactWatchCall()).result()
 
     def hand_back_control(self) -> ServiceAnswer:
         """Make the pendant's program continue after its External Control node."""

@@ -31,6 +31,8 @@ class TrajectoryResult(IntEnum):
     CONTACT = 4
     #: A required contact did not come.
     NO_CONTACT = 5
+    #: The tool made contact, and a watch beside the trajectory stopped the arm there.
+    TOUCHED = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,6 +77,13 @@ class LinkLost:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ContactWatchChanged:
+    """The robot program watches for contact beside the goal, or does so no more."""
+
+    is_active: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Tick:
     """Time passed; sent every 20 ms, so that timeouts expire even if nothing else happens."""
 
@@ -112,6 +121,7 @@ Event: TypeAlias = (
     | PreemptRequested
     | LinkLost
     | OutputsSecured
+    | ContactWatchChanged
     | Tick
 )
 

@@ -140,6 +140,9 @@ PRESS_CONSTANTS: dict[str, float] = {
     'STEP_WITHOUT_GAIN': 0.008,
 }
 
+#: The watch for contact takes the tool for resting below this speed [m/s].
+WATCH_REST_SPEED = 0.001
+
 #: Constants of path offsets.
 OFFSET_CONSTANTS: dict[str, float] = {
     #: The controller's number for offsets along the axes of the base.
@@ -375,6 +378,7 @@ def _message_constants() -> Iterator[str]:
         yield f'SPLINE_{name} = {value:.10f}'
     yield from _enum('RESULT', TrajectoryResult)
     yield from _enum('COMMAND', script_command.ScriptCommand)
+    yield from _enum('TOOL_CONTACT', script_command.ToolContactResult)
     yield f'NO_COMMAND = {[0] * (script_command.COMMAND_WORDS + 1)}'
 
 
@@ -405,6 +409,7 @@ def _event_constants() -> Iterator[str]:
     yield from _enum('CONTACT', ContactEnd)
     for name, value in PRESS_CONSTANTS.items():
         yield f'PRESS_{name} = {value}'
+    yield f'WATCH_REST_SPEED = {WATCH_REST_SPEED}'
     for name, value in OFFSET_CONSTANTS.items():
         yield f'OFFSET_{name} = {value:.10g}'
     yield f'TRAJECTORY_TAKES_OFFSETS = {int(reverse.TAKES_OFFSETS)}'

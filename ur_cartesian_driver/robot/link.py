@@ -26,7 +26,13 @@ from typing import NoReturn
 
 from ur_cartesian_driver.kinematics.robot_models import DhTable, JointLimits, MODELS
 from ur_cartesian_driver.motion.errors import DriverError
-from ur_cartesian_driver.motion.events import Event, LinkLost, StateReceived, TrajectoryEnded
+from ur_cartesian_driver.motion.events import (
+    ContactWatchChanged,
+    Event,
+    LinkLost,
+    StateReceived,
+    TrajectoryEnded,
+)
 from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.state.io_signals import Signals
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
@@ -47,6 +53,7 @@ from ur_cartesian_driver.robot.lifecycle import ConnectionEvent, ConnectionState
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.link_status import LinkStatus
 from ur_cartesian_driver.robot.primary_client import PrimaryCallbacks, PrimaryClient
+from ur_cartesian_driver.robot.program.contact_watch import ContactWatch
 from ur_cartesian_driver.robot.program.program_control import ProgramControl
 from ur_cartesian_driver.robot.program.program_sockets import ProgramCallbacks, ProgramSockets
 from ur_cartesian_driver.robot.rtde.signal_stream import SignalStream
@@ -126,8 +133,13 @@ class RobotLink:
                 connected=self._on_program_connected,
                 lost=self._on_program_lost,
                 result=lambda result: callbacks.event(TrajectoryEnded(result=result)),
+                contact=lambda result: self.contact_watch.take(result),
                 warning=self._warn,
             ),
+        )
+        self.contact_watch = ContactWatch(
+            self.program,
+            lambda active: callbacks.event(ContactWatchChanged(is_active=active)),
         )
         self.event_log = EventLog(
             asyncio.get_running_loop().time, self.program, settings.robot_receive_timeout
@@ -361,6 +373,7 @@ class RobotLink:
                 CAUSE_TIMEOUT, self.explain, 'The robot program is gone.'
             )
         self.control.tcp_setter.program_lost()
+        self.contact_watch.program_lost(reason)
         self._status.apply(
             ConnectionEvent.PROGRAM_LOST,
             program_running=False,

@@ -34,6 +34,7 @@ from ur_cartesian_driver.ros.parameters.node_parameters import as_overrides, dec
 from ur_cartesian_driver.ros.parameters.parameter_table import ParameterError, ParameterValue
 from ur_cartesian_driver.ros.services.append_service import AppendService
 from ur_cartesian_driver.ros.services.command_services import CommandServices
+from ur_cartesian_driver.ros.services.contact_action import ContactAction
 from ur_cartesian_driver.ros.state.joint_states_check import JointStatesCheck
 from ur_cartesian_driver.ros.state.state_publisher import StatePublisher
 from ur_cartesian_driver.ros.ur_driver_names.names_process import NamesProcess
@@ -121,6 +122,8 @@ class CartesianDriverNode(Node):
             )
             self._components.append(self.live_targets)
         self._components.append(FreedriveService(self, self.driver, arbiter))
+        self.contact_action = ContactAction(self, self.driver)
+        self._components.append(self.contact_action)
         self._publisher.start()
         self._call_services = CommandServices(self, self.driver, self._is_idle)
         self.create_timer(
@@ -254,9 +257,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _end_goals(
     node: CartesianDriverNode, executor: SingleThreadedExecutor, signals: _SignalCounter
 ) -> None:
-    node.action_server.stop()
+    servers = node.action_server, node.contact_action
+    for server in servers:
+        server.stop()
     deadline = monotonic() + SHUTDOWN_TIMEOUT
-    while not node.action_server.idle and monotonic() < deadline and signals.count < 2:
+    while (
+        not all(server.idle for server in servers) and monotonic() < deadline and signals.count < 2
+    ):
         executor.spin_once(timeout_sec=0.05)
     for _ in range(3):  # the executor still has to send the results
         executor.spin_once(timeout_sec=0.02)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Joint trajectories until the tool touches, by the name of the UR driver's node."""
+"""Contact of the tool: trajectories until it touches, and a watch, by the UR driver's names."""
 
 from action_msgs.msg import GoalStatus
 from builtin_interfaces.msg import Duration
@@ -111,3 +111,62 @@ def test_a_refusal_of_the_driver_was_not_triggered(ur):
     assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, result.INVALID_GOAL)
     assert 'max_approach_distance' in result.error_string
     assert result.until_condition_result == result.NOT_TRIGGERED
+
+
+def watch(ur):
+    return ur.action('/tool_contact_controller/detect_tool_contact', 'ur_msgs/action/ToolContact')
+
+
+@touching
+@pytest.mark.parametrize('controller', ['joint_trajectory', 'passthrough_trajectory'])
+def test_a_watch_stops_a_trajectory_and_succeeds(ur, controller):
+    contact = watch(ur)
+    watching = ur.send(contact, contact._action_type.Goal())
+    assert watching.accepted
+    name = f'/{controller}_controller/follow_joint_trajectory'
+    client = ur.action(name, 'control_msgs/action/FollowJointTrajectory')
+    moving = ur.send(client, swing(ur, client, (3, -0.05), (8, -0.3)))
+    status, _ = ur.result(watching)
+    assert status == GoalStatus.STATUS_SUCCEEDED
+    assert ur.cell.T_base_tcp.position[1] == pytest.approx(FACE, abs=1e-3)
+    status, result = ur.result(moving)
+    assert status == GoalStatus.STATUS_ABORTED
+    assert result.error_code == result.PATH_TOLERANCE_VIOLATED
+    assert 'the watch for contact (detect_tool_contact)' in result.error_string
+    # The watch is over, as that of the UR driver is.
+    status, result = ur.result(ur.send(client, swing(ur, client, (3, 0.1))))
+    assert (status, result.error_code) == (GoalStatus.STATUS_SUCCEEDED, 0), result.error_string
+
+
+@touching
+def test_a_watch_and_a_trajectory_until_contact_both_succeed(ur):
+    contact, client = watch(ur), until(ur)
+    watching = ur.send(contact, contact._action_type.Goal())
+    moving = ur.send(client, swing(ur, client, (3, -0.05), (8, -0.3)))
+    status, result = ur.result(moving)
+    assert (status, result.error_code) == (GoalStatus.STATUS_SUCCEEDED, 0), result.error_string
+    assert result.until_condition_result == result.TRIGGERED
+    assert ur.result(watching)[0] == GoalStatus.STATUS_SUCCEEDED
+
+
+def test_a_watch_rejects_another_one_and_is_cancelled(ur, capfd):
+    contact = watch(ur)
+    for _ in range(2):
+        watching = ur.send(contact, contact._action_type.Goal())
+        assert watching.accepted
+        assert not ur.send(contact, contact._action_type.Goal()).accepted
+        assert 'a goal is being executed' in capfd.readouterr().err
+        ur.cell.await_(watching.cancel_goal_async())
+        assert ur.result(watching)[0] == GoalStatus.STATUS_CANCELED
+
+
+def test_a_watch_ends_with_the_program(ur, capfd):
+    contact = watch(ur)
+    watching = ur.send(contact, contact._action_type.Goal())
+    assert ur.io('hand_back_control').success
+    assert ur.result(watching)[0] == GoalStatus.STATUS_ABORTED
+    assert 'The watch for contact ended with the robot program: ' in capfd.readouterr().err
+    assert ur.io('resend_robot_program').success
+    watching = ur.send(contact, contact._action_type.Goal())
+    ur.cell.await_(watching.cancel_goal_async())
+    assert ur.result(watching)[0] == GoalStatus.STATUS_CANCELED

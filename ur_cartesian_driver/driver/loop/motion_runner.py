@@ -62,6 +62,7 @@ from ur_cartesian_driver.execution.goal.temporary_tcp import same_tcp
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,
+    ContactWatchChanged,
     Event,
     INPUTS_LINK,
     LinkLost,
@@ -74,6 +75,7 @@ from ur_cartesian_driver.motion.state.io_signals import Signals
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.protocol.program import script_command
 from ur_cartesian_driver.robot.link import RobotLink
+from ur_cartesian_driver.robot.program.program_tracker import NEEDS_OWN_PROGRAM
 from ur_cartesian_driver.robot.rtde.register_connection import (
     offset_exchange,
     RegisterConnection,
@@ -160,6 +162,8 @@ class MotionRunner:
         self._ends.begin()
         self._link.set_executing(True)
         self._execute(commands)
+        if self._link.contact_watch.is_active:
+            self.handle_event(ContactWatchChanged(is_active=True))
 
     def _refusal(self, job: MotionJob) -> str:
         """Return why a motion cannot start now; empty if it can."""
@@ -179,11 +183,7 @@ class MotionRunner:
         needs = '' if job is None else job.own_program_needs
         if not needs or await self._link.control.tracker.wait_for_identity():
             return ''
-        return (
-            f'The goal has {needs}, for which the robot has to run the program of this driver, '
-            'and the program that runs has not shown to be that; call resend_robot_program '
-            '(headless_mode), or play a program whose External Control node fetches it from here.'
-        )
+        return f'The goal has {needs}, {NEEDS_OWN_PROGRAM}'
 
     async def append(self, request: AppendToMotion) -> None:
         """Offer points to the running motion; refuse them if they are for another motion."""

@@ -157,6 +157,9 @@ class GoalMachine:
         commands: list[GoalCommand] = []
         for each in self.can.ageing:
             commands += each.age(now)
+        if isinstance(event, events.ContactWatchChanged):
+            self._monitor.contact_is_watched = event.is_active
+            return commands
         if isinstance(event, events.StateReceived):
             commands += self._observe(event.state, now)
         elif isinstance(event, _REGISTERS):

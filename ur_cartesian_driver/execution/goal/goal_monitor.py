@@ -73,6 +73,8 @@ class GoalMonitor:
         #: The newest packet; None before the first packet.
         self.latest: RobotState | None = None
         self._applied_offset = NO_OFFSET
+        #: Whether a watch beside the goal stops the arm at contact, and moves it back.
+        self.contact_is_watched = False
         #: Scaled time: time since the start, as the controller's clock ran [s]; the part of that
         #: time before the motion began [s].
         self.scaled_time = self.start_delay = 0.0
@@ -383,9 +385,8 @@ class GoalMonitor:
             return None
         clause = self._joint_check.path_violation(state)
         if clause is None and (self._path_check or press):
-            desired = self._desired(state)
+            desired = self._retracted(self._tracked(state.actual_tcp_pose), self._desired(state))
             if press is not None:
-                desired = self._retracted(self._tracked(state.actual_tcp_pose), desired)
                 clause = press.excess(desired, state, self._tracker.time())
                 state = press.stiff_state(desired, state)
             clause = clause or self._path_check.violation(desired, state)
@@ -430,7 +431,7 @@ class GoalMonitor:
     def _retracted(self, pose: Pose, planned: Pose) -> Pose:
         """Return the planned pose, or an earlier one if the tool retracts after contact."""
         press = self._press()
-        if press is None or not press.ends_at_contact:
+        if not self.contact_is_watched and (press is None or not press.ends_at_contact):
             return planned
         behind = self._tracker.behind(pose)
         return behind if behind.distance_to(pose) < planned.distance_to(pose) else planned

@@ -24,7 +24,8 @@ state, and the error code if the signal decides the outcome of the goal.
   inside the goal tolerance, within the goal's time tolerance. If the controller's target is not
   at the last point, the program skipped motions (DEVIATION).
 * A goal that ends when the tool touches (CONTACT) succeeds without SETTLING: the program has
-  moved the arm back to the place of contact.
+  moved the arm back to the place of contact. A goal that such a contact ends for the sake of a
+  watch beside it (TOUCHED) fails, also at rest between or after its trajectories.
 * **CANCELLING**: CANCEL has been sent. The program brakes, discards the points that it has not
   run and answers CANCELED. A SUCCESS in this state means that the last point was reached before
   the program read CANCEL; this is not the answer to CANCEL: CANCELED still follows.
@@ -121,7 +122,13 @@ def _decide(state: GoalState, *signals: GoalSignal) -> dict[GoalSignal, Transiti
 
 
 _STOPS = (GoalSignal.PROTECTIVE_STOP, GoalSignal.EMERGENCY_STOP, GoalSignal.CONNECTION_LOST)
-_RESULTS = (GoalSignal.SUCCESS, GoalSignal.CANCELED, GoalSignal.FAILURE, GoalSignal.CONTACT)
+_RESULTS = (
+    GoalSignal.SUCCESS,
+    GoalSignal.CANCELED,
+    GoalSignal.FAILURE,
+    GoalSignal.CONTACT,
+    GoalSignal.TOUCHED,
+)
 _USER_STOPS = (GoalSignal.CANCEL, GoalSignal.PREEMPT)
 
 #: Transitions if the arm stops by itself: this deeper reason replaces an outcome that is already
@@ -133,6 +140,7 @@ _ON_STOP = {
 _WHILE_RUNNING = {
     **_ON_STOP,
     **_decide(GoalState.RESTORING, GoalSignal.CANCELED, GoalSignal.FAILURE, GoalSignal.CONTACT),
+    **_decide(GoalState.RESTORING, GoalSignal.TOUCHED),
     **_decide(GoalState.CANCELLING, *_USER_STOPS, GoalSignal.VIOLATION, GoalSignal.DEVIATION),
     **_decide(GoalState.CANCELLING, GoalSignal.STALE),
     **_decide(GoalState.ENDED, GoalSignal.STANDSTILL),
@@ -147,6 +155,7 @@ TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = {
         **_to(GoalState.ARMING, *_RESULTS),
         **_to(GoalState.MOVING, GoalSignal.ARMED),
         **_decide(GoalState.RESTORING, *_USER_STOPS, GoalSignal.STALE, GoalSignal.NOT_READY),
+        **_decide(GoalState.RESTORING, GoalSignal.TOUCHED),
     },
     GoalState.MOVING: {
         **_WHILE_RUNNING,
@@ -163,13 +172,14 @@ TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = {
         **_to(GoalState.MOVING, GoalSignal.APPENDED),
         **_to(GoalState.SETTLING, GoalSignal.NO_MORE_POINTS),
         **_decide(GoalState.RESTORING, *_USER_STOPS, GoalSignal.DEVIATION, GoalSignal.STALE),
-        **_decide(GoalState.RESTORING, GoalSignal.ABANDONED),
+        **_decide(GoalState.RESTORING, GoalSignal.ABANDONED, GoalSignal.TOUCHED),
     },
     GoalState.SETTLING: {
         **_ON_STOP,
         **_to(GoalState.SETTLING, *_RESULTS),
         **_decide(GoalState.RESTORING, *_USER_STOPS, GoalSignal.DEVIATION, GoalSignal.STALE),
         **_decide(GoalState.RESTORING, GoalSignal.SETTLED, GoalSignal.NOT_SETTLED),
+        **_decide(GoalState.RESTORING, GoalSignal.TOUCHED),
     },
     GoalState.CANCELLING: {
         **_ON_STOP,

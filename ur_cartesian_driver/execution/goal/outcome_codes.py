@@ -27,6 +27,7 @@ class GoalSignal(Enum):
     CANCELED = 'the trajectory was cancelled', ErrorCode.EXECUTION_FAILED
     FAILURE = 'the robot program failed', ErrorCode.EXECUTION_FAILED
     CONTACT = 'the tool touched, where that ends the goal', ErrorCode.SUCCESSFUL
+    TOUCHED = 'the tool touched, which a watch beside the goal awaits', ErrorCode.EXECUTION_FAILED
     # Requests of users.
     CANCEL = 'the client cancels', ErrorCode.CANCELLED
     PREEMPT = 'a newer goal takes over', ErrorCode.PREEMPTED
@@ -79,6 +80,10 @@ RESULT_SIGNALS: dict[TrajectoryResult, Fault] = {
         'an input of input_waits did not come in time',
     ),
     TrajectoryResult.CONTACT: (GoalSignal.CONTACT, 'the tool touched'),
+    TrajectoryResult.TOUCHED: (
+        GoalSignal.TOUCHED,
+        'the tool touched, and the watch for contact (detect_tool_contact) stops every motion',
+    ),
     TrajectoryResult.NO_CONTACT: (
         GoalSignal.FAILURE,
         'the tool touched nothing, but its press requires contact',

@@ -51,7 +51,12 @@ from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT, NO_INPUT
 from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoStream
 from ur_cartesian_driver.execution.servo.wait_for_arm import WaitForArm
-from ur_cartesian_driver.motion.events import Event, ServoReceived, TrajectoryEnded
+from ur_cartesian_driver.motion.events import (
+    Event,
+    ServoReceived,
+    TrajectoryEnded,
+    TrajectoryResult,
+)
 from ur_cartesian_driver.motion.geometry.vectors import subtract6
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.servo_report import UNKNOWN6
@@ -194,7 +199,8 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
     def interpret(self, event: Event, state: GoalState) -> Meaning | None:
         """Return the meaning of the servo's phase after a packet."""
         if self._points is None and isinstance(event, TrajectoryEnded):
-            return NO_MEANING  # the result of an earlier goal
+            # All others are the results of an earlier goal.
+            return None if event.result is TrajectoryResult.TOUCHED else NO_MEANING
         if not isinstance(event, ServoReceived):
             return None
         if self.stream.phase is ServoPhase.ARRIVED and state is GoalState.MOVING:

@@ -150,7 +150,7 @@ class ExternalError(IntEnum):
 
 
 #: Incremented when the robot program gains a feature that the driver relies on.
-PROGRAM_VERSION = 2
+PROGRAM_VERSION = 3
 
 Register: TypeAlias = (
     InputInteger | InputDouble | OutputInteger | OutputDouble | OffsetInput | OffsetOutput

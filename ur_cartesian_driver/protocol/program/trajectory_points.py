@@ -20,7 +20,7 @@ The sender must
   the last point to 0.
 
 The result of a trajectory is one int32: 0 success, 1 canceled, 2 failure; from our own program
-also 3 input missing, 4 contact, 5 no contact. It comes in a TCP segment of its own.
+also 3 input missing, 4 contact, 5 no contact, 6 touched. It comes in a TCP segment of its own.
 """
 
 from __future__ import annotations

@@ -27,6 +27,10 @@ from ur_cartesian_driver.program import ProgramSettings, render
 from ur_cartesian_driver.protocol.framing import INT32_MAX
 from ur_cartesian_driver.protocol.program import reverse, script_sender
 from ur_cartesian_driver.protocol.program.reverse import ControlMode, TrajectoryAction
+from ur_cartesian_driver.protocol.program.script_command import (
+    ToolContactResult,
+    ToolContactResultDecoder,
+)
 from ur_cartesian_driver.protocol.program.trajectory_points import TrajectoryResultDecoder
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.link_settings import LinkSettings
@@ -46,6 +50,8 @@ class ProgramCallbacks:
     lost: Callable[[str], None]
     #: The robot program reported the end of a trajectory.
     result: Callable[[TrajectoryResult], None]
+    #: The robot program reported the end of its watch for contact.
+    contact: Callable[[ToolContactResult], None]
     #: A client was rejected; the text is the reason.
     warning: Callable[[str], None]
 
@@ -80,9 +86,10 @@ class ProgramSockets:
         self._host = ''
         self._read_timeout = round(1000.0 * settings.robot_receive_timeout)
         self._results = TrajectoryResultDecoder()
+        self._contacts = ToolContactResultDecoder()
         self._requests = script_sender.RequestDecoder()
         self._trajectory = self._program_port('trajectory_port', self._on_results)
-        self._commands = self._program_port('script_command_port', _ignore)
+        self._commands = self._program_port('script_command_port', self._on_contacts)
         self._reverse = self._program_port('reverse_port', _ignore)
         self._sender = TcpListener(
             'script_sender_port',
@@ -245,6 +252,8 @@ class ProgramSockets:
             port.disconnect()  # a foreign client, or a program that died while connecting
         if connection is self._trajectory.connection:
             self._results = TrajectoryResultDecoder()
+        if connection is self._commands.connection:
+            self._contacts = ToolContactResultDecoder()
         if all(port.connection is not None for port in self._program_ports):
             self.connected = True
             self._listener.connected()
@@ -260,6 +269,14 @@ class ProgramSockets:
         except ProtocolError as error:
             assert self._trajectory.connection is not None
             self._trajectory.connection.abort(str(error))
+
+    def _on_contacts(self, data: bytes) -> None:
+        try:
+            for result in self._contacts.feed(data):
+                self._listener.contact(result)
+        except ProtocolError as error:
+            assert self._commands.connection is not None
+            self._commands.connection.abort(str(error))
 
     def _on_sender_open(self, _: TcpConnection) -> None:
         self._requests = script_sender.RequestDecoder()

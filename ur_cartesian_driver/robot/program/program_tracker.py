@@ -16,6 +16,12 @@ from ur_cartesian_driver.robot.program.program_sockets import ProgramSockets
 DEAD_PROGRAM_TIMEOUT = 0.5
 #: How long our own program may take after connecting to prove that it is ours [s].
 IDENTITY_TIMEOUT = 0.5
+#: What to do where only our own program will do; the end of a sentence.
+NEEDS_OWN_PROGRAM = (
+    'for which the robot has to run the program of this driver, and the program that runs has not '
+    'shown to be that; call resend_robot_program (headless_mode), or play a program whose '
+    'External Control node fetches it from here.'
+)
 
 
 class ProgramTracker:

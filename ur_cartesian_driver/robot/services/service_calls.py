@@ -271,6 +271,16 @@ class SetSpeedSliderCall:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class WatchContactCall:
+    """Stop every motion where the tool touches; answered at contact, or after the watch."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EndContactWatchCall:
+    """End the watch for contact."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SendProgramCall:
     """Upload the robot program (again), and wait until it has connected."""
 
@@ -358,6 +368,8 @@ ServiceCall: TypeAlias = (
     | ZeroFtSensorCall
     | SetOutputCall
     | SetSpeedSliderCall
+    | WatchContactCall
+    | EndContactWatchCall
     | SendProgramCall
     | HandBackCall
     | RunScriptCall

@@ -6,7 +6,8 @@ Carries out the service calls of a driver's owner.
 A call uses the dashboard, a single command to the robot program, the primary interface, or RTDE
 inputs. It succeeds once the robot reports the effect, if the robot can report it. A call ends
 within :data:`CALL_TIMEOUT`, a recovery within :data:`RECOVERY_TIMEOUT`, a script within
-:data:`CALL_TIMEOUT` plus its timeout, and so does a report (:data:`REPORT_TIMEOUTS`).
+:data:`CALL_TIMEOUT` plus its timeout, and so does a report (:data:`REPORT_TIMEOUTS`); a watch for
+contact lasts until it is ended.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from ur_cartesian_driver.protocol.program import script_command
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.link_settings import LinkSettings
+from ur_cartesian_driver.robot.program.program_tracker import NEEDS_OWN_PROGRAM
 from ur_cartesian_driver.robot.services import rtde_input_writer
 from ur_cartesian_driver.robot.services.dashboard_connection import REPORT_TIMEOUTS
 from ur_cartesian_driver.robot.services.dashboard_service import (
@@ -39,6 +41,7 @@ from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,
     DownloadProgramCall,
+    EndContactWatchCall,
     failed,
     HandBackCall,
     ListProgramsCall,
@@ -55,6 +58,7 @@ from ur_cartesian_driver.robot.services.service_calls import (
     SettingCall,
     succeeded,
     UploadProgramCall,
+    WatchContactCall,
     ZeroFtSensorCall,
 )
 
@@ -133,6 +137,8 @@ class ServiceDispatcher:
 
     async def dispatch(self, call: ServiceCall) -> ServiceAnswer:
         """Carry out a call; errors become answers."""
+        if isinstance(call, WatchContactCall):
+            return self._refusal(call) or await self._execute(call)
         bound = RECOVERY_TIMEOUT if isinstance(call, RecoverCall) else CALL_TIMEOUT
         if isinstance(call, RunScriptCall):
             bound += call.timeout
@@ -170,6 +176,13 @@ class ServiceDispatcher:
                     rtde_input_writer.speed_slider_write(call),
                     f'The speed slider is at {call.fraction:.0%}.',
                 )
+            case WatchContactCall():
+                return await self._watch_contact()
+            case EndContactWatchCall():
+                # A call that was made before this one may still wait for it, too.
+                await self._link.control.tracker.wait_for_identity()
+                self._link.contact_watch.end()
+                return succeeded('The watch for contact is being ended.')
             case SendProgramCall():
                 return await self._send_program()
             case HandBackCall():
@@ -237,6 +250,32 @@ class ServiceDispatcher:
         return self._command(script_command.ZeroFtSensorCommand()) or succeeded(
             'The command to zero the force sensor was sent.'
         )
+
+    async def _watch_contact(self) -> ServiceAnswer:
+        """Answer at contact, or when the watch has ended without one."""
+        link, version = self._link, self._link.version
+        if version is not None and version.major < E_SERIES:
+            return failed(
+                f'A CB3 robot (software {version}) has no watch for contact: the manufacturer '
+                'offers it from the e-Series on.'
+            )
+        if refusal := self._paused():
+            return refusal
+        if not link.program.connected:
+            return failed(f'Only the robot program can watch for contact. {link.status.message}')
+        if not await link.control.tracker.wait_for_identity():
+            # Others leave the goal that contact stops without a result.
+            return failed(f'This is a watch for contact, {NEEDS_OWN_PROGRAM}')
+        try:
+            touched = await link.contact_watch.run()
+        except DriverError as error:
+            return failed(str(error))
+        if not touched:
+            return failed('The watch was ended before the tool touched.')
+        if link.robot is None:
+            return succeeded('The tool touched.')
+        x, y, z = link.robot.actual_tcp_pose.position
+        return succeeded(f'The tool touched at x {x:.4f}, y {y:.4f}, z {z:.4f} m in base.')
 
     async def _set(self, call: SettingCall) -> ServiceAnswer:
         """Set TCP, payload or gravity; no goal starts meanwhile."""

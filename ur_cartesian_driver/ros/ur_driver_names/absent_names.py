@@ -50,13 +50,6 @@ _ROWS = (
         'control_msgs/srv/QueryTrajectoryState',
         'between goals the driver has no desired state',
     ),
-    (
-        'action',
-        'tool_contact_controller/detect_tool_contact',
-        'ur_msgs/action/ToolContact',
-        'the robot program watches for contact only during a goal that asks for it, and contact '
-        'ends that goal: `trajectory_until_node/execute`, or `presses` of a goal',
-    ),
 )
 
 ABSENT = tuple(

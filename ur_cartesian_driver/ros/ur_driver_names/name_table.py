@@ -17,6 +17,7 @@ from ur_cartesian_driver.ros.ur_driver_names.offered_name import UrName
 from ur_cartesian_driver.ros.ur_driver_names.program_services import PROGRAM_SERVICES
 from ur_cartesian_driver.ros.ur_driver_names.sequence_action import SEQUENCE_ACTION
 from ur_cartesian_driver.ros.ur_driver_names.state_topics import STATE_TOPICS
+from ur_cartesian_driver.ros.ur_driver_names.tool_contact_action import TOOL_CONTACT_ACTION
 from ur_cartesian_driver.ros.ur_driver_names.trajectory_actions import TRAJECTORY_ACTIONS
 
 NAMES: tuple[UrName, ...] = (
@@ -27,6 +28,7 @@ NAMES: tuple[UrName, ...] = (
     *IO_SERVICES,
     *TRAJECTORY_ACTIONS,
     SEQUENCE_ACTION,
+    TOOL_CONTACT_ACTION,
     MODE_ACTION,
     *ABSENT,
 )

@@ -1,0 +1,96 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The robot program's watch for contact of the tool, which stops every motion at contact.
+
+START_TOOL_CONTACT begins the watch, and has one answer: contact, or ended before a contact, after
+END_TOOL_CONTACT. A paused program reads END_TOOL_CONTACT when it goes on, so its answer may be
+due long after its watch is of no more interest.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from ur_cartesian_driver.motion.errors import RobotNotReady
+from ur_cartesian_driver.protocol.program import script_command
+from ur_cartesian_driver.protocol.program.script_command import ToolContactResult
+from ur_cartesian_driver.robot.program.program_sockets import ProgramSockets
+
+#: How long the program may take to answer END_TOOL_CONTACT [s].
+END_TIMEOUT = 1.0
+
+
+class ContactWatch:
+    """One watch at a time, until its answer."""
+
+    def __init__(self, sockets: ProgramSockets, changed: Callable[[bool], None]) -> None:
+        """
+        Begin without a watch.
+
+        :param changed: called with True when a watch begins, and with False when one ends without
+            contact.
+        """
+        self._sockets, self._changed = sockets, changed
+        #: The answer of the program, or why it will not come; None = no watch.
+        self._answer: asyncio.Future[ToolContactResult | str] | None = None
+        self._ends = asyncio.Event()
+
+    @property
+    def is_active(self) -> bool:
+        """Return whether the program watches for contact, as far as it has answered."""
+        return self._answer is not None
+
+    async def run(self) -> bool:
+        """
+        Watch for contact; return whether the tool has touched, or False after :meth:`end`.
+
+        :raises RobotNotReady: the program watches already, or its watch ended with the program.
+        """
+        if self.is_active:
+            raise RobotNotReady(
+                'The robot program watches for contact already; cancel that watch, or play the '
+                'program if it is paused.'
+            )
+        if not self._sockets.send_command(
+            script_command.encode(script_command.StartToolContactCommand())
+        ):
+            raise RobotNotReady('The robot program, which watches for contact, does not run.')
+        answer = self._answer = asyncio.get_running_loop().create_future()
+        self._ends.clear()
+        self._changed(True)
+        ending = asyncio.ensure_future(self._ends.wait())
+        try:
+            await asyncio.wait((answer, ending), return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait((answer,), timeout=END_TIMEOUT)
+        finally:
+            ending.cancel()
+        result = answer.result() if answer.done() else ToolContactResult.CANCELED
+        if isinstance(result, str):
+            raise RobotNotReady(result)
+        return result is ToolContactResult.SUCCESS
+
+    def end(self) -> None:
+        """End the watch; nothing happens if there is none."""
+        if self.is_active and not self._ends.is_set():
+            self._ends.set()
+            self._sockets.send_command(
+                script_command.encode(script_command.EndToolContactCommand())
+            )
+
+    def take(self, result: ToolContactResult) -> None:
+        """Process the answer of the program; without a watch, nothing happens."""
+        self._finish(result)
+
+    def program_lost(self, reason: str) -> None:
+        """End the watch with the program."""
+        self._finish(f'The watch for contact ended with the robot program: {reason}.')
+
+    def _finish(self, result: ToolContactResult | str) -> None:
+        answer, self._answer = self._answer, None
+        if answer is not None:
+            answer.set_result(result)
+            # At contact the running goal ends, by a result that may come a little later.
+            if result is not ToolContactResult.SUCCESS:
+                self._changed(False)

@@ -1,0 +1,65 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The action of the tool contact controller: each goal becomes one of the driver's own action.
+
+As there, a goal is rejected while another one watches. Goals and results have no fields, so the
+reason why a goal is aborted is logged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ur_cartesian_driver.action import DetectToolContact
+from ur_cartesian_driver.ros.message_fields import Message
+from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
+from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
+from ur_cartesian_driver.ros.ur_driver_names.offered_name import UrName
+from ur_cartesian_driver.ros.ur_driver_names.trajectory_actions import ForwardedGoal, GoalForwarder
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToolContactAction(UrName):
+    """``tool_contact_controller/detect_tool_contact``."""
+
+    kind: str = 'action'
+    name: str = 'tool_contact_controller/detect_tool_contact'
+    type: str = 'ur_msgs/action/ToolContact'
+
+    @property
+    def served_by(self) -> str:
+        """The driver's own action."""
+        return '`~/detect_tool_contact`'
+
+    def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
+        """Forward goals, results and cancels."""
+        return _ContactForwarder(driver, self.name, kind)
+
+
+class _ContactForwarder(GoalForwarder):
+    preempts = False
+
+    def __init__(self, driver: DriverNode, name: str, action: Any) -> None:
+        super().__init__(driver, name, action, ('detect_tool_contact', DetectToolContact))
+
+    def forward(self, run: ForwardedGoal) -> None:
+        """Send a goal, which has no fields."""
+        self.send(run, DetectToolContact.Goal())
+
+    def feedback(self, feedback: Message) -> Message:
+        """Return feedback, which has no fields."""
+        return self.action.Feedback()
+
+    def result(self, result: Message) -> Message:
+        """Return a result, which has no fields, and log a failure."""
+        return self.action.Result() if result.success else self.failure(result.message)
+
+    def failure(self, text: str) -> Message:
+        """Return a result, and log the reason, for which it has no field."""
+        self.driver.warn(f'tool_contact_controller/detect_tool_contact: {text}')
+        return self.action.Result()
+
+
+TOOL_CONTACT_ACTION = ToolContactAction()
