@@ -219,8 +219,8 @@ def send_program(user, method, program):
 def test_programs_are_listed_uploaded_updated_downloaded_and_played():
     user = ApiUser()
     assert [each['name'] for each in user.value('/programs/v1/')['programs']] == [
-        'external_control',
         'a',
+        'external_control',
     ]
     assert user.ask('GET', '/programs/v1/weld%20it')[0] == 404
     # The script of a program has labels, and uses functions that the application defines.
@@ -231,8 +231,8 @@ def test_programs_are_listed_uploaded_updated_downloaded_and_played():
     assert (status, answer['programName']) == (200, 'weld it')
     assert send_program(user, 'POST', program)[0] == 400  # it exists
     assert [each['name'] for each in user.value('/programs/v1')['programs']] == [
-        'external_control',
         'a',
+        'external_control',
         'weld it',
     ]
     assert user.value('/programs/v1/weld%20it') == program
