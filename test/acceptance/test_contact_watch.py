@@ -195,9 +195,34 @@ def test_a_watch_may_begin_while_the_arm_moves():
         await cell.until(lambda: place(cell) > wall - DISTANCE + 0.005, 5.0)
         answer = await watch(cell)
         await touched(cell, answer, wall)
+        await cell.until(lambda: motion.outcome)
         assert STOPPED in motion.outcome.text
 
     run_cell(scenario)
+
+
+@pytest.mark.parametrize('threads', ['', 'seed 7'])
+def test_a_goal_that_begins_beside_a_contact_moves_nothing_after_its_end(threads):
+    async def scenario(cell):
+        ended = set()
+        for half_cycles in range(24):
+            wall, answer = put_wall(cell), await watch(cell)
+            goal = line(cell, -0.003)
+            move_wall(cell, wall, -DISTANCE - 0.0005)
+            await cell.sleep(half_cycles * 0.5 * CYCLE)
+            motion = cell.owner.start(goal)
+            await cell.until(lambda motion=motion: motion.outcome, 5.0)
+            await cell.until(answer, 2.0)
+            assert answer().ok, answer().text
+            assert motion.outcome.succeeded or STOPPED in motion.outcome.text
+            ended.add(motion.outcome.code)
+            cell.robot.controller.contact.bodies = ()
+            before = place(cell)
+            await cell.sleep(0.3)
+            assert place(cell) == pytest.approx(before, abs=5e-4), half_cycles
+        assert ended == {ErrorCode.SUCCESSFUL, ErrorCode.EXECUTION_FAILED}
+
+    run_cell(scenario, threads=threads)
 
 
 def test_contact_at_rest_is_found_and_moves_the_arm_by_no_more_than_it_was_pushed():

@@ -171,6 +171,10 @@ class RobotInMemory:
         """Let the message come that ends the mode in which trajectories run."""
         self._socket(REVERSE).feed(keepalive(0).encode())
 
+    def cancel(self):
+        """Let CANCEL come, as the driver sends it."""
+        self._command(trajectory(TrajectoryAction.CANCEL, 0, read_timeout=0))
+
     def late_results(self, cycles):
         """Return the results that come within some cycles after the end of a trajectory."""
         for _ in range(cycles):

@@ -25,7 +25,8 @@ state, and the error code if the signal decides the outcome of the goal.
   at the last point, the program skipped motions (DEVIATION).
 * A goal that ends when the tool touches (CONTACT) succeeds without SETTLING: the program has
   moved the arm back to the place of contact. A goal that such a contact ends for the sake of a
-  watch beside it (TOUCHED) fails, also at rest between or after its trajectories.
+  watch beside it (TOUCHED) fails, also at rest between or after its trajectories. It is cancelled,
+  too: the program may have read START just after the contact, and then runs the trajectory.
 * **CANCELLING**: CANCEL has been sent. The program brakes, discards the points that it has not
   run and answers CANCELED. A SUCCESS in this state means that the last point was reached before
   the program read CANCEL; this is not the answer to CANCEL: CANCELED still follows.
@@ -140,9 +141,8 @@ _ON_STOP = {
 _WHILE_RUNNING = {
     **_ON_STOP,
     **_decide(GoalState.RESTORING, GoalSignal.CANCELED, GoalSignal.FAILURE, GoalSignal.CONTACT),
-    **_decide(GoalState.RESTORING, GoalSignal.TOUCHED),
     **_decide(GoalState.CANCELLING, *_USER_STOPS, GoalSignal.VIOLATION, GoalSignal.DEVIATION),
-    **_decide(GoalState.CANCELLING, GoalSignal.STALE),
+    **_decide(GoalState.CANCELLING, GoalSignal.STALE, GoalSignal.TOUCHED),
     **_decide(GoalState.ENDED, GoalSignal.STANDSTILL),
 }
 
