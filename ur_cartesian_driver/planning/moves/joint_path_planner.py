@@ -289,7 +289,7 @@ class JointPathPlanner:
         line = JointLineCurve.between(self.kinematics.arm, self.kinematics.T_flange_tcp, q, chosen)
         if i == 0 and line.joint_travel <= SAME_SOLUTION:
             drafts.stop_at(k)
-        self._path.curves.put(k, line)
+        self._path.curves.put_joint_line(k, line)
         drafts.joints[k] = chosen
         self._make_blends(k, k + 1)
         self._solve_entry(k, line)
