@@ -265,6 +265,13 @@ def test_a_path_that_leads_nowhere_is_refused(cell, count):
         plan(goal, cell.state, cell.arm, OPTIONS)
 
 
+def test_a_path_that_needs_too_many_samples_is_refused(cell):
+    back, forth = cell.point(), cell.point(0.2)  # a hundred steps of 2 mm apart
+    goal = Goal(waypoints=(forth, back) * 10_100, corner_deviation=1e-3)
+    with pytest.raises(InvalidGoal, match=r'needs 2\.02e\+06 samples, more than 2,000,000'):
+        plan(goal, cell.state, cell.arm, OPTIONS)
+
+
 @pytest.mark.parametrize('deviation', [2e-5, 1e-3, 0.1])
 @pytest.mark.parametrize(
     'places',

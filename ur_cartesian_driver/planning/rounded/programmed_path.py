@@ -25,8 +25,10 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
 )
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.planning.geometry.blended_path import curves_of
+from ur_cartesian_driver.planning.geometry.samples import STEP_ANGLE, STEP_LENGTH
 from ur_cartesian_driver.planning.request.validate import arc_error
 from ur_cartesian_driver.planning.rounded.rounded_path import Polyline
+from ur_cartesian_driver.planning.spline.spline_path import check_sample_count
 
 #: Radius [m] at which a turn of the tool is measured as the length of an arc, for ``s``.
 TURN_RADIUS = 0.05
@@ -36,6 +38,8 @@ CURVE_BOUNDS = 1e-5, 2e-4
 _CHORD_ERROR = 2e-6
 #: Greatest turn of the tool along a chord [rad].
 _CHORD_TURN = radians(2.0)
+#: The remedy for a path that needs too many samples.
+CHECK_SPEEDS = 'check speeds and positions'
 #: Steps shorter than this [m] count as no motion.
 _NO_STEP = 1e-9
 #: Quaternions that differ by less than this are the same.
@@ -86,6 +90,9 @@ def programmed_sections(
     curves, faults = curves_of(goal.motions, goal.T_base_frame, starts, targets.copy())
     for row, fault in faults.items():
         raise arc_error(row, fault)
+    # Samples are never farther apart than this, so a path that needs too many is refused here.
+    steps = np.maximum(curves.length / STEP_LENGTH, curves.angle / STEP_ANGLE)
+    check_sample_count(steps, np.arange(n), CHECK_SPEEDS)
     count = curves.chord_counts(_CHORD_ERROR, _CHORD_TURN)
     last = np.cumsum(count)
     segment = np.repeat(np.arange(n), count)

@@ -37,7 +37,7 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.request.rounded_rules import corner_bounds
-from ur_cartesian_driver.planning.rounded.programmed_path import programmed_sections
+from ur_cartesian_driver.planning.rounded.programmed_path import CHECK_SPEEDS, programmed_sections
 from ur_cartesian_driver.planning.rounded.rounded_path import RoundedPath
 from ur_cartesian_driver.planning.rounded.section_law import SectionLaw, ToolLimits
 from ur_cartesian_driver.planning.rounded.tool_knots import (
@@ -51,7 +51,11 @@ from ur_cartesian_driver.planning.spline.joint_polynomials import (
     fit_joint_polynomials,
     JointPolynomials,
 )
-from ur_cartesian_driver.planning.spline.spline_path import solve_spline_path, SplinePath
+from ur_cartesian_driver.planning.spline.spline_path import (
+    check_sample_count,
+    solve_spline_path,
+    SplinePath,
+)
 
 #: Greatest deviation that the pieces may add to the path's own [m].
 PIECE_TOLERANCE = 1e-5
@@ -225,6 +229,8 @@ def _fit(
         )
     )
     places = Places(laws, begins)
+    count = np.concatenate([section.sample_count for section in knots])
+    check_sample_count(count, places(spline.times[1:])[0], CHECK_SPEEDS)
     path = solve_spline_path(
         kinematics,
         spline,
@@ -234,7 +240,7 @@ def _fit(
         first=0,
         rests=True,
         places=places,
-        count=np.concatenate([section.sample_count for section in knots]),
+        count=count,
     )
     polynomials = fit_joint_polynomials(
         kinematics,

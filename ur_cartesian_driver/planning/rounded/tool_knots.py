@@ -17,12 +17,12 @@ import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, length_rows
-from ur_cartesian_driver.planning.geometry.curves import ARC_CHORD_ERROR
-from ur_cartesian_driver.planning.geometry.samples import counted, STEP_ANGLE, STEP_LENGTH
+from ur_cartesian_driver.planning.geometry.samples import counted
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.rounded.section_law import SectionLaw, tool_rows
 from ur_cartesian_driver.planning.rounded.time_law import PathTimes
 from ur_cartesian_driver.planning.spline.joint_polynomials import ANGLE_TOLERANCE_RADIUS
+from ur_cartesian_driver.planning.spline.spline_path import sample_density
 
 #: Shortest time of a piece [s] that robot program and sockets sustain over any number of pieces.
 MIN_PIECE_TIME = 0.02
@@ -115,13 +115,9 @@ class _HalfSteps:
         along = np.einsum('ij,ij->i', twists[:, :3], accelerations) / np.maximum(speed, _REST)
         size = length_rows(accelerations)
         across = np.sqrt(np.maximum(size * size - along * along, 0.0))
-        density = np.maximum.reduce(
-            [
-                speed / STEP_LENGTH,
-                length_rows(twists[:, 3:]) / STEP_ANGLE,
-                np.sqrt(across / (8.0 * ARC_CHORD_ERROR)),
-                np.sqrt(size / (8.0 * _TIME_ERROR)),
-            ]
+        density = np.maximum(
+            sample_density(speed, length_rows(twists[:, 3:]), across),
+            np.sqrt(size / (8.0 * _TIME_ERROR)),
         )
         first, last = 2 * ends[:-1], 2 * ends[1:]
         greatest = np.maximum(np.maximum.reduceat(density, first), density[last])

@@ -259,32 +259,48 @@ def sample_count(
     :param turn_rate: turn rate of the tool at these samples [rad/s].
     :param acceleration: acceleration of the tool at these samples [m/s^2].
     :param first: the number of the point at the end of the first piece.
+    :raises InvalidGoal: there would be too many.
     """
     h = np.diff(times)
-
-    def largest(values: Floats) -> Floats:
-        bound: Floats = values.reshape(len(h), _COARSE_SAMPLES).max(axis=1)
-        return bound
-
-    steps = _SPEED_MARGIN * np.max(
-        [
-            h * largest(speed) / STEP_LENGTH,
-            h * largest(turn_rate) / STEP_ANGLE,
-            h * np.sqrt(largest(acceleration) / (8.0 * ARC_CHORD_ERROR)),
-        ],
-        axis=0,
-    )
+    density = sample_density(speed, turn_rate, acceleration).reshape(len(h), _COARSE_SAMPLES)
+    steps = _SPEED_MARGIN * h * density.max(axis=1)
     count = np.maximum(np.ceil(steps), np.minimum(MIN_SAMPLES, np.ceil(1.25 * steps) + 1.0))
-    if count.sum() > MAX_SAMPLES:
-        k = int(np.argmax(count))
-        raise InvalidGoal(
-            'trajectory.points',
-            f'ask for a path so long, or so fast (most of all to points[{first + k}]), that its '
-            f'check needs {count.sum():.3g} samples, more than {MAX_SAMPLES:,}',
-            'check twists and accelerations, or split the goal',
-        )
+    check_sample_count(count, first + np.arange(len(h)), 'check twists and accelerations')
     found: Indices = count.astype(np.intp)
     return found
+
+
+def sample_density(speed: Floats, turn_rate: Floats, acceleration: Floats) -> Floats:
+    """
+    Return the samples a second (m,) that follow the tool closely enough at m times.
+
+    :param acceleration: of the tool, or the part of it that bends the path [m/s^2].
+    """
+    density: Floats = np.maximum.reduce(
+        [
+            speed / STEP_LENGTH,
+            turn_rate / STEP_ANGLE,
+            np.sqrt(acceleration / (8.0 * ARC_CHORD_ERROR)),
+        ]
+    )
+    return density
+
+
+def check_sample_count(count: Floats | Indices, points: Indices, remedy: str) -> None:
+    """
+    Refuse a goal that needs too many samples.
+
+    :param count: (n,) the number of samples of each part; ``points``: (n,) the point to which it
+        leads.
+    """
+    if (total := count.sum()) > MAX_SAMPLES:
+        raise InvalidGoal(
+            'trajectory.points',
+            'ask for a path so long, or so fast (most of all to points['
+            f'{points[np.argmax(count)]}]), that its check needs {total:.3g} samples, more than '
+            f'{MAX_SAMPLES:,}',
+            f'{remedy}, or split the goal',
+        )
 
 
 def _cumulative(steps: Floats) -> Floats:
