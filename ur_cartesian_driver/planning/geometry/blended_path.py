@@ -159,16 +159,6 @@ class CurveRows:
             rows[first:last] = self.joint_lines[k].rows(u[first:last])
         return rows
 
-    def places(self, row: Indices, u: Floats) -> Floats:
-        """Return positions (n, m, 3) [m] at many ``u`` (n, m) on each of some curves (n,)."""
-        start, end = self.start[row, None, :3], self.end[row, None, :3]
-        places: Floats = start + u[..., None] * (end - start)
-        on_arc = np.flatnonzero(self.is_arc[row])
-        places[on_arc] = self.arcs.take((row[on_arc], None)).places(u[on_arc])
-        for k in rows_where(self.is_joint_line[row]):
-            places[k] = self.joint_lines[int(row[k])].rows(u[k])[:, :3]
-        return places
-
     def trim(self, row: Indices, radius: Floats, *, at_end: bool = False) -> Floats:
         """Return the ``u`` (n,) at a distance [m] from the starts, or the ends, of curves."""
         length = self.length[row]
@@ -268,12 +258,8 @@ class BlendedPath:
         s = np.linspace(0.0, 1.0, _CHORDS + 1)
         for k in range(0, len(curved), _BLOCK // _CHORDS):
             row = curved[k : k + _BLOCK // _CHORDS]
-            after = row + 1
-            a, b = crossfade(self.u_leave[row, None], self.u_join[after, None], s)
-            places = curves.places(row, a) + curves.places(after, b)
-            places -= curves.start[after, None, :3]
-            for j in rows_where(curves.is_joint_line[row] & curves.is_joint_line[after]):
-                places[j] = self.blend_rows(np.full(len(s), row[j]), s)[:, :3]
+            rows = self.blend_rows(np.repeat(row, len(s)), np.tile(s, len(row)))
+            places = rows[:, :3].reshape(len(row), len(s), 3)
             chords = np.linalg.norm(np.diff(places, axis=1), axis=2)
             self.blend_length[row] = chords.sum(axis=1)
 

@@ -119,23 +119,16 @@ class ToolSpline:
         :param piece: (m,) the piece to which each time belongs.
         :param t: (m,) time since this piece began [s].
         """
-        x = evaluate(self.positions[piece], t)
-        orientations = self.orientations[piece]
-        w, e = np.zeros_like(x.v), np.zeros_like(x.a)
-        rows = self._turning(piece)
-        if len(rows):
-            turn = evaluate(self.turns[piece[rows]], t[rows])
-            w[rows], e[rows] = angular_rates(turn)
-            orientations[rows] = _turned(turn.x, orientations[rows])
-        return ToolRows(
-            np.concatenate([x.x, orientations], axis=1),
-            np.concatenate([x.v, w], axis=1),
-            np.concatenate([x.a, e], axis=1),
-        )
+        return ToolRows(self.poses(piece, t), *self.rates(piece, t))
 
     def rates(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
         """Return the twists and the accelerations that :meth:`rows` returns, (m, 6) each."""
-        _, twists, accelerations = self.rows(piece, t)
+        twists, accelerations = np.zeros((2, len(piece), 6))
+        _, twists[:, :3], accelerations[:, :3] = evaluate(self.positions[piece], t)
+        rows = self._turning(piece)
+        if len(rows):
+            turn = evaluate(self.turns[piece[rows]], t[rows])
+            twists[rows, 3:], accelerations[rows, 3:] = angular_rates(turn)
         return twists, accelerations
 
     def poses(self, piece: Indices, t: Floats) -> Floats:
@@ -144,7 +137,8 @@ class ToolSpline:
         rows = self._turning(piece)
         if len(rows):
             turn = values(self.turns[piece[rows]], t[rows])
-            orientations[rows] = normalized_rows(multiply_rows(exp_rows(turn), orientations[rows]))
+            turned = multiply_rows(exp_rows(turn), orientations[rows])
+            orientations[rows] = normalized_rows(turned)
         return np.concatenate([position, orientations], axis=1)
 
     def _turning(self, piece: Indices) -> Indices:
@@ -171,11 +165,6 @@ class ToolSpline:
             positions=self.positions * powers,
             turns=self.turns * powers,
         )
-
-
-def _turned(turns: Floats, orientations: Floats) -> Floats:
-    """Return orientations (m, 4) turned by rotation vectors (m, 3)."""
-    return normalized_rows(multiply_rows(exp_rows(turns), orientations))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

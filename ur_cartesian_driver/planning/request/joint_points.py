@@ -32,8 +32,21 @@ class JointPositions(Posture):
 
     def joints(self, tf_prefix: str) -> Joints:
         """Return the joint positions [rad]."""
-        by_name = dict(zip(self.names, self.values, strict=True))
-        return vector6(by_name[tf_prefix + name] for name in JOINT_NAMES)
+        named = named_joints(self, tf_prefix)
+        return vector6(named[k] for k in range(6))
+
+
+def named_joints(posture: Posture, tf_prefix: str) -> dict[int, float]:
+    """Return the values [rad] of a checked posture by joint number."""
+    return {
+        JOINT_NAMES.index(name.removeprefix(tf_prefix)): value
+        for name, value in zip(posture.names, posture.values, strict=True)
+    }
+
+
+def full_posture(named: dict[int, float]) -> Joints | None:
+    """Return the configuration of a posture that names all joints, else None."""
+    return vector6(named[k] for k in range(6)) if len(named) == 6 else None
 
 
 def check_for_arm(goal: Goal, T_flange_tcp: Pose, arm: Arm, options: PlanningOptions) -> GoalTable:

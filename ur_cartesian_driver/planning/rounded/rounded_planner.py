@@ -297,7 +297,7 @@ def _coarse_times(motion: RoundedMotion, tolerance: float, options: PlanningOpti
     bounds = (1.0 - _TOOL_PART) * tolerance * np.array([1.0, 1.0 / ANGLE_TOLERANCE_RADIUS])
     coarse = np.any(pieces.deviations > bounds, axis=1)
     doubtful = np.flatnonzero(_may_exceed(motion, options))
-    coarse[doubtful] |= _acceleration_excess(motion, options, doubtful) > CLOSE_ENOUGH
+    coarse[doubtful] |= _limit_excess(motion, options, doubtful) > CLOSE_ENOUGH
     return np.stack([pieces.times[:-1][coarse], pieces.times[1:][coarse]], axis=1)
 
 
@@ -320,7 +320,7 @@ def _may_exceed(motion: RoundedMotion, options: PlanningOptions) -> Flags:
     return found
 
 
-def _acceleration_excess(motion: RoundedMotion, options: PlanningOptions, rows: Indices) -> Floats:
+def _limit_excess(motion: RoundedMotion, options: PlanningOptions, rows: Indices) -> Floats:
     """Return the greatest ratio, inside some pieces (k,), of a quantity to its limit."""
     pieces, kinematics = motion.polynomials, motion.kinematics
     model = kinematics.arm.model

@@ -162,15 +162,6 @@ class FastestLaw:
         )[::-1]
 
 
-def fastest_law(s: Floats, limits: LawLimits) -> Floats:
-    """
-    Return the square of the greatest possible ds/dt at places (m,); it is 0 at both ends.
-
-    :param s: the places (m,), increasing.
-    """
-    return FastestLaw(s, limits).squares(limits.speed, np.ones(len(s)))
-
-
 def _possible(bounds: _Bounds, y: Floats) -> Floats:
     """Return the largest y (m,), but at most the given ones, at which some u is allowed."""
     for r, n in zip(bounds.r, bounds.n, strict=True):
