@@ -125,8 +125,8 @@ HERE, THERE = (0.0, 0.0, 0.0), (0.1, 0.0, 0.0)
     ],
 )
 def test_points_that_make_no_arc_are_told_by_their_fault(via, end, fixed, text):
-    places = (np.array([each]) for each in (HERE, via, end))
-    faults = arc_faults(*places, np.array([fixed]))
+    start, middle, last = (np.array([each]) for each in (HERE, via, end))
+    faults = arc_faults(start, middle, last, np.array([fixed]))
     assert list(faults) == [0] * bool(text)
     assert text in faults.get(0, '')
 

@@ -17,7 +17,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.geometry.polynomials import (
     cubic_rows,
     evaluate,
@@ -76,6 +76,8 @@ class ToolSpline:
     turns: Floats
     #: (n, 4) the orientation at the start of each piece, where its rotation vector is zero
     orientations: Floats
+    #: (n,) whether the tool may turn on each piece
+    is_turning: Flags
 
     @classmethod
     def through(cls, points: ToolPoints) -> ToolSpline:
@@ -95,7 +97,8 @@ class ToolSpline:
         changes = np.concatenate(
             [rates[begin], rates[end], orientations[end] - orientations[begin]], axis=1
         )
-        turning = np.flatnonzero(changes.any(axis=1))
+        is_turning: Flags = np.any(changes, axis=1)
+        turning = np.flatnonzero(is_turning)
         if len(turning):
             to, since = orientations[end][turning], orientations[begin][turning]
             turn = log_rows(multiply_rows(to, conjugate_rows(since)))
@@ -110,6 +113,7 @@ class ToolSpline:
             orientations=orientations[begin],
             positions=positions,
             turns=turns,
+            is_turning=is_turning,
         )
 
     def rows(self, piece: Indices, t: Floats) -> ToolRows:
@@ -143,7 +147,7 @@ class ToolSpline:
 
     def _turning(self, piece: Indices) -> Indices:
         """Return the rows of pieces (m,) on which the tool turns: often none."""
-        return np.flatnonzero(np.any(self.turns, axis=(1, 2))[piece])
+        return np.flatnonzero(self.is_turning[piece])
 
     def vectors(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
         """Return positions [m] and rotation vectors since the piece began [rad], (m, 3) each."""

@@ -136,8 +136,7 @@ class _SectionSpeeds:
     @classmethod
     def of(cls, law: SectionLaw) -> _SectionSpeeds:
         """Return the speeds of a law."""
-        times = law.law.all_times()
-        place, rate, _ = law.law.at(times)
+        _, (place, rate, _) = law.law.table
         s, caps = law.samples.s, np.stack(list(law.caps.values()))
         limit, travel = np.argmin(caps, axis=0), length_rows(law.samples.x1)
         speed, step = np.interp(s, place, rate) * travel, np.gradient(s) * travel

@@ -38,8 +38,10 @@ _JOINED = 8
 _QUARTERS, _MEASURED = (0.25, 0.5, 0.75), (0.08, 0.16, 0.3, 0.42, 0.58, 0.7, 0.84, 0.92)
 #: Greatest error of the acceleration, as a fraction of its limit, on pieces that can be split.
 _ACCELERATION_PART = 0.15
+#: Greatest distance [m] of a chord between two samples from the path: as that of the pieces.
+_CHORD_ERROR = 1e-5
 #: Greatest error [m] along the path of a place between two samples, by its time.
-_TIME_ERROR = 2e-5
+_TIME_ERROR = 5e-5
 #: A tool slower than this [m/s] rests.
 _REST = 1e-9
 
@@ -94,7 +96,6 @@ class _HalfSteps:
         at = law.law.at(times)
         self._law = law
         self._points = _points_at(law, times, at)
-        self._s = at.s
         self._limits = law.acceleration_limits(at.s)
 
     def points(self, rows: Indices) -> ToolPoints:
@@ -116,7 +117,7 @@ class _HalfSteps:
         size = length_rows(accelerations)
         across = np.sqrt(np.maximum(size * size - along * along, 0.0))
         density = np.maximum(
-            sample_density(speed, length_rows(twists[:, 3:]), across),
+            sample_density(speed, length_rows(twists[:, 3:]), across, _CHORD_ERROR),
             np.sqrt(size / (8.0 * _TIME_ERROR)),
         )
         first, last = 2 * ends[:-1], 2 * ends[1:]
@@ -126,9 +127,11 @@ class _HalfSteps:
 
     def fits(self, begin: Indices, end: Indices, tolerance: float) -> Flags:
         """Return whether quintics between grid times (r,) follow the law closely enough."""
-        pieces = self._pieces(begin, end)
-        # Most that do not are off at a quarter, so few are compared at all half steps.
-        fits = self._follows(pieces, tolerance, at_quarters=True)
+        pieces, fits = self._pieces(begin, end), np.ones(len(begin), dtype=np.bool_)
+        # Most that do not are off at a quarter, so few long ones are compared at all half steps.
+        long = np.flatnonzero(end - begin > 2)
+        if len(long):
+            fits[long] = self._follows(pieces.take(long), tolerance, at_quarters=True)
         rows = np.flatnonzero(fits)
         if len(rows):
             few = pieces.take(rows)
@@ -175,12 +178,12 @@ class _HalfSteps:
 
     def _excess(self, pieces: _Pieces, parts: tuple[float, ...]) -> Floats:
         """Return the greatest such ratio (r,) at some parts of the time of each piece."""
-        count, begin = len(parts), self.grid[pieces.begin]
-        t = ((self.grid[pieces.end] - begin)[:, None] * parts).ravel()
-        _, accelerations = pieces.spline.rates(np.repeat(pieces.number, count), t)
-        s = np.interp(np.repeat(begin, count) + t, self._points.times, self._s)
-        ratios = _ratios(accelerations, self._law.acceleration_limits(s))
-        largest: Floats = ratios.reshape(-1, count).max(axis=1)
+        begin, end = pieces.begin[:, None], pieces.end[:, None]
+        t = ((self.grid[end] - self.grid[begin]) * parts).ravel()
+        _, accelerations = pieces.spline.rates(np.repeat(pieces.number, len(parts)), t)
+        rows = (2 * begin + 2 * (end - begin) * np.array(parts)).astype(np.intp).ravel()
+        ratios = _ratios(accelerations, (self._limits[0][rows], self._limits[1][rows]))
+        largest: Floats = ratios.reshape(-1, len(parts)).max(axis=1)
         return largest
 
     def _pieces(self, begin: Indices, end: Indices) -> _Pieces:
@@ -220,10 +223,11 @@ def _piece_ends(steps: _HalfSteps, tolerance: float) -> Indices:
     last = len(steps.grid) - 1
     # The first piece is short, so that an output can be sent soon after the start.
     ends = np.unique([0, 1, *range(_JOINED, last, _JOINED), last])
-    open_rows = np.arange(len(ends) - 1)
+    open_rows, tried = np.arange(len(ends) - 1), np.empty(0, dtype=np.intp)
     while len(open_rows := open_rows[np.diff(ends)[open_rows] > 1]):
         begin, end = ends[open_rows], ends[open_rows + 1]
         split = open_rows[~steps.fits(begin, end, tolerance)]
+        tried = np.append(tried, _names(ends[split], ends[split + 1]))
         ends = np.insert(ends, split + 1, (ends[split] + ends[split + 1]) // 2)
         moved = split + np.arange(len(split))
         open_rows = np.sort(np.concatenate([moved, moved + 1]))
@@ -231,10 +235,16 @@ def _piece_ends(steps: _HalfSteps, tolerance: float) -> Indices:
     for first in (1, 2):
         left = np.arange(first, len(ends) - 2, 2)
         left = left[ends[left + 2] - ends[left] <= _JOINED]
+        left = left[~np.isin(_names(ends[left], ends[left + 2]), tried)]
         if len(left):
             joined = left[steps.fits(ends[left], ends[left + 2], tolerance)]
             ends = np.delete(ends, joined + 1)
     return ends
+
+
+def _names(begin: Indices, end: Indices) -> Indices:
+    """Return a number for each piece between rows of the grid (r,)."""
+    return 2 * _JOINED * begin + end - begin
 
 
 def _ratios(accelerations: Floats, limits: tuple[Floats, Floats]) -> Floats:

@@ -270,17 +270,23 @@ def sample_count(
     return found
 
 
-def sample_density(speed: Floats, turn_rate: Floats, acceleration: Floats) -> Floats:
+def sample_density(
+    speed: Floats,
+    turn_rate: Floats,
+    acceleration: Floats,
+    chord_error: float = ARC_CHORD_ERROR,
+) -> Floats:
     """
     Return the samples a second (m,) that follow the tool closely enough at m times.
 
     :param acceleration: of the tool, or the part of it that bends the path [m/s^2].
+    :param chord_error: greatest distance of chords between samples from the path [m].
     """
     density: Floats = np.maximum.reduce(
         [
             speed / STEP_LENGTH,
             turn_rate / STEP_ANGLE,
-            np.sqrt(acceleration / (8.0 * ARC_CHORD_ERROR)),
+            np.sqrt(acceleration / (8.0 * chord_error)),
         ]
     )
     return density
