@@ -32,6 +32,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
+from ur_cartesian_driver.planning.geometry.samples import sample_poses
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
@@ -54,6 +55,7 @@ from ur_cartesian_driver.planning.spline.joint_polynomials import (
 from ur_cartesian_driver.planning.spline.spline_path import (
     check_sample_count,
     solve_spline_path,
+    spline_pieces,
     SplinePath,
 )
 
@@ -90,7 +92,10 @@ class RoundedMotion:
     #: (k,) when each section begins [s].
     begins: Floats
     places: Places
+    #: The tool spline with the samples at which the arm is checked.
     path: SplinePath
+    #: (m,) the number of samples between its knots that describe the path.
+    sample_count: Indices
     polynomials: JointPolynomials
     #: (n,) when each point of the goal is passed [s].
     point_times: Floats
@@ -99,11 +104,23 @@ class RoundedMotion:
     def reference(self) -> ReferencePath:
         """The path of the tool, whose rows name the segments of the goal."""
         path = self.path
-        poses = path.poses.copy()
+        pieces = spline_pieces(path.spline, self.sample_count, 0, self.places)
+        samples = sample_poses(pieces)
+        point, fraction = pieces.locate(samples.piece, samples.t)
+        begin, durations = path.spline.times[samples.piece], np.diff(path.spline.times)
+        poses = np.concatenate([path.poses[:1], samples.poses])
         keep_hemisphere(poses)
         return ReferencePath(
-            poses=poses, point=path.points, time=path.times, fraction=path.fractions
+            poses=poses,
+            point=np.append(point[:1], point),
+            time=np.append(0.0, begin + samples.t * durations[samples.piece]),
+            fraction=np.append(0.0, fraction),
         )
+
+    @cached_property
+    def joint_spline(self) -> JointSpline:
+        """The joints over time."""
+        return JointSpline.through(self.polynomials.times, self.polynomials.joints, quintic=True)
 
 
 def plan_rounded_path(
@@ -155,7 +172,7 @@ def plan_rounded_path(
         if attempt < TRIES:
             for law, begin in zip(laws, motion.begins.tolist(), strict=True):
                 law.slow_around(coarse - begin)
-    point = int(motion.path.points[np.searchsorted(motion.path.times, coarse[0, 0])])
+    point = int(motion.places(coarse[:1, 0])[0][0])
     raise TooFast(
         point_field(point),
         f'lies on a path that the joints cannot follow within {1e3 * tolerance:.3f} mm by pieces '
@@ -240,7 +257,7 @@ def _fit(
         first=0,
         rests=True,
         places=places,
-        count=count,
+        count=np.concatenate([section.check_count for section in knots]),
     )
     polynomials = fit_joint_polynomials(
         kinematics,
@@ -258,6 +275,7 @@ def _fit(
         begins=begins,
         places=places,
         path=path,
+        sample_count=count,
         polynomials=polynomials,
         point_times=places.point_times(len(limits.speeds)),
     )
@@ -328,8 +346,7 @@ def _limit_excess(motion: RoundedMotion, options: PlanningOptions, rows: Indices
         return np.empty(0)
     part = np.arange(1, _SAMPLES_INSIDE + 1) / (_SAMPLES_INSIDE + 1)
     t = (pieces.times[rows, None] + np.diff(pieces.times)[rows, None] * part).ravel()
-    joints = JointSpline.through(pieces.times, pieces.joints, quintic=True)
-    q, qd, qdd = joints.rows(t)
+    q, qd, qdd = motion.joint_spline.rows(t)
     _, tool = tool_rates(kinematics.arm, kinematics.T_flange_tcp, q, qd, qdd)
     segments, _ = motion.places(t)
     excess = np.maximum.reduce(
@@ -352,10 +369,8 @@ def _check_postures(
     options: PlanningOptions,
 ) -> None:
     """Refuse a point if the arm does not pass it in the point's posture."""
-    times = motion.path.times
     for i, posture in sorted(goal.waypoints.postures.items()):
-        row = min(int(np.searchsorted(times, motion.point_times[i])), len(times) - 1)
-        q = vector6(motion.path.q[row].tolist())
+        q = vector6(motion.joint_spline.rows(motion.point_times[i : i + 1])[0][0].tolist())
         if clause := kinematics.explain_missed_posture(
             pose_from_row(targets[i]), posture, q, i, options.tf_prefix
         ):

@@ -107,12 +107,12 @@ class RoundedReport:
 
 def planned_rows(motion: RoundedMotion, report: RoundedReport) -> PlannedRows:
     """Return the pieces, each with the first point that is passed at its end or later."""
-    polynomials, path = motion.polynomials, motion.path
+    polynomials = motion.polynomials
     waypoints = np.minimum(
         np.searchsorted(motion.point_times, polynomials.times[1:] - 1e-6),
         len(motion.point_times) - 1,
     )
-    return piece_rows(path, polynomials, waypoints, lambda _: report.lines())
+    return piece_rows(motion.reference, polynomials, waypoints, lambda _: report.lines())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

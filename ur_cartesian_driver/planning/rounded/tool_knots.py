@@ -53,6 +53,8 @@ class ToolKnots(NamedTuple):
     points: ToolPoints
     #: (n,) the number of samples between them that describe the path.
     sample_count: Indices
+    #: (n,) the number of samples between them at which the arm is checked, as on lines.
+    check_count: Indices
 
 
 def tool_knots(law: SectionLaw, tolerance: float) -> ToolKnots:
@@ -70,7 +72,7 @@ def tool_knots(law: SectionLaw, tolerance: float) -> ToolKnots:
         if not len(coarse) or attempt == TRIES:
             break
         law.slow_around(np.stack([steps.grid[coarse], steps.grid[coarse + 1]], axis=1))
-    return ToolKnots(steps.points(2 * ends), steps.sample_count(ends))
+    return ToolKnots(steps.points(2 * ends), *steps.sample_counts(ends))
 
 
 class _Pieces(NamedTuple):
@@ -109,21 +111,29 @@ class _HalfSteps:
             quintic=True,
         )
 
-    def sample_count(self, ends: Indices) -> Indices:
-        """Return the number of samples between grid times: at most 2 mm and one degree apart."""
+    def sample_counts(self, ends: Indices) -> tuple[Indices, ...]:
+        """
+        Return the numbers of samples between grid times (n,), at most 2 mm and one degree apart.
+
+        The first ones also follow the curve of the path, and its course over time.
+        """
         twists, accelerations = self._points.twists, self._points.accelerations[:, :3]
         speed = length_rows(twists[:, :3])
         along = np.einsum('ij,ij->i', twists[:, :3], accelerations) / np.maximum(speed, _REST)
         size = length_rows(accelerations)
         across = np.sqrt(np.maximum(size * size - along * along, 0.0))
-        density = np.maximum(
-            sample_density(speed, length_rows(twists[:, 3:]), across, _CHORD_ERROR),
-            np.sqrt(size / (8.0 * _TIME_ERROR)),
-        )
+        rates = speed, length_rows(twists[:, 3:])
+        bent = sample_density(*rates, across, _CHORD_ERROR)
         first, last = 2 * ends[:-1], 2 * ends[1:]
-        greatest = np.maximum(np.maximum.reduceat(density, first), density[last])
-        count: Indices = np.ceil(greatest * np.diff(self.grid[ends])).astype(np.intp)
-        return np.maximum(count, 1)
+
+        def count(density: Floats) -> Indices:
+            greatest = np.maximum(np.maximum.reduceat(density, first), density[last])
+            return np.maximum(np.ceil(greatest * np.diff(self.grid[ends])), 1.0).astype(np.intp)
+
+        return (
+            count(np.maximum(bent, np.sqrt(size / (8.0 * _TIME_ERROR)))),
+            count(sample_density(*rates, np.zeros(len(speed)))),
+        )
 
     def fits(self, begin: Indices, end: Indices, tolerance: float) -> Flags:
         """Return whether quintics between grid times (r,) follow the law closely enough."""

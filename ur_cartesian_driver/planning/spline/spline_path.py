@@ -24,9 +24,10 @@ from ur_cartesian_driver.motion.errors import (
     NearSingularity,
 )
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
-from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, keep_hemisphere
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import Posture
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.planning.geometry.curves import ARC_CHORD_ERROR, HALF_TURN
 from ur_cartesian_driver.planning.geometry.samples import (
     CurvePieces,
@@ -82,8 +83,6 @@ class SplinePath:
     q: Floats
     #: (m,) path length of the tool since the start [m].
     length: Floats
-    #: (m,) turn of the tool since the start [rad].
-    angle: Floats
     #: The tightest margin of each segment.
     tightest_margins: TightestMargins
 
@@ -93,6 +92,15 @@ class SplinePath:
         begin = self.spline.times[self.piece]
         times: Floats = begin + self.u * (self.spline.times[self.piece + 1] - begin)
         return times
+
+    @property
+    def reference(self) -> ReferencePath:
+        """The path of the tool."""
+        poses = self.poses.copy()
+        keep_hemisphere(poses)
+        return ReferencePath(
+            poses=poses, point=self.points, time=self.times, fraction=self.fractions
+        )
 
     def stretch_times(self, factor: float) -> SplinePath:
         """Return the same path with all times multiplied by a factor."""
@@ -123,16 +131,7 @@ def solve_spline_path(
     """
     if count is None:
         count = _measured_count(kinematics, spline, first)
-    n = len(count)
-    pieces = CurvePieces(
-        path=ToolSplinePath(spline, count, places),
-        first=first,
-        number=2 * np.arange(n),
-        begin=np.zeros(n),
-        end=np.ones(n),
-        sample_count=count,
-    )
-    joint_path = solve_joint_path(kinematics, pieces, q_start)
+    joint_path = solve_joint_path(kinematics, spline_pieces(spline, count, first, places), q_start)
     start = spline.poses(np.zeros(1, dtype=np.intp), np.zeros(1))
     poses = np.concatenate([start, joint_path.poses])
     length = _cumulative(np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1))
@@ -150,10 +149,27 @@ def solve_spline_path(
         points=np.concatenate([joint_path.segments[:1], joint_path.segments]),
         fractions=np.concatenate([[0.0], joint_path.fractions]),
         length=length,
-        angle=angle,
         tightest_margins=tightest_margins(
             kinematics.arm, joint_path.q, measures, joint_path.segments, joint_path.fractions
         ),
+    )
+
+
+def spline_pieces(
+    spline: ToolSpline,
+    count: Indices,
+    first: int,
+    places: Callable[[Floats], tuple[Indices, Floats]] | None,
+) -> CurvePieces:
+    """Return the pieces of a spline; for the parameters see :func:`solve_spline_path`."""
+    n = len(count)
+    return CurvePieces(
+        path=ToolSplinePath(spline, count, places),
+        first=first,
+        number=2 * np.arange(n),
+        begin=np.zeros(n),
+        end=np.ones(n),
+        sample_count=count,
     )
 
 
