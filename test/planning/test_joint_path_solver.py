@@ -422,9 +422,11 @@ def test_places_are_dense_and_on_their_curves(cell, a, b, radius, fillet):
 def test_the_joints_of_many_places_are_those_of_each_after_the_other(cell, a, b):
     middle, end = (cell.pose(*spot[:3], turn=spot[3:]) for spot in (a, b))
     path = path_of([Line(cell.home, middle), Line(middle, end)])
-    arc = [np.array([pose.row()]) for pose in (middle, cell.pose(0.05, 0.02, 0.11), end)]
-    if not arc_faults(*arc, np.array([False])):
-        path.curves.put_arcs(np.array([1]), ArcRows.through(*arc, np.array([False])))
+    poses = middle, cell.pose(0.05, 0.02, 0.11), end
+    start, via, last = (np.array([pose.row()]) for pose in poses)
+    if not arc_faults(start, via, last, np.array([False])):
+        arcs = ArcRows.through(start, via, last, np.array([False]))
+        path.curves.put_arcs(np.array([1]), arcs)
     pieces = pieces_of(path, [0, 2], [0.0, 0.0], [1.0, 1.0])
     found = solve_joint_path(
         TcpKinematics(cell.arm, cell.T_flange_tcp), pieces, cell.state.actual_q
