@@ -30,7 +30,6 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.goal.goal import (
-    ArcMode,
     Goal,
     Posture,
     Segment,
@@ -40,10 +39,7 @@ from ur_cartesian_driver.motion.goal.goal import (
 from ur_cartesian_driver.motion.plan.primitive import MoveJ, MoveL
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, CurveRows
-from ur_cartesian_driver.planning.geometry.curves import (
-    ArcCurve,
-    JointLineCurve,
-)
+from ur_cartesian_driver.planning.geometry.curves import arc_faults, ArcRows, JointLineCurve
 from ur_cartesian_driver.planning.geometry.samples import (
     CurvePieces,
     sample_poses,
@@ -380,8 +376,10 @@ def test_a_peak_of_the_joints_between_coarse_places_counts(make_cell):
 def path_of(curves, radius=0.0, fillet=False):
     """Return the path of two curves, with a blend between them if there is a radius."""
     start, end = (pose_rows([getattr(curve, at) for curve in curves]) for at in ('start', 'end'))
-    others = {k: curve for k, curve in enumerate(curves) if not isinstance(curve, Line)}
-    path = BlendedPath(CurveRows(start, end, others))
+    path = BlendedPath(CurveRows(start, end))
+    for k, curve in enumerate(curves):
+        if not isinstance(curve, Line):
+            path.curves.put_joint_line(k, curve)
     if radius > 0.0:
         path.make_blends(np.array([0]), np.array([radius]), np.array([fillet]))
     return path
@@ -423,14 +421,13 @@ def test_places_are_dense_and_on_their_curves(cell, a, b, radius, fillet):
 @given(a=spots, b=spots)
 def test_the_joints_of_many_places_are_those_of_each_after_the_other(cell, a, b):
     middle, end = (cell.pose(*spot[:3], turn=spot[3:]) for spot in (a, b))
-    paths: list[Line | ArcCurve] = [Line(cell.home, middle)]
-    try:
-        paths.append(
-            ArcCurve.through(middle, cell.pose(0.05, 0.02, 0.11).position, end, ArcMode(0))
-        )
-    except ValueError:
-        paths.append(Line(middle, end))
-    pieces = pieces_of(path_of(paths), [0, 2], [0.0, 0.0], [1.0, 1.0])
+    path = path_of([Line(cell.home, middle), Line(middle, end)])
+    poses = middle, cell.pose(0.05, 0.02, 0.11), end
+    start, via, last = (np.array([pose.row()]) for pose in poses)
+    if not arc_faults(start, via, last, np.array([False])):
+        arcs = ArcRows.through(start, via, last, np.array([False]))
+        path.curves.put_arcs(np.array([1]), arcs)
+    pieces = pieces_of(path, [0, 2], [0.0, 0.0], [1.0, 1.0])
     found = solve_joint_path(
         TcpKinematics(cell.arm, cell.T_flange_tcp), pieces, cell.state.actual_q
     )

@@ -16,9 +16,11 @@ from ur_cartesian_driver.motion.errors import (
     InvalidGoal,
     InvalidJoints,
     JointLimitExceeded,
+    NotAvailable,
 )
 from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import (
     FreeAxis,
     Goal,
@@ -30,6 +32,8 @@ from ur_cartesian_driver.motion.goal.goal import (
 from ur_cartesian_driver.motion.plan.primitive import MoveJ, MoveL, OptimoveJ
 from ur_cartesian_driver.path.resumption import resume
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
+from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.planning.request.validate import check
 
 NO_POSE = Pose((nan,) * 3, (nan,) * 4)
@@ -160,3 +164,46 @@ def test_a_goal_with_times_takes_its_time(cell):
     q = (0.1, -1.4, 1.7, -1.8, -1.5, 0.3)
     made = planned(cell, at(q, time=4.0), segments=(JOINT,))
     assert made.rows.primitives[0].duration == pytest.approx(4.0)
+
+
+#: Two configurations near the arm, to which splines lead.
+NEAR = (0.1, -1.5, 1.6, -1.6, -1.5, 0.1), (0.2, -1.5, 1.5, -1.6, -1.6, 0.0)
+
+
+def test_a_spline_passes_these_joints(cell):
+    made = planned(
+        cell,
+        *(at(q, time=2.0 + 2.0 * k) for k, q in enumerate(NEAR)),
+        execution=ExecutionMode.SPLINE,
+    )
+    q, _, _ = made.joint_spline.rows(np.array([2.0, 4.0]))
+    assert np.abs(q - NEAR).max() < 1e-6
+
+
+def test_rounded_corners_lead_past_these_joints_to_the_last(cell):
+    made = planned(cell, *map(at, NEAR), corner_deviation=1e-3)
+    q, _, _ = made.joint_spline.rows(np.linspace(0.0, made.duration, 2000))
+    assert np.abs(q[-1] - NEAR[1]).max() < 1e-6
+    assert 1e-4 < np.abs(q - NEAR[0]).max(axis=1).min() < 5e-3
+
+
+@pytest.mark.parametrize('execution', [ExecutionMode.PRIMITIVES, ExecutionMode.SPLINE])
+def test_appended_points_lead_there(cell, execution):
+    first, second = (
+        at(q, time=(2.0 + 2.0 * k) * (execution is ExecutionMode.SPLINE))
+        for k, q in enumerate(NEAR)
+    )
+    goal = Goal(waypoints=(first,), execution=execution, keep_open=True)
+    begun = plan_first_part(plan(goal, cell.state, cell.arm, OPTIONS), cell.arm, OPTIONS)
+    added = AppendedPoints(waypoints=(second,), segments=(), io_commands=(), last=True)
+    made = plan_append(begun.next_goal, added, cell.arm, OPTIONS, from_rest=False)
+    assert np.abs(made.plan.rows.joints[-1] - NEAR[1]).max() < 1e-6
+
+
+def test_without_a_calibration_only_joint_moves_lead_there(cell):
+    options = replace(OPTIONS, calibration_known=False)
+    made = planned(cell, at(NEAR[0]), segments=(JOINT,), options=options)
+    assert made.rows.primitives[0].target == NEAR[0]
+    for segments in ((), (Segment(),), (Segment(type=SegmentType.PROCESS),)):
+        with pytest.raises(NotAvailable, match=r'points\[0\]\.pose is NaN.*calibration'):
+            planned(cell, at(NEAR[0]), segments=segments, options=options)

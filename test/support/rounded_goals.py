@@ -4,7 +4,7 @@
 
 from dataclasses import dataclass
 
-from curve_distance import distances
+from curve_distance import arc_points, distances
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -18,7 +18,6 @@ from ur_cartesian_driver.motion.geometry.pose import (
 from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning import PlanningOptions
-from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.sim.calibration import random_calibration
 
 MODELS = ('ur3e', 'ur5', 'ur5e', 'ur10e', 'ur20')
@@ -105,8 +104,8 @@ def programmed(case):
         case.starts, case.goal.waypoints, case.goal.segments, strict=True
     ):
         if segment.type is SegmentType.CIRCULAR:
-            arc = ArcCurve.through(start, segment.via.position, point.pose, segment.arc_mode)
-            found.append(arc.rows(np.linspace(0.0, 1.0, 400)[1:])[:, :3])
+            places = (start.position, segment.via.position, point.pose.position)
+            found.append(arc_points(*map(np.array, places)))
         else:
             found.append(np.array([point.pose.position]))
     path = np.vstack(found)

@@ -25,7 +25,6 @@ from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.goal.goal import (
-    ArcMode,
     Goal,
     Posture,
     Segment,
@@ -34,7 +33,7 @@ from ur_cartesian_driver.motion.goal.goal import (
 )
 from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable, rows_where
 from ur_cartesian_driver.motion.goal.known_frames import FRAMES_OF_TOOL
-from ur_cartesian_driver.planning.geometry.curves import ArcCurve
+from ur_cartesian_driver.planning.geometry.blended_path import curves_of
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.request.goal_fields import (
     gives_joints,
@@ -121,6 +120,11 @@ class _Resumption:
         self.timed, self.mode = is_timed(table), resolve_execution_mode(table)
         self.spline = _Spline(table, start) if is_spline(table) else None
         self.rounded = is_rounded(table)
+        poses = table.waypoints.poses
+        #: The lines and arcs; where segment 0 begins is not known, but it is never cut.
+        self.curves, self.faults = curves_of(
+            table.motions, IDENTITY, np.concatenate([poses[:1], poses[:-1]]), poses.copy()
+        )
         self.moves_joints = self.spline is None and not self.rounded
         self.stopped = place.point + place.fraction
         self.begin = self._begin(place, overlap)
@@ -237,43 +241,23 @@ class _Resumption:
         """Return a fraction, reduced on an arc until what remains of it determines a circle."""
         if self.segments[k].type is not SegmentType.CIRCULAR:
             return u
-        arc = self._arc(k)
-        least = max(_MIN_ARC, sqrt(8.0 * _MIN_HEIGHT * arc.radius))
-        return min(u, max(0.0, 1.0 - least / arc.length))
+        length, radius = self._length(k), float(self.curves.arcs.radius[k])
+        least = max(_MIN_ARC, sqrt(8.0 * _MIN_HEIGHT * radius))
+        return min(u, max(0.0, 1.0 - least / length))
 
     # -- the curves ------------------------------------------------------------------------------
-
-    def _curve_start(self, k: int) -> Pose:
-        """Return the pose at which a segment begins."""
-        before = self.segments[k - 1]
-        fixed = before.type is SegmentType.CIRCULAR and before.arc_mode is ArcMode.FIXED
-        if fixed and k > 1:
-            return self._arc(k - 1).end
-        return self.points[k - 1].pose
-
-    def _arc(self, k: int) -> ArcCurve:
-        segment, via = self.segments[k], self.segments[k].via
-        assert via is not None
-        try:
-            return ArcCurve.through(
-                self._curve_start(k), via.position, self.points[k].pose, segment.arc_mode
-            )
-        except ValueError as error:
-            raise InvalidGoal(f'segments[{k}].via', f'makes no arc: {error}') from None
 
     def _length(self, k: int) -> float:
         if self.spline is not None:
             return self.spline.length(k)
-        if self.segments[k].type is SegmentType.CIRCULAR:
-            return self._arc(k).length
-        return self._curve_start(k).distance_to(self.points[k].pose)
+        if k in self.faults:
+            raise InvalidGoal(f'segments[{k}].via', f'makes no arc: {self.faults[k]}')
+        return float(self.curves.length[k])
 
     def _pose(self, k: int, u: float) -> Pose:
         if self.spline is not None:
             return self.spline.pose(k, u)
-        if self.segments[k].type is SegmentType.CIRCULAR:
-            return pose_from_row(self._arc(k).rows(np.array([u]))[0].tolist())
-        return self._curve_start(k).interpolate(self.points[k].pose, u)
+        return pose_from_row(self.curves.rows(np.array([k]), np.array([u]))[0])
 
     def _cut(self, k: int, u: float) -> Segment:
         """Return what remains of a segment after a fraction of it."""

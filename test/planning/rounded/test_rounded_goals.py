@@ -32,6 +32,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     SegmentType,
 )
 from ur_cartesian_driver.motion.plan.primitive import Wait
+from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause
 from ur_cartesian_driver.planning import plan
 
 PARTS = 10
@@ -137,6 +138,19 @@ def test_points_without_a_deviation_are_stops(cell):
     assert speed[nearest[1]] < 0.005
     assert np.linalg.norm(rows[nearest[1]] - corners[1]) < 1e-4
     assert min(speed[nearest[0]], speed[nearest[2]]) > 0.01
+
+
+def test_a_stop_is_a_slow_stretch_down_to_rest(cell):
+    segments = (Segment(corner_deviation=1e-3), Segment(), Segment(corner_deviation=1e-3))
+    found = plan(square(cell, segments=(*segments, Segment())), cell.state, cell.arm, OPTIONS)
+    stretches = found.find_slow_stretches()
+    stops = [each for each in stretches if each.cause is SlowCause.STOP]
+    assert [(each.point, each.lowest) for each in stops] == [(1, 0.0)] * 2
+    assert stops[0].last == 1
+    assert stops[1].first == 2
+    corners = [each for each in stretches if each.cause is SlowCause.CORNER]
+    assert {each.point for each in corners} == {0, 2}
+    assert all(0.0 < each.lowest < each.asked for each in corners)
 
 
 def test_a_dwell_is_a_stop_with_a_rest(cell):
@@ -262,6 +276,13 @@ def test_what_excludes_rounded_corners_is_refused(cell, fields, text):
 def test_a_path_that_leads_nowhere_is_refused(cell, count):
     goal = Goal(waypoints=(cell.point(),) * count, corner_deviation=1e-3)
     with pytest.raises(InvalidGoal, match='are all where the arm is'):
+        plan(goal, cell.state, cell.arm, OPTIONS)
+
+
+def test_a_path_that_needs_too_many_samples_is_refused(cell):
+    back, forth = cell.point(), cell.point(0.2)  # a hundred steps of 2 mm apart
+    goal = Goal(waypoints=(forth, back) * 10_100, corner_deviation=1e-3)
+    with pytest.raises(InvalidGoal, match=r'needs 2\.02e\+06 samples, more than 2,000,000'):
         plan(goal, cell.state, cell.arm, OPTIONS)
 
 

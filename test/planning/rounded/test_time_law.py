@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.planning.rounded.time_law import (
-    fastest_law,
+    FastestLaw,
     LawLimits,
     lowered_over,
     TimeLaw,
@@ -54,6 +54,10 @@ def limits_of(d1, d2):
         bound=np.broadcast_to(ACCELERATIONS, d1.shape),
         vectors=(),
     )
+
+
+def fastest_law(s, limits):
+    return FastestLaw(s, limits).squares(limits.speed, np.ones(len(s)))
 
 
 def duration(s, y):

@@ -51,13 +51,13 @@ from ur_cartesian_driver.planning.geometry.curves import goal_arcs
 from ur_cartesian_driver.planning.geometry.samples import counted
 from ur_cartesian_driver.planning.options import MAX_CLEARANCE, PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import Clearance
-from ur_cartesian_driver.planning.preflight.tcp_kinematics import named_joints
 from ur_cartesian_driver.planning.request.controlled_frame import SAME_TCP
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_spline,
     is_timed,
     OPTIMIZED_TYPES,
 )
+from ur_cartesian_driver.planning.request.joint_points import named_joints
 
 #: Length between two samples of a segment [m].
 _SAMPLE_LENGTH = 0.02

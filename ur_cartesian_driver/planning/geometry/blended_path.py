@@ -9,7 +9,7 @@ blends, are stored as rows; joint lines are objects.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     distance_rows,
     interpolate_rows,
 )
-from ur_cartesian_driver.motion.goal.goal_table import rows_where
+from ur_cartesian_driver.motion.goal.goal_table import rows_where, SegmentRows
 from ur_cartesian_driver.planning.geometry.blend_shapes import (
     BlendShapes,
     crossfade,
@@ -30,12 +30,11 @@ from ur_cartesian_driver.planning.geometry.blend_shapes import (
 )
 from ur_cartesian_driver.planning.geometry.curves import (
     ARC_CHORD_ERROR,
-    ArcCurve,
     ArcRows,
+    goal_arcs,
     JointLineCurve,
     MAX_TURN_PER_SAMPLE,
     NO_ARCS,
-    SegmentCurve,
     tcp_rows,
     unset_arcs,
 )
@@ -76,11 +75,10 @@ class CurveRows:
     The curves of consecutive segments, a row for each.
 
     :param start: (n, 7) the pose where each curve begins; ``end``: (n, 7) where it ends.
-    :param others: curves that are not lines, by row.
     """
 
-    def __init__(self, start: Floats, end: Floats, others: Mapping[int, SegmentCurve]) -> None:
-        """Measure the lines."""
+    def __init__(self, start: Floats, end: Floats) -> None:
+        """Begin with lines."""
         self.start, self.end = start, end
         #: (n,) lengths [m].
         self.length = distance_rows(start, end)
@@ -92,9 +90,8 @@ class CurveRows:
         self.is_joint_line = ~self.is_line
         #: The arcs; other rows are meaningless. Empty if there are no arcs.
         self.arcs = NO_ARCS
-        self.others: dict[int, SegmentCurve] = {}
-        for row, curve in others.items():
-            self.put(row, curve)
+        #: The joint lines, by row.
+        self.joint_lines: dict[int, JointLineCurve] = {}
 
     def __len__(self) -> int:
         return len(self.length)
@@ -104,19 +101,10 @@ class CurveRows:
         """(n,) whether each curve is an arc."""
         return ~(self.is_line | self.is_joint_line)
 
-    def joint_line(self, row: int) -> JointLineCurve:
-        """Return the curve of a joint move."""
-        curve = self.others[row]
-        assert isinstance(curve, JointLineCurve)
-        return curve
-
-    def put(self, row: int, curve: SegmentCurve) -> None:
-        """Replace the curve of a row by one that is not a line."""
-        self.put_line(row, curve.start, curve.end)
-        self.others[row] = curve
-        if isinstance(curve, ArcCurve):
-            self.put_arcs(np.array([row]), curve.columns)
-            return
+    def put_joint_line(self, row: int, curve: JointLineCurve) -> None:
+        """Replace the curve of a row by a joint line."""
+        self.put_line(row, curve.start.row(), curve.end.row())
+        self.joint_lines[row] = curve
         self.length[row], self.joint_travel[row] = curve.length, curve.joint_travel
         self.is_line[row], self.is_joint_line[row] = False, True
 
@@ -129,27 +117,35 @@ class CurveRows:
         self.length[row], self.is_line[row] = arcs.radius * arcs.sweep, False
         self.angle[row] = np.where(arcs.is_fixed, arcs.sweep, self.angle[row])
 
-    def put_line(self, row: int, start: Pose, end: Pose | None = None) -> None:
-        """Replace a curve by the line from a pose to another one, or to the end of the curve."""
-        self.start[row], self.end[row] = start.row(), self.end[row] if end is None else end.row()
+    def put_line(
+        self, row: int, start: Floats | Sequence[float], end: Floats | Sequence[float]
+    ) -> None:
+        """Replace the curve of a row by the line between two poses (7,)."""
+        self.start[row], self.end[row] = start, end
         one = slice(row, row + 1)
         self.length[one] = distance_rows(self.start[one], self.end[one])
         self.angle[one] = angle_rows(self.start[one, 3:], self.end[one, 3:])
         self.joint_travel[row] = 0.0
         self.is_line[row], self.is_joint_line[row] = True, False
-        self.others.pop(row, None)
+        self.joint_lines.pop(row, None)
 
-    @property
-    def samples(self) -> Indices:
-        """(n,) the number of chords that follow each curve closely enough."""
-        samples = np.maximum(1, np.ceil(self.angle / MAX_TURN_PER_SAMPLE)).astype(np.intp)
+    def chord_counts(
+        self, error: float = ARC_CHORD_ERROR, turn: float = MAX_TURN_PER_SAMPLE
+    ) -> Indices:
+        """
+        Return the number of chords (n,) that follow each curve closely enough.
+
+        :param error: greatest distance of a chord from its arc [m]; ``turn``: greatest turn of the
+            tool along a chord [rad]. Joint lines have their own bounds.
+        """
+        counts = np.maximum(1, np.ceil(self.angle / turn)).astype(np.intp)
         at = np.flatnonzero(self.is_arc)
         arcs = self.arcs.take(at)
-        chords = np.ceil(arcs.sweep / np.sqrt(8.0 * ARC_CHORD_ERROR / arcs.radius))
-        samples[at] = np.maximum(samples[at], chords)
-        for row in rows_where(self.is_joint_line):
-            samples[row] = self.joint_line(row).samples
-        return samples
+        chords = np.ceil(arcs.sweep / np.sqrt(8.0 * error / arcs.radius))
+        counts[at] = np.maximum(counts[at], chords)
+        for row, line in self.joint_lines.items():
+            counts[row] = line.samples
+        return counts
 
     def rows(self, row: Indices, u: Floats) -> Floats:
         """Return poses (n, 7) on many curves; ``row`` must not decrease."""
@@ -160,18 +156,8 @@ class CurveRows:
         rows[at] = self.arcs.take(row[at]).rows(self.start[row[at]], rows[at], u[at])
         for k in np.unique(row[self.is_joint_line[row]]).tolist():
             first, last = np.searchsorted(row, (k, k + 1))
-            rows[first:last] = self.others[k].rows(u[first:last])
+            rows[first:last] = self.joint_lines[k].rows(u[first:last])
         return rows
-
-    def places(self, row: Indices, u: Floats) -> Floats:
-        """Return positions (n, m, 3) [m] at many ``u`` (n, m) on each of some curves (n,)."""
-        start, end = self.start[row, None, :3], self.end[row, None, :3]
-        places: Floats = start + u[..., None] * (end - start)
-        on_arc = np.flatnonzero(self.is_arc[row])
-        places[on_arc] = self.arcs.take((row[on_arc], None)).places(u[on_arc])
-        for k in rows_where(self.is_joint_line[row]):
-            places[k] = self.joint_line(int(row[k])).rows(u[k])[:, :3]
-        return places
 
     def trim(self, row: Indices, radius: Floats, *, at_end: bool = False) -> Floats:
         """Return the ``u`` (n,) at a distance [m] from the starts, or the ends, of curves."""
@@ -182,8 +168,22 @@ class CurveRows:
         if at_end:
             u = 1.0 - u
         for k in rows_where(self.is_joint_line[row]):
-            u[k] = self.joint_line(int(row[k])).trim(float(radius[k]), at_end=at_end)
+            u[k] = self.joint_lines[int(row[k])].trim(float(radius[k]), at_end=at_end)
         return u
+
+
+def curves_of(
+    segments: SegmentRows, T_base_frame: Pose, start: Floats, end: Floats
+) -> tuple[CurveRows, dict[int, str]]:
+    """
+    Return the lines and arcs of segments, and the faults of arcs, which remain lines.
+
+    For the parameters see :func:`~.curves.goal_arcs`.
+    """
+    rows, arcs, faults = goal_arcs(segments, T_base_frame, start, end)
+    curves = CurveRows(start, end)
+    curves.put_arcs(rows, arcs)
+    return curves, faults
 
 
 class BlendedPath:
@@ -258,12 +258,8 @@ class BlendedPath:
         s = np.linspace(0.0, 1.0, _CHORDS + 1)
         for k in range(0, len(curved), _BLOCK // _CHORDS):
             row = curved[k : k + _BLOCK // _CHORDS]
-            after = row + 1
-            a, b = crossfade(self.u_leave[row, None], self.u_join[after, None], s)
-            places = curves.places(row, a) + curves.places(after, b)
-            places -= curves.start[after, None, :3]
-            for j in rows_where(curves.is_joint_line[row] & curves.is_joint_line[after]):
-                places[j] = self.blend_rows(np.full(len(s), row[j]), s)[:, :3]
+            rows = self.blend_rows(np.repeat(row, len(s)), np.tile(s, len(row)))
+            places = rows[:, :3].reshape(len(row), len(s), 3)
             chords = np.linalg.norm(np.diff(places, axis=1), axis=2)
             self.blend_length[row] = chords.sum(axis=1)
 
@@ -314,7 +310,7 @@ class BlendedPath:
         rows[~in_joint_space] = self._crossfaded(row[~in_joint_space], s[~in_joint_space])
         for k in np.unique(row[in_joint_space]).tolist():
             first, last = np.searchsorted(row, (k, k + 1))
-            line, q = curves.joint_line(k), self.joint_rows(2 * k + 1, s[first:last])
+            line, q = curves.joint_lines[k], self.joint_rows(2 * k + 1, s[first:last])
             rows[first:last] = tcp_rows(line.arm, line.T_flange_tcp, q)
         return rows
 
@@ -326,10 +322,10 @@ class BlendedPath:
     def joint_rows(self, number: int, t: Floats) -> Floats:
         """Return the joint positions (n, 6) [rad] on a curve in joint space."""
         row, is_blend = divmod(number, 2)
-        first = self.curves.joint_line(row)
+        first = self.curves.joint_lines[row]
         if not is_blend:
             return first.joint_rows(t)
-        second = self.curves.joint_line(row + 1)
+        second = self.curves.joint_lines[row + 1]
         a, b = crossfade(self.u_leave[row : row + 1], self.u_join[row + 1 : row + 2], t)
         rows: Floats = first.joint_rows(a) + second.joint_rows(b) - np.array(second.q_start)
         return rows

@@ -13,23 +13,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import ceil, degrees, hypot, pi, sqrt
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
-from ur_cartesian_driver.motion.geometry.pose import multiply, Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose import multiply, Pose
 from ur_cartesian_driver.motion.geometry.pose_rows import (
     compose_rows,
     cross_rows,
     distance_rows,
-    interpolate_rows,
     multiply_rows,
     normalized_rows,
     transform_rows,
 )
-from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector3, vector6
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import rows_where, SegmentRows
 
@@ -162,48 +161,6 @@ NO_ARCS = unset_arcs(0)
 
 
 @dataclass(frozen=True, slots=True)
-class ArcCurve:
-    """The tool on a circular arc."""
-
-    start: Pose
-    end: Pose
-    #: The arc as a single row.
-    columns: ArcRows
-    #: Radius [m]; angle of the arc [rad], in (0, 2 pi).
-    radius: float
-    sweep: float
-
-    @classmethod
-    def through(cls, start: Pose, via: Vector3, end: Pose, mode: ArcMode) -> ArcCurve:
-        """
-        Return the arc from start through a position [m] to the end's position.
-
-        In mode FIXED the orientation of ``end`` is replaced by the one in which the arc arrives.
-
-        :raises ValueError: the three positions make no circle, or, in mode FIXED, a circle that
-            rounding on the wire changes too much; the text is a clause that gives the reason.
-        """
-        a, b, c = (np.array([place]) for place in (start.row(), via, end.row()))
-        is_fixed = np.array([mode is ArcMode.FIXED])
-        for fault in arc_faults(a, b, c, is_fixed).values():
-            raise ValueError(fault)
-        arc = ArcRows.through(a, b, c, is_fixed)
-        arc.turn_ends(np.zeros(1, dtype=np.intp), a, c)
-        return cls(start, pose_from_row(c[0]), arc, float(arc.radius[0]), float(arc.sweep[0]))
-
-    @property
-    def length(self) -> float:
-        """Length of the arc [m]."""
-        return self.radius * self.sweep
-
-    def rows(self, u: Floats) -> Floats:
-        """Return the poses (n, 7) at many ``u`` (n,)."""
-        start, end = (np.tile(pose.row(), (len(u), 1)) for pose in (self.start, self.end))
-        arcs = self.columns.take(np.zeros(len(u), dtype=np.intp))
-        return arcs.rows(start, interpolate_rows(start, end, u), u)
-
-
-@dataclass(frozen=True, slots=True)
 class JointLineCurve:
     """A straight line in joint space; forward kinematics gives the poses of the tool."""
 
@@ -283,9 +240,6 @@ class JointLineCurve:
             k = int(np.argmin(np.append(distance_rows(center, between) < radius, False)))
             low, high = v[k : k + 2].tolist()
         return 1.0 - high if at_end else high
-
-
-SegmentCurve: TypeAlias = ArcCurve | JointLineCurve
 
 
 def tcp_rows(arm: Arm, T_flange_tcp: Pose, q: Floats) -> Floats:

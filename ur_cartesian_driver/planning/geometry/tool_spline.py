@@ -17,7 +17,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.geometry.polynomials import (
     cubic_rows,
     evaluate,
@@ -76,6 +76,8 @@ class ToolSpline:
     turns: Floats
     #: (n, 4) the orientation at the start of each piece, where its rotation vector is zero
     orientations: Floats
+    #: (n,) whether the tool may turn on each piece
+    is_turning: Flags
 
     @classmethod
     def through(cls, points: ToolPoints) -> ToolSpline:
@@ -95,7 +97,8 @@ class ToolSpline:
         changes = np.concatenate(
             [rates[begin], rates[end], orientations[end] - orientations[begin]], axis=1
         )
-        turning = np.flatnonzero(changes.any(axis=1))
+        is_turning: Flags = np.any(changes, axis=1)
+        turning = np.flatnonzero(is_turning)
         if len(turning):
             to, since = orientations[end][turning], orientations[begin][turning]
             turn = log_rows(multiply_rows(to, conjugate_rows(since)))
@@ -110,6 +113,7 @@ class ToolSpline:
             orientations=orientations[begin],
             positions=positions,
             turns=turns,
+            is_turning=is_turning,
         )
 
     def rows(self, piece: Indices, t: Floats) -> ToolRows:
@@ -119,23 +123,16 @@ class ToolSpline:
         :param piece: (m,) the piece to which each time belongs.
         :param t: (m,) time since this piece began [s].
         """
-        x = evaluate(self.positions[piece], t)
-        orientations = self.orientations[piece]
-        w, e = np.zeros_like(x.v), np.zeros_like(x.a)
-        rows = self._turning(piece)
-        if len(rows):
-            turn = evaluate(self.turns[piece[rows]], t[rows])
-            w[rows], e[rows] = angular_rates(turn)
-            orientations[rows] = _turned(turn.x, orientations[rows])
-        return ToolRows(
-            np.concatenate([x.x, orientations], axis=1),
-            np.concatenate([x.v, w], axis=1),
-            np.concatenate([x.a, e], axis=1),
-        )
+        return ToolRows(self.poses(piece, t), *self.rates(piece, t))
 
     def rates(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
         """Return the twists and the accelerations that :meth:`rows` returns, (m, 6) each."""
-        _, twists, accelerations = self.rows(piece, t)
+        twists, accelerations = np.zeros((2, len(piece), 6))
+        _, twists[:, :3], accelerations[:, :3] = evaluate(self.positions[piece], t)
+        rows = self._turning(piece)
+        if len(rows):
+            turn = evaluate(self.turns[piece[rows]], t[rows])
+            twists[rows, 3:], accelerations[rows, 3:] = angular_rates(turn)
         return twists, accelerations
 
     def poses(self, piece: Indices, t: Floats) -> Floats:
@@ -144,12 +141,13 @@ class ToolSpline:
         rows = self._turning(piece)
         if len(rows):
             turn = values(self.turns[piece[rows]], t[rows])
-            orientations[rows] = normalized_rows(multiply_rows(exp_rows(turn), orientations[rows]))
+            turned = multiply_rows(exp_rows(turn), orientations[rows])
+            orientations[rows] = normalized_rows(turned)
         return np.concatenate([position, orientations], axis=1)
 
     def _turning(self, piece: Indices) -> Indices:
         """Return the rows of pieces (m,) on which the tool turns: often none."""
-        return np.flatnonzero(np.any(self.turns, axis=(1, 2))[piece])
+        return np.flatnonzero(self.is_turning[piece])
 
     def vectors(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
         """Return positions [m] and rotation vectors since the piece began [rad], (m, 3) each."""
@@ -171,11 +169,6 @@ class ToolSpline:
             positions=self.positions * powers,
             turns=self.turns * powers,
         )
-
-
-def _turned(turns: Floats, orientations: Floats) -> Floats:
-    """Return orientations (m, 4) turned by rotation vectors (m, 3)."""
-    return normalized_rows(multiply_rows(exp_rows(turns), orientations))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -47,11 +47,7 @@ from ur_cartesian_driver.planning.preflight.joint_path_solver import (
     sample_joint_move,
     solve_joint_path,
 )
-from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
-    max_joint_change,
-    named_joints,
-    TcpKinematics,
-)
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_change, TcpKinematics
 from ur_cartesian_driver.planning.preflight.tightest_margins import (
     first_refusal,
     near_singularity_refusal,
@@ -63,7 +59,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     point_field,
     segment_field,
 )
-from ur_cartesian_driver.planning.request.joint_points import JointPositions
+from ur_cartesian_driver.planning.request.joint_points import JointPositions, named_joints
 from ur_cartesian_driver.planning.request.program_features import check_wait
 from ur_cartesian_driver.planning.request.validate import duplicate_point_error
 
@@ -289,7 +285,7 @@ class JointPathPlanner:
         line = JointLineCurve.between(self.kinematics.arm, self.kinematics.T_flange_tcp, q, chosen)
         if i == 0 and line.joint_travel <= SAME_SOLUTION:
             drafts.stop_at(k)
-        self._path.curves.put(k, line)
+        self._path.curves.put_joint_line(k, line)
         drafts.joints[k] = chosen
         self._make_blends(k, k + 1)
         self._solve_entry(k, line)

@@ -56,7 +56,7 @@ def _places(path: BlendedPath, times: MoveTimes) -> tuple[Indices, Floats]:
     """Return curve number and curve parameter, each (n,), of all rows but the start."""
     curves, rows = path.curves, np.arange(len(path.u_join))
     begin, span = path.u_join, np.maximum(path.u_leave - path.u_join, 0.0)
-    n = np.maximum(1, np.ceil(curves.samples * span)).astype(np.intp)
+    n = np.maximum(1, np.ceil(curves.chord_counts() * span)).astype(np.intp)
     # Joint moves are sampled evenly, because the preview finds joint positions by counting rows.
     n = np.where(curves.is_joint_line, np.maximum(n, _MIN_JOINT_SAMPLES), n)
     row, k = counted(n - 1)

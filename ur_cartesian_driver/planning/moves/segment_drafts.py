@@ -19,9 +19,8 @@ from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.pose_rows import distance_rows
 from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
-from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, CurveRows
+from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, CurveRows, curves_of
 from ur_cartesian_driver.planning.geometry.curves import (
-    ArcCurve,
     goal_arcs,
     HALF_TURN,
     is_same_pose,
@@ -31,7 +30,7 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.blend_limits import check_blends_fit
 from ur_cartesian_driver.planning.request.goal_fields import point_field, type_table
 from ur_cartesian_driver.planning.request.program_features import round_down, round_radii
-from ur_cartesian_driver.planning.request.validate import arc_through_via
+from ur_cartesian_driver.planning.request.validate import arc_error
 
 _LINEAR, _JOINT = SegmentType.LINEAR, SegmentType.JOINT
 _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
@@ -124,41 +123,35 @@ class SegmentDrafts:
         self._find_blends()
         after = row + 1
         if after < len(self) and not self.is_joint_move[after]:
-            start = self.target(row)
-            if self.kinds[after] == SegmentType.CIRCULAR:
-                arc = self._arc(after, start)
-                self.path.curves.put(after, arc)
-                if self.segments.arc_modes[after] == ArcMode.FIXED:
-                    self._remarks += self._turn_remarks(after, arc.end)
-            else:
-                self._check_turn(after, start)
-                self.path.curves.put_line(after, start)
+            start, end = (self.targets[k : k + 1].copy() for k in (row, after))
+            arcs_of = self.segments[after : after + 1], self._goal.T_base_frame
+            rows, arcs, faults = goal_arcs(*arcs_of, start, end)
+            self._check(after, self.target(row), faults.get(0))
+            self.path.curves.put_line(after, start[0], end[0])
+            self.path.curves.put_arcs(rows + after, arcs)
+            if arcs.is_fixed.any():
+                self._remarks += self._turn_remarks(after, pose_from_row(end[0]))
 
     # -- curves ----------------------------------------------------------------------------------
 
     def _curves(self, start: Pose, remarks: list[tuple[int, str]]) -> CurveRows:
         """Return the curves of lines and arcs; the rows of joint moves have no meaning."""
         starts, ends = np.concatenate([[start.row()], self.targets[:-1]]), self.targets.copy()
-        rows, arcs, faults = goal_arcs(self.segments, self._goal.T_base_frame, starts, ends)
-        curves = CurveRows(starts, ends, {})
+        curves, faults = curves_of(self.segments, self._goal.T_base_frame, starts, ends)
         suspect = ~self.is_joint_move & (curves.angle > pi - 2.0 * HALF_TURN)
         suspect[[*faults]] = True
         for row in rows_where(suspect):
-            check = self._arc if self.kinds[row] == SegmentType.CIRCULAR else self._check_turn
-            check(row, pose_from_row(starts[row]))
-        for row in rows[arcs.is_fixed].tolist():
+            self._check(row, pose_from_row(starts[row]), faults.get(row))
+        for row in rows_where(self.segments.arc_modes == ArcMode.FIXED):
             remarks += [(row, text) for text in self._turn_remarks(row, pose_from_row(ends[row]))]
-        curves.put_arcs(rows, arcs)
         return curves
 
-    def _arc(self, row: int, start: Pose) -> ArcCurve:
-        """Return the arc of a segment from the pose ``start``."""
-        mode, via = ArcMode(int(self.segments.arc_modes[row])), self.segments.via(row)
-        if mode != ArcMode.FIXED:
+    def _check(self, row: int, start: Pose, fault: str | None) -> None:
+        """Refuse an ambiguous turn from the pose ``start``, and an arc with a fault."""
+        if self.segments.arc_modes[row] != ArcMode.FIXED:
             self._check_turn(row, start)
-        assert via is not None
-        T_base_via = self._goal.T_base_frame @ via
-        return arc_through_via(self.begin + row, start, T_base_via, self.target(row), mode)
+        if fault:
+            raise arc_error(self.begin + row, fault)
 
     def _turn_remarks(self, row: int, end: Pose) -> list[str]:
         """Return the remark on an arc that arrives in another orientation than the target's."""

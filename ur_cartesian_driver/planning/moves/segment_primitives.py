@@ -36,17 +36,17 @@ from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlann
 from ur_cartesian_driver.planning.moves.segment_drafts import JOINT_SPACE_TYPES
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
-from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
-    full_posture,
-    max_joint_change,
-    named_joints,
-)
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_change
 from ur_cartesian_driver.planning.request.goal_fields import (
     point_field,
     segment_field,
     type_table,
 )
-from ur_cartesian_driver.planning.request.joint_points import JointPositions
+from ur_cartesian_driver.planning.request.joint_points import (
+    full_posture,
+    JointPositions,
+    named_joints,
+)
 from ur_cartesian_driver.planning.request.program_features import (
     adapt_primitive,
     explain_poses_only,

@@ -99,7 +99,7 @@ class SpeedLimits:
 
     def _joint_moves(self, rows: Indices, curves: CurveRows) -> tuple[Floats, Indices]:
         """Return the greatest speeds (m,) of joint moves, and the joints (m,) that limit them."""
-        travel = np.array([curves.joint_line(row).travel for row in rows.tolist()])
+        travel = np.array([curves.joint_lines[row].travel for row in rows.tolist()])
         speeds = np.array(self._model.max_joint_speed) * self.length[rows, None]
         speeds = np.where(travel > 0.0, speeds / np.maximum(travel, 1e-300), inf)
         return speeds.min(axis=1), speeds.argmin(axis=1)
@@ -112,7 +112,7 @@ class SpeedLimits:
         shortest = np.maximum(self._bounds.shortest_times, _MIN_LENGTH)
         travel = curves.length * 1.0
         for row in rows_where(curves.is_joint_line):
-            travel[row] *= curves.joint_line(row).unevenness
+            travel[row] *= curves.joint_lines[row].unevenness
         per_unit = travel / np.where(self.is_optimized, shortest, self.length)
         speed = self._options.max_tool_speed / np.maximum(per_unit, 1e-300)
         return np.where(self.translates, speed, inf)

@@ -37,6 +37,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import Posture
 from ur_cartesian_driver.planning.request.goal_fields import point_field
+from ur_cartesian_driver.planning.request.joint_points import named_joints
 
 #: An arm arrives in a posture if each named joint is at most this far from the chosen solution
 #: [rad]. Full turns are not ignored.
@@ -233,19 +234,6 @@ class TcpKinematics:
 def max_joint_change(a: Joints, b: Joints) -> float:
     """Return the largest change of a joint between two configurations [rad]."""
     return max(abs(y - x) for x, y in zip(a, b, strict=True))
-
-
-def named_joints(posture: Posture, tf_prefix: str) -> dict[int, float]:
-    """Return the values [rad] of a checked posture by joint number."""
-    return {
-        JOINT_NAMES.index(name.removeprefix(tf_prefix)): value
-        for name, value in zip(posture.names, posture.values, strict=True)
-    }
-
-
-def full_posture(named: dict[int, float]) -> Joints | None:
-    """Return the configuration of a posture that names all joints, else None."""
-    return vector6(named[k] for k in range(6)) if len(named) == 6 else None
 
 
 def describe_miss(q: Joints, chosen: Joints, named: dict[int, float]) -> str:

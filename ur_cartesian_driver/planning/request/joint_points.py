@@ -16,10 +16,11 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.errors import JointLimitExceeded
+from ur_cartesian_driver.motion.errors import JointLimitExceeded, NotAvailable
+from ur_cartesian_driver.motion.geometry.arrays import Flags
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
-from ur_cartesian_driver.motion.goal.goal import Goal, Posture
+from ur_cartesian_driver.motion.goal.goal import Goal, Posture, SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import gives_joints, point_field
@@ -32,8 +33,21 @@ class JointPositions(Posture):
 
     def joints(self, tf_prefix: str) -> Joints:
         """Return the joint positions [rad]."""
-        by_name = dict(zip(self.names, self.values, strict=True))
-        return vector6(by_name[tf_prefix + name] for name in JOINT_NAMES)
+        named = named_joints(self, tf_prefix)
+        return vector6(named[k] for k in range(6))
+
+
+def named_joints(posture: Posture, tf_prefix: str) -> dict[int, float]:
+    """Return the values [rad] of a checked posture by joint number."""
+    return {
+        JOINT_NAMES.index(name.removeprefix(tf_prefix)): value
+        for name, value in zip(posture.names, posture.values, strict=True)
+    }
+
+
+def full_posture(named: dict[int, float]) -> Joints | None:
+    """Return the configuration of a posture that names all joints, else None."""
+    return vector6(named[k] for k in range(6)) if len(named) == 6 else None
 
 
 def check_for_arm(goal: Goal, T_flange_tcp: Pose, arm: Arm, options: PlanningOptions) -> GoalTable:
@@ -41,12 +55,14 @@ def check_for_arm(goal: Goal, T_flange_tcp: Pose, arm: Arm, options: PlanningOpt
     Return a goal as a table that passed :func:`~.validate.check`, with a pose at each point.
 
     :param T_flange_tcp: the active TCP; a controlled frame of the goal takes its place.
-    :raises GoalRefused: the goal is wrong, or a joint position is out of its range.
+    :raises GoalRefused: the goal is wrong, a joint position is out of its range, or a pose is
+        needed that an unknown calibration does not tell.
     """
     table = check(goal, options)
     by_joints = gives_joints(table)
     if not by_joints.any():
         return table
+    _check_calibration(table, by_joints, options)
     T_frame_base = table.T_base_frame.inverse()
     T_flange_point = table.T_flange_controlled or T_flange_tcp
     poses, postures = table.waypoints.poses.copy(), dict(table.waypoints.postures)
@@ -58,6 +74,19 @@ def check_for_arm(goal: Goal, T_flange_tcp: Pose, arm: Arm, options: PlanningOpt
         postures[i] = posture
     waypoints = replace(table.waypoints, poses=poses, postures=postures)
     return check(replace(table, waypoints=waypoints), options)
+
+
+def _check_calibration(goal: GoalTable, by_joints: Flags, options: PlanningOptions) -> None:
+    """Refuse points whose pose must be known, if only a calibration would tell it."""
+    is_sent = np.isin(goal.motions.types, (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT))
+    for i in rows_where(by_joints & ~is_sent)[:1]:
+        if not options.calibration_known:
+            raise NotAvailable(
+                point_field(i, 'pose'),
+                'is NaN, but where the joint positions of the posture put the tool is not known: '
+                'the calibration of this robot is unknown',
+                'give the pose, or use a JOINT segment',
+            )
 
 
 def _check_ranges(index: int, q: Joints, arm: Arm) -> None:

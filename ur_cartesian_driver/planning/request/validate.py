@@ -25,7 +25,7 @@ from ur_cartesian_driver.motion.errors import (
     NotAvailable,
     OldHeaderTimestamp,
 )
-from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY
 from ur_cartesian_driver.motion.goal.declared_types import WrongType
 from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
@@ -37,7 +37,6 @@ from ur_cartesian_driver.motion.goal.goal import (
 )
 from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable, rows_where
 from ur_cartesian_driver.planning.geometry.curves import (
-    ArcCurve,
     goal_arcs,
     is_same_pose,
     SAME_POSITION,
@@ -255,19 +254,15 @@ def _motions(goal: GoalTable, options: PlanningOptions) -> None:
         return  # a spline can wait at a point
     points, segments = goal.waypoints, goal.motions
     lengths = np.linalg.norm(np.diff(points.poses[:, :3], axis=0), axis=1)
-    is_arc = segments.types[1:] == SegmentType.CIRCULAR
     suspect = np.isin(segments.types[1:], STRAIGHT_TYPES) & (lengths < 2.0 * SAME_POSITION)
     starts, ends = points.poses[:-1].copy(), points.poses[1:].copy()
-    suspect[[*goal_arcs(segments[1:], IDENTITY, starts, ends)[2]]] = True
+    _, _, faults = goal_arcs(segments[1:], IDENTITY, starts, ends)
+    suspect[[*faults]] = True
     suspect &= ~np.isnan(lengths)  # checked again when the joint positions have a pose
     for i in rows_where(np.append(False, suspect)):
-        start, end = points.pose(i - 1), points.pose(i)
-        if is_arc[i - 1]:
-            # The start's orientation does not change the shape of the arc.
-            via = segments.via(i)
-            assert via is not None
-            arc_through_via(i, start, via, end, ArcMode(segments.arc_modes[i]))
-        elif is_same_pose(start, end) and not is_rounded(goal):
+        if i - 1 in faults:
+            raise arc_error(i, faults[i - 1])
+        if is_same_pose(points.pose(i - 1), points.pose(i)) and not is_rounded(goal):
             # With a posture, the segment may become a joint move: the planner decides.
             if not (i in points.postures and options.on_posture_change == 'movej'):
                 raise duplicate_point_error(goal, i)
@@ -382,20 +377,13 @@ def check_posture(field: str, posture: Posture, tf_prefix: str) -> None:
             )
 
 
-def arc_through_via(index: int, start: Pose, via: Pose, end: Pose, mode: ArcMode) -> ArcCurve:
-    """
-    Return the arc of a CIRCULAR segment.
-
-    :raises InvalidGoal: start, via and end do not define an arc.
-    """
-    try:
-        return ArcCurve.through(start, via.position, end, mode)
-    except ValueError as error:
-        raise InvalidGoal(
-            segment_field(index, 'via'),
-            f'defines no arc to point {index}: {error}',
-            'put the via near the middle of a larger arc, or use LINEAR',
-        ) from None
+def arc_error(index: int, fault: str) -> InvalidGoal:
+    """Return the refusal of a CIRCULAR segment whose start, via and end define no arc."""
+    return InvalidGoal(
+        segment_field(index, 'via'),
+        f'defines no arc to point {index}: {fault}',
+        'put the via near the middle of a larger arc, or use LINEAR',
+    )
 
 
 def duplicate_point_error(goal: GoalTable, index: int) -> InvalidGoal:

@@ -12,23 +12,23 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from math import ceil, radians, sqrt
+from math import radians
 
 import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
-from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.pose_rows import (
     angle_rows,
     distance_rows,
     keep_hemisphere,
 )
-from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
-from ur_cartesian_driver.planning.geometry.blended_path import CurveRows
-from ur_cartesian_driver.planning.geometry.curves import ArcCurve
-from ur_cartesian_driver.planning.request.validate import arc_through_via
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.planning.geometry.blended_path import curves_of
+from ur_cartesian_driver.planning.geometry.samples import STEP_ANGLE, STEP_LENGTH
+from ur_cartesian_driver.planning.request.validate import arc_error
 from ur_cartesian_driver.planning.rounded.rounded_path import Polyline
+from ur_cartesian_driver.planning.spline.spline_path import check_sample_count
 
 #: Radius [m] at which a turn of the tool is measured as the length of an arc, for ``s``.
 TURN_RADIUS = 0.05
@@ -38,6 +38,8 @@ CURVE_BOUNDS = 1e-5, 2e-4
 _CHORD_ERROR = 2e-6
 #: Greatest turn of the tool along a chord [rad].
 _CHORD_TURN = radians(2.0)
+#: The remedy for a path that needs too many samples.
+CHECK_SPEEDS = 'check speeds and positions'
 #: Steps shorter than this [m] count as no motion.
 _NO_STEP = 1e-9
 #: Quaternions that differ by less than this are the same.
@@ -82,14 +84,16 @@ def programmed_sections(
     :param start: pose of the tool in base at the beginning.
     :param corners: (n, 2) allowed deviations of the path at each point [m], [rad]; 0 = a stop.
     :param stops: further points at which the arm stops.
+    :raises InvalidGoal: a segment defines no arc.
     """
-    curves = _curves(goal, targets, start)
-    n = len(targets)
-    count = np.maximum(1, np.ceil(curves.angle / _CHORD_TURN)).astype(np.intp)
-    for row, arc in curves.others.items():
-        assert isinstance(arc, ArcCurve)
-        chords = ceil(arc.sweep / sqrt(8.0 * _CHORD_ERROR / arc.radius))
-        count[row] = max(int(count[row]), chords)
+    starts, n = np.concatenate([[start.row()], targets[:-1]]), len(targets)
+    curves, faults = curves_of(goal.motions, goal.T_base_frame, starts, targets.copy())
+    for row, fault in faults.items():
+        raise arc_error(row, fault)
+    # Samples are never farther apart than this, so a path that needs too many is refused here.
+    steps = np.maximum(curves.length / STEP_LENGTH, curves.angle / STEP_ANGLE)
+    check_sample_count(steps, np.arange(n), CHECK_SPEEDS)
+    count = curves.chord_counts(_CHORD_ERROR, _CHORD_TURN)
     last = np.cumsum(count)
     segment = np.repeat(np.arange(n), count)
     number = np.arange(1, last[-1] + 1) - (last - count)[segment]
@@ -123,18 +127,3 @@ def programmed_sections(
         )
         first = end + 1
     return sections
-
-
-def _curves(goal: GoalTable, targets: Floats, start: Pose) -> CurveRows:
-    segments = goal.motions
-    curves = CurveRows(np.concatenate([[start.row()], targets[:-1]]), targets.copy(), {})
-    for row in rows_where(segments.types == SegmentType.CIRCULAR):
-        via, mode = segments.via(row), ArcMode(segments.arc_modes[row])
-        assert via is not None
-        begin = pose_from_row(curves.start[row].tolist())
-        end = pose_from_row(curves.end[row].tolist())
-        arc = arc_through_via(row, begin, goal.T_base_frame @ via, end, mode)
-        curves.put(row, arc)
-        if mode is ArcMode.FIXED and row + 1 < len(targets):
-            curves.put_line(row + 1, arc.end)
-    return curves

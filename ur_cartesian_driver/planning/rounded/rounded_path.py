@@ -38,8 +38,8 @@ MIN_WIDTH = 2e-6
 _RATIO = 1.5
 #: Fraction of a bound to which widths are fitted, so that few deviations exceed the bound.
 _AIM = 0.95
-#: Number of rounds of this fit.
-_ROUNDS = 10
+#: Greatest number of rounds of this fit, which ends when no width changes by this part.
+_ROUNDS, _SAME = 10, 0.006
 #: Smallest and greatest factor on a width in a round.
 _STEPS = 0.5, 1.3
 #: If more than ``_MANY`` corners lie within a corner's width, samples are farther apart by the
@@ -175,7 +175,9 @@ class RoundedPath:
         for _ in range(_ROUNDS):
             excess = self._excess(places, widths, self._bounds)
             step = np.clip(np.maximum(excess / _AIM, 1e-6) ** -0.5, *_STEPS)
-            widths = self._evened(np.minimum(widths * step, largest))
+            before, widths = widths, self._evened(np.minimum(widths * step, largest))
+            if np.all(np.abs(widths - before) <= _SAME * before):
+                break
         return widths
 
     def _evened(self, widths: Floats) -> Floats:

@@ -32,12 +32,13 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
+from ur_cartesian_driver.planning.geometry.samples import sample_poses
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.request.rounded_rules import corner_bounds
-from ur_cartesian_driver.planning.rounded.programmed_path import programmed_sections
+from ur_cartesian_driver.planning.rounded.programmed_path import CHECK_SPEEDS, programmed_sections
 from ur_cartesian_driver.planning.rounded.rounded_path import RoundedPath
 from ur_cartesian_driver.planning.rounded.section_law import SectionLaw, ToolLimits
 from ur_cartesian_driver.planning.rounded.tool_knots import (
@@ -51,7 +52,12 @@ from ur_cartesian_driver.planning.spline.joint_polynomials import (
     fit_joint_polynomials,
     JointPolynomials,
 )
-from ur_cartesian_driver.planning.spline.spline_path import solve_spline_path, SplinePath
+from ur_cartesian_driver.planning.spline.spline_path import (
+    check_sample_count,
+    solve_spline_path,
+    spline_pieces,
+    SplinePath,
+)
 
 #: Greatest deviation that the pieces may add to the path's own [m].
 PIECE_TOLERANCE = 1e-5
@@ -86,7 +92,10 @@ class RoundedMotion:
     #: (k,) when each section begins [s].
     begins: Floats
     places: Places
+    #: The tool spline with the samples at which the arm is checked.
     path: SplinePath
+    #: (m,) the number of samples between its knots that describe the path.
+    sample_count: Indices
     polynomials: JointPolynomials
     #: (n,) when each point of the goal is passed [s].
     point_times: Floats
@@ -95,11 +104,23 @@ class RoundedMotion:
     def reference(self) -> ReferencePath:
         """The path of the tool, whose rows name the segments of the goal."""
         path = self.path
-        poses = path.poses.copy()
+        pieces = spline_pieces(path.spline, self.sample_count, 0, self.places)
+        samples = sample_poses(pieces)
+        point, fraction = pieces.locate(samples.piece, samples.t)
+        begin, durations = path.spline.times[samples.piece], np.diff(path.spline.times)
+        poses = np.concatenate([path.poses[:1], samples.poses])
         keep_hemisphere(poses)
         return ReferencePath(
-            poses=poses, point=path.points, time=path.times, fraction=path.fractions
+            poses=poses,
+            point=np.append(point[:1], point),
+            time=np.append(0.0, begin + samples.t * durations[samples.piece]),
+            fraction=np.append(0.0, fraction),
         )
+
+    @cached_property
+    def joint_spline(self) -> JointSpline:
+        """The joints over time."""
+        return JointSpline.through(self.polynomials.times, self.polynomials.joints, quintic=True)
 
 
 def plan_rounded_path(
@@ -151,7 +172,7 @@ def plan_rounded_path(
         if attempt < TRIES:
             for law, begin in zip(laws, motion.begins.tolist(), strict=True):
                 law.slow_around(coarse - begin)
-    point = int(motion.path.points[np.searchsorted(motion.path.times, coarse[0, 0])])
+    point = int(motion.places(coarse[:1, 0])[0][0])
     raise TooFast(
         point_field(point),
         f'lies on a path that the joints cannot follow within {1e3 * tolerance:.3f} mm by pieces '
@@ -225,6 +246,8 @@ def _fit(
         )
     )
     places = Places(laws, begins)
+    count = np.concatenate([section.sample_count for section in knots])
+    check_sample_count(count, places(spline.times[1:])[0], CHECK_SPEEDS)
     path = solve_spline_path(
         kinematics,
         spline,
@@ -234,7 +257,7 @@ def _fit(
         first=0,
         rests=True,
         places=places,
-        count=np.concatenate([section.sample_count for section in knots]),
+        count=np.concatenate([section.check_count for section in knots]),
     )
     polynomials = fit_joint_polynomials(
         kinematics,
@@ -252,6 +275,7 @@ def _fit(
         begins=begins,
         places=places,
         path=path,
+        sample_count=count,
         polynomials=polynomials,
         point_times=places.point_times(len(limits.speeds)),
     )
@@ -291,7 +315,7 @@ def _coarse_times(motion: RoundedMotion, tolerance: float, options: PlanningOpti
     bounds = (1.0 - _TOOL_PART) * tolerance * np.array([1.0, 1.0 / ANGLE_TOLERANCE_RADIUS])
     coarse = np.any(pieces.deviations > bounds, axis=1)
     doubtful = np.flatnonzero(_may_exceed(motion, options))
-    coarse[doubtful] |= _acceleration_excess(motion, options, doubtful) > CLOSE_ENOUGH
+    coarse[doubtful] |= _limit_excess(motion, options, doubtful) > CLOSE_ENOUGH
     return np.stack([pieces.times[:-1][coarse], pieces.times[1:][coarse]], axis=1)
 
 
@@ -314,7 +338,7 @@ def _may_exceed(motion: RoundedMotion, options: PlanningOptions) -> Flags:
     return found
 
 
-def _acceleration_excess(motion: RoundedMotion, options: PlanningOptions, rows: Indices) -> Floats:
+def _limit_excess(motion: RoundedMotion, options: PlanningOptions, rows: Indices) -> Floats:
     """Return the greatest ratio, inside some pieces (k,), of a quantity to its limit."""
     pieces, kinematics = motion.polynomials, motion.kinematics
     model = kinematics.arm.model
@@ -322,8 +346,7 @@ def _acceleration_excess(motion: RoundedMotion, options: PlanningOptions, rows: 
         return np.empty(0)
     part = np.arange(1, _SAMPLES_INSIDE + 1) / (_SAMPLES_INSIDE + 1)
     t = (pieces.times[rows, None] + np.diff(pieces.times)[rows, None] * part).ravel()
-    joints = JointSpline.through(pieces.times, pieces.joints, quintic=True)
-    q, qd, qdd = joints.rows(t)
+    q, qd, qdd = motion.joint_spline.rows(t)
     _, tool = tool_rates(kinematics.arm, kinematics.T_flange_tcp, q, qd, qdd)
     segments, _ = motion.places(t)
     excess = np.maximum.reduce(
@@ -346,10 +369,8 @@ def _check_postures(
     options: PlanningOptions,
 ) -> None:
     """Refuse a point if the arm does not pass it in the point's posture."""
-    times = motion.path.times
     for i, posture in sorted(goal.waypoints.postures.items()):
-        row = min(int(np.searchsorted(times, motion.point_times[i])), len(times) - 1)
-        q = vector6(motion.path.q[row].tolist())
+        q = vector6(motion.joint_spline.rows(motion.point_times[i : i + 1])[0][0].tolist())
         if clause := kinematics.explain_missed_posture(
             pose_from_row(targets[i]), posture, q, i, options.tf_prefix
         ):

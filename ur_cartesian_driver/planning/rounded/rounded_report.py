@@ -107,12 +107,12 @@ class RoundedReport:
 
 def planned_rows(motion: RoundedMotion, report: RoundedReport) -> PlannedRows:
     """Return the pieces, each with the first point that is passed at its end or later."""
-    polynomials, path = motion.polynomials, motion.path
+    polynomials = motion.polynomials
     waypoints = np.minimum(
         np.searchsorted(motion.point_times, polynomials.times[1:] - 1e-6),
         len(motion.point_times) - 1,
     )
-    return piece_rows(path, polynomials, waypoints, lambda _: report.lines())
+    return piece_rows(motion.reference, polynomials, waypoints, lambda _: report.lines())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -136,8 +136,7 @@ class _SectionSpeeds:
     @classmethod
     def of(cls, law: SectionLaw) -> _SectionSpeeds:
         """Return the speeds of a law."""
-        times = law.law.all_times()
-        place, rate, _ = law.law.at(times)
+        _, (place, rate, _) = law.law.table
         s, caps = law.samples.s, np.stack(list(law.caps.values()))
         limit, travel = np.argmin(caps, axis=0), length_rows(law.samples.x1)
         speed, step = np.interp(s, place, rate) * travel, np.gradient(s) * travel

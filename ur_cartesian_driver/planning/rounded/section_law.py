@@ -153,6 +153,8 @@ class SectionLaw:
         x1, x2, x3 = (each[:, :3].copy() for each in rows[1:])
         self.samples = CurveSamples(s=s, x1=x1, x2=x2, x3=x3, w1=w1, w2=w2)
         row = self._rows(s)
+        #: (m - 1,) the rows of the tool's limits between places.
+        self._rows_between = row[1:]
         # Where two segments meet, the lower limits apply, because the next step is in the second.
         after = np.minimum(row + np.isin(s, section.ends), len(section.ends) - 1)
         self._limits_at = tool.at(row, after)
@@ -334,7 +336,7 @@ class SectionLaw:
         """Return the greatest such ratio (b,) of a law at some times; ``at`` = places before."""
         samples, tool, joints = self.samples, self._tool, self._joints
         part = ((law.s - samples.s[at]) / (samples.s[at + 1] - samples.s[at]))[:, None]
-        row = self._rows(law.s)
+        row = self._rows_between[at]
 
         def rows(values: Floats) -> Floats:
             found: Floats = values[at]

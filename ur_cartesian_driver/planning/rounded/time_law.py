@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf
 from typing import NamedTuple
 
@@ -37,6 +38,8 @@ _NO_TIME = 1e-9
 # Newton's method finds times of places, unless the law nearly rests there [1/s].
 _NEWTON_STEPS = 4
 _NO_SPEED = 1e-9
+# Places passed within this time are sampled without a time in between [s]: windows are longer.
+_APART = 0.004
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -162,15 +165,6 @@ class FastestLaw:
         )[::-1]
 
 
-def fastest_law(s: Floats, limits: LawLimits) -> Floats:
-    """
-    Return the square of the greatest possible ds/dt at places (m,); it is 0 at both ends.
-
-    :param s: the places (m,), increasing.
-    """
-    return FastestLaw(s, limits).squares(limits.speed, np.ones(len(s)))
-
-
 def _possible(bounds: _Bounds, y: Floats) -> Floats:
     """Return the largest y (m,), but at most the given ones, at which some u is allowed."""
     for r, n in zip(bounds.r, bounds.n, strict=True):
@@ -273,28 +267,30 @@ class TimeLaw:
 
     def sampled_times(self, at: Flags | None = None) -> Floats:
         """
-        Return times (k,) near which the averaged law passes places, and between them [s].
+        Return times (k,) near which the averaged law passes places, and between distant ones [s].
 
         :param at: (m,) the places; each comes with its two neighbours. None = all.
         """
         passed = self.times + 0.5 * self.window
-        between = 0.5 * (passed[1:] + passed[:-1])
+        between, apart = 0.5 * (passed[1:] + passed[:-1]), np.diff(passed) > _APART
         if at is not None:
             near = at[1:] | at[:-1]
             passed = passed[np.append(near, False) | np.append(False, near)]
-            between = between[near]
-        return np.sort(np.concatenate([passed, between]))
+            apart &= near
+        return np.sort(np.concatenate([passed, between[apart]]))
 
-    def all_times(self) -> Floats:
-        """Return :meth:`sampled_times`, with the begin and the end of the motion [s]."""
-        return np.concatenate([[0.0], self.sampled_times(), [self.duration]])
+    @cached_property
+    def table(self) -> tuple[Floats, PathTimes]:
+        """:meth:`sampled_times`, begin and end of the motion (k,) [s], and the law at these."""
+        times = np.concatenate([[0.0], self.sampled_times(), [self.duration]])
+        return times, self.at(times)
 
     def times_of(self, s: Floats) -> Floats:
         """Return when the averaged law passes places (m,) [s]."""
         low = np.interp(s, self._s, self.times)
         high = low + self.window
-        known = self.all_times()
-        t = np.clip(np.interp(s, self.at(known).s, known), low, high)
+        times, known = self.table
+        t = np.clip(np.interp(s, known.s, times), low, high)
         for _ in range(_NEWTON_STEPS):
             place, v, _ = self.at(t)
             step = np.where(v > _NO_SPEED, (s - place) / np.maximum(v, _NO_SPEED), 0.0)

@@ -17,12 +17,12 @@ import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, length_rows
-from ur_cartesian_driver.planning.geometry.curves import ARC_CHORD_ERROR
-from ur_cartesian_driver.planning.geometry.samples import counted, STEP_ANGLE, STEP_LENGTH
+from ur_cartesian_driver.planning.geometry.samples import counted
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.rounded.section_law import SectionLaw, tool_rows
 from ur_cartesian_driver.planning.rounded.time_law import PathTimes
 from ur_cartesian_driver.planning.spline.joint_polynomials import ANGLE_TOLERANCE_RADIUS
+from ur_cartesian_driver.planning.spline.spline_path import sample_density
 
 #: Shortest time of a piece [s] that robot program and sockets sustain over any number of pieces.
 MIN_PIECE_TIME = 0.02
@@ -38,8 +38,10 @@ _JOINED = 8
 _QUARTERS, _MEASURED = (0.25, 0.5, 0.75), (0.08, 0.16, 0.3, 0.42, 0.58, 0.7, 0.84, 0.92)
 #: Greatest error of the acceleration, as a fraction of its limit, on pieces that can be split.
 _ACCELERATION_PART = 0.15
+#: Greatest distance [m] of a chord between two samples from the path: as that of the pieces.
+_CHORD_ERROR = 1e-5
 #: Greatest error [m] along the path of a place between two samples, by its time.
-_TIME_ERROR = 2e-5
+_TIME_ERROR = 5e-5
 #: A tool slower than this [m/s] rests.
 _REST = 1e-9
 
@@ -51,6 +53,8 @@ class ToolKnots(NamedTuple):
     points: ToolPoints
     #: (n,) the number of samples between them that describe the path.
     sample_count: Indices
+    #: (n,) the number of samples between them at which the arm is checked, as on lines.
+    check_count: Indices
 
 
 def tool_knots(law: SectionLaw, tolerance: float) -> ToolKnots:
@@ -68,7 +72,7 @@ def tool_knots(law: SectionLaw, tolerance: float) -> ToolKnots:
         if not len(coarse) or attempt == TRIES:
             break
         law.slow_around(np.stack([steps.grid[coarse], steps.grid[coarse + 1]], axis=1))
-    return ToolKnots(steps.points(2 * ends), steps.sample_count(ends))
+    return ToolKnots(steps.points(2 * ends), *steps.sample_counts(ends))
 
 
 class _Pieces(NamedTuple):
@@ -94,7 +98,6 @@ class _HalfSteps:
         at = law.law.at(times)
         self._law = law
         self._points = _points_at(law, times, at)
-        self._s = at.s
         self._limits = law.acceleration_limits(at.s)
 
     def points(self, rows: Indices) -> ToolPoints:
@@ -108,31 +111,37 @@ class _HalfSteps:
             quintic=True,
         )
 
-    def sample_count(self, ends: Indices) -> Indices:
-        """Return the number of samples between grid times: at most 2 mm and one degree apart."""
+    def sample_counts(self, ends: Indices) -> tuple[Indices, ...]:
+        """
+        Return the numbers of samples between grid times (n,), at most 2 mm and one degree apart.
+
+        The first ones also follow the curve of the path, and its course over time.
+        """
         twists, accelerations = self._points.twists, self._points.accelerations[:, :3]
         speed = length_rows(twists[:, :3])
         along = np.einsum('ij,ij->i', twists[:, :3], accelerations) / np.maximum(speed, _REST)
         size = length_rows(accelerations)
         across = np.sqrt(np.maximum(size * size - along * along, 0.0))
-        density = np.maximum.reduce(
-            [
-                speed / STEP_LENGTH,
-                length_rows(twists[:, 3:]) / STEP_ANGLE,
-                np.sqrt(across / (8.0 * ARC_CHORD_ERROR)),
-                np.sqrt(size / (8.0 * _TIME_ERROR)),
-            ]
-        )
+        rates = speed, length_rows(twists[:, 3:])
+        bent = sample_density(*rates, across, _CHORD_ERROR)
         first, last = 2 * ends[:-1], 2 * ends[1:]
-        greatest = np.maximum(np.maximum.reduceat(density, first), density[last])
-        count: Indices = np.ceil(greatest * np.diff(self.grid[ends])).astype(np.intp)
-        return np.maximum(count, 1)
+
+        def count(density: Floats) -> Indices:
+            greatest = np.maximum(np.maximum.reduceat(density, first), density[last])
+            return np.maximum(np.ceil(greatest * np.diff(self.grid[ends])), 1.0).astype(np.intp)
+
+        return (
+            count(np.maximum(bent, np.sqrt(size / (8.0 * _TIME_ERROR)))),
+            count(sample_density(*rates, np.zeros(len(speed)))),
+        )
 
     def fits(self, begin: Indices, end: Indices, tolerance: float) -> Flags:
         """Return whether quintics between grid times (r,) follow the law closely enough."""
-        pieces = self._pieces(begin, end)
-        # Most that do not are off at a quarter, so few are compared at all half steps.
-        fits = self._follows(pieces, tolerance, at_quarters=True)
+        pieces, fits = self._pieces(begin, end), np.ones(len(begin), dtype=np.bool_)
+        # Most that do not are off at a quarter, so few long ones are compared at all half steps.
+        long = np.flatnonzero(end - begin > 2)
+        if len(long):
+            fits[long] = self._follows(pieces.take(long), tolerance, at_quarters=True)
         rows = np.flatnonzero(fits)
         if len(rows):
             few = pieces.take(rows)
@@ -179,12 +188,12 @@ class _HalfSteps:
 
     def _excess(self, pieces: _Pieces, parts: tuple[float, ...]) -> Floats:
         """Return the greatest such ratio (r,) at some parts of the time of each piece."""
-        count, begin = len(parts), self.grid[pieces.begin]
-        t = ((self.grid[pieces.end] - begin)[:, None] * parts).ravel()
-        _, accelerations = pieces.spline.rates(np.repeat(pieces.number, count), t)
-        s = np.interp(np.repeat(begin, count) + t, self._points.times, self._s)
-        ratios = _ratios(accelerations, self._law.acceleration_limits(s))
-        largest: Floats = ratios.reshape(-1, count).max(axis=1)
+        begin, end = pieces.begin[:, None], pieces.end[:, None]
+        t = ((self.grid[end] - self.grid[begin]) * parts).ravel()
+        _, accelerations = pieces.spline.rates(np.repeat(pieces.number, len(parts)), t)
+        rows = (2 * begin + 2 * (end - begin) * np.array(parts)).astype(np.intp).ravel()
+        ratios = _ratios(accelerations, (self._limits[0][rows], self._limits[1][rows]))
+        largest: Floats = ratios.reshape(-1, len(parts)).max(axis=1)
         return largest
 
     def _pieces(self, begin: Indices, end: Indices) -> _Pieces:
@@ -224,10 +233,11 @@ def _piece_ends(steps: _HalfSteps, tolerance: float) -> Indices:
     last = len(steps.grid) - 1
     # The first piece is short, so that an output can be sent soon after the start.
     ends = np.unique([0, 1, *range(_JOINED, last, _JOINED), last])
-    open_rows = np.arange(len(ends) - 1)
+    open_rows, tried = np.arange(len(ends) - 1), np.empty(0, dtype=np.intp)
     while len(open_rows := open_rows[np.diff(ends)[open_rows] > 1]):
         begin, end = ends[open_rows], ends[open_rows + 1]
         split = open_rows[~steps.fits(begin, end, tolerance)]
+        tried = np.append(tried, _names(ends[split], ends[split + 1]))
         ends = np.insert(ends, split + 1, (ends[split] + ends[split + 1]) // 2)
         moved = split + np.arange(len(split))
         open_rows = np.sort(np.concatenate([moved, moved + 1]))
@@ -235,10 +245,16 @@ def _piece_ends(steps: _HalfSteps, tolerance: float) -> Indices:
     for first in (1, 2):
         left = np.arange(first, len(ends) - 2, 2)
         left = left[ends[left + 2] - ends[left] <= _JOINED]
+        left = left[~np.isin(_names(ends[left], ends[left + 2]), tried)]
         if len(left):
             joined = left[steps.fits(ends[left], ends[left + 2], tolerance)]
             ends = np.delete(ends, joined + 1)
     return ends
+
+
+def _names(begin: Indices, end: Indices) -> Indices:
+    """Return a number for each piece between rows of the grid (r,)."""
+    return 2 * _JOINED * begin + end - begin
 
 
 def _ratios(accelerations: Floats, limits: tuple[Floats, Floats]) -> Floats:

@@ -27,10 +27,10 @@ from ur_cartesian_driver.motion.geometry.polynomials import (
     quintic_rows,
     values,
 )
-from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, compose_rows
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, compose_rows, distance_rows
 from ur_cartesian_driver.motion.goal.goal_table import zeros
 from ur_cartesian_driver.motion.plan.move_rows import SplineRows
-from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows
+from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows, ReferencePath
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
@@ -74,7 +74,7 @@ class JointPolynomials:
 
 
 def piece_rows(
-    path: SplinePath,
+    reference: ReferencePath,
     polynomials: JointPolynomials,
     waypoints: Indices,
     lines: Callable[[Floats], Sequence[str]],
@@ -82,13 +82,17 @@ def piece_rows(
     """
     Return joint pieces as the segments of a plan.
 
+    :param reference: the path of the tool.
     :param waypoints: (n,) the point of the goal to which each piece leads.
     :param lines: returns the line of the report for each piece, from lengths [m], turns [rad] and
         times [s] of the pieces (n, 3).
     """
     durations = np.round(np.diff(polynomials.times), 6)
-    lengths = np.diff(np.interp(polynomials.times, path.times, path.length))
-    angles = np.diff(np.interp(polynomials.times, path.times, path.angle))
+    a, b = reference.poses[:-1], reference.poses[1:]
+    lengths, angles = (
+        np.diff(np.interp(polynomials.times, reference.time, np.append(0.0, np.cumsum(steps))))
+        for steps in (distance_rows(a, b), angle_rows(a[:, 3:], b[:, 3:]))
+    )
     n = len(durations)
     return PlannedRows(
         waypoints=waypoints.astype(np.int32),

@@ -24,9 +24,10 @@ from ur_cartesian_driver.motion.errors import (
     NearSingularity,
 )
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
-from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, keep_hemisphere
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import Posture
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.planning.geometry.curves import ARC_CHORD_ERROR, HALF_TURN
 from ur_cartesian_driver.planning.geometry.samples import (
     CurvePieces,
@@ -82,8 +83,6 @@ class SplinePath:
     q: Floats
     #: (m,) path length of the tool since the start [m].
     length: Floats
-    #: (m,) turn of the tool since the start [rad].
-    angle: Floats
     #: The tightest margin of each segment.
     tightest_margins: TightestMargins
 
@@ -93,6 +92,15 @@ class SplinePath:
         begin = self.spline.times[self.piece]
         times: Floats = begin + self.u * (self.spline.times[self.piece + 1] - begin)
         return times
+
+    @property
+    def reference(self) -> ReferencePath:
+        """The path of the tool."""
+        poses = self.poses.copy()
+        keep_hemisphere(poses)
+        return ReferencePath(
+            poses=poses, point=self.points, time=self.times, fraction=self.fractions
+        )
 
     def stretch_times(self, factor: float) -> SplinePath:
         """Return the same path with all times multiplied by a factor."""
@@ -123,16 +131,7 @@ def solve_spline_path(
     """
     if count is None:
         count = _measured_count(kinematics, spline, first)
-    n = len(count)
-    pieces = CurvePieces(
-        path=ToolSplinePath(spline, count, places),
-        first=first,
-        number=2 * np.arange(n),
-        begin=np.zeros(n),
-        end=np.ones(n),
-        sample_count=count,
-    )
-    joint_path = solve_joint_path(kinematics, pieces, q_start)
+    joint_path = solve_joint_path(kinematics, spline_pieces(spline, count, first, places), q_start)
     start = spline.poses(np.zeros(1, dtype=np.intp), np.zeros(1))
     poses = np.concatenate([start, joint_path.poses])
     length = _cumulative(np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1))
@@ -150,10 +149,27 @@ def solve_spline_path(
         points=np.concatenate([joint_path.segments[:1], joint_path.segments]),
         fractions=np.concatenate([[0.0], joint_path.fractions]),
         length=length,
-        angle=angle,
         tightest_margins=tightest_margins(
             kinematics.arm, joint_path.q, measures, joint_path.segments, joint_path.fractions
         ),
+    )
+
+
+def spline_pieces(
+    spline: ToolSpline,
+    count: Indices,
+    first: int,
+    places: Callable[[Floats], tuple[Indices, Floats]] | None,
+) -> CurvePieces:
+    """Return the pieces of a spline; for the parameters see :func:`solve_spline_path`."""
+    n = len(count)
+    return CurvePieces(
+        path=ToolSplinePath(spline, count, places),
+        first=first,
+        number=2 * np.arange(n),
+        begin=np.zeros(n),
+        end=np.ones(n),
+        sample_count=count,
     )
 
 
@@ -259,32 +275,54 @@ def sample_count(
     :param turn_rate: turn rate of the tool at these samples [rad/s].
     :param acceleration: acceleration of the tool at these samples [m/s^2].
     :param first: the number of the point at the end of the first piece.
+    :raises InvalidGoal: there would be too many.
     """
     h = np.diff(times)
-
-    def largest(values: Floats) -> Floats:
-        bound: Floats = values.reshape(len(h), _COARSE_SAMPLES).max(axis=1)
-        return bound
-
-    steps = _SPEED_MARGIN * np.max(
-        [
-            h * largest(speed) / STEP_LENGTH,
-            h * largest(turn_rate) / STEP_ANGLE,
-            h * np.sqrt(largest(acceleration) / (8.0 * ARC_CHORD_ERROR)),
-        ],
-        axis=0,
-    )
+    density = sample_density(speed, turn_rate, acceleration).reshape(len(h), _COARSE_SAMPLES)
+    steps = _SPEED_MARGIN * h * density.max(axis=1)
     count = np.maximum(np.ceil(steps), np.minimum(MIN_SAMPLES, np.ceil(1.25 * steps) + 1.0))
-    if count.sum() > MAX_SAMPLES:
-        k = int(np.argmax(count))
-        raise InvalidGoal(
-            'trajectory.points',
-            f'ask for a path so long, or so fast (most of all to points[{first + k}]), that its '
-            f'check needs {count.sum():.3g} samples, more than {MAX_SAMPLES:,}',
-            'check twists and accelerations, or split the goal',
-        )
+    check_sample_count(count, first + np.arange(len(h)), 'check twists and accelerations')
     found: Indices = count.astype(np.intp)
     return found
+
+
+def sample_density(
+    speed: Floats,
+    turn_rate: Floats,
+    acceleration: Floats,
+    chord_error: float = ARC_CHORD_ERROR,
+) -> Floats:
+    """
+    Return the samples a second (m,) that follow the tool closely enough at m times.
+
+    :param acceleration: of the tool, or the part of it that bends the path [m/s^2].
+    :param chord_error: greatest distance of chords between samples from the path [m].
+    """
+    density: Floats = np.maximum.reduce(
+        [
+            speed / STEP_LENGTH,
+            turn_rate / STEP_ANGLE,
+            np.sqrt(acceleration / (8.0 * chord_error)),
+        ]
+    )
+    return density
+
+
+def check_sample_count(count: Floats | Indices, points: Indices, remedy: str) -> None:
+    """
+    Refuse a goal that needs too many samples.
+
+    :param count: (n,) the number of samples of each part; ``points``: (n,) the point to which it
+        leads.
+    """
+    if (total := count.sum()) > MAX_SAMPLES:
+        raise InvalidGoal(
+            'trajectory.points',
+            'ask for a path so long, or so fast (most of all to points['
+            f'{points[np.argmax(count)]}]), that its check needs {total:.3g} samples, more than '
+            f'{MAX_SAMPLES:,}',
+            f'{remedy}, or split the goal',
+        )
 
 
 def _cumulative(steps: Floats) -> Floats:

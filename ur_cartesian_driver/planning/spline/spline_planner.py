@@ -26,7 +26,6 @@ from ur_cartesian_driver.motion.errors import JointLimitExceeded
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.polynomials import MotionRows
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.geometry.pose_rows import keep_hemisphere
 from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector6, vector6, ZERO6
 from ur_cartesian_driver.motion.goal.goal import PIECES_PER_HORIZON
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
@@ -166,16 +165,11 @@ def plan_spline(
         options.spline_tolerance,
         _max_piece_time(goal),
     )
-    segments = _segments(path, polynomials, goal)
-    end = _end_of(polynomials)
-    poses = path.poses.copy()
-    keep_hemisphere(poses)
+    end, reference = _end_of(polynomials), path.reference
     kind = 'quintic' if polynomials.quintic else 'cubic'
     return SplinePieces(
-        segments=segments,
-        reference=ReferencePath(
-            poses=poses, point=path.points, time=path.times, fraction=path.fractions
-        ),
+        segments=_segments(path, reference, polynomials, goal),
+        reference=reference,
         end=end,
         stretch=stretch,
         remarks=(
@@ -286,7 +280,9 @@ def _fit_to_limits(
     return path, found.factor, found.speed_limit
 
 
-def _segments(path: SplinePath, polynomials: JointPolynomials, goal: GoalTable) -> PlannedRows:
+def _segments(
+    path: SplinePath, reference: ReferencePath, polynomials: JointPolynomials, goal: GoalTable
+) -> PlannedRows:
     def lines(sizes: Floats) -> list[str]:
         """Return a line for the last piece to each point, and '' for the other pieces."""
         last = np.flatnonzero(np.diff(polynomials.piece, append=-1))
@@ -300,7 +296,7 @@ def _segments(path: SplinePath, polynomials: JointPolynomials, goal: GoalTable) 
             made[row] = f'{line}; margin {margin}'
         return made
 
-    return piece_rows(path, polynomials, path.first + polynomials.piece, lines)
+    return piece_rows(reference, polynomials, path.first + polynomials.piece, lines)
 
 
 def _segment_line(goal: GoalTable, first: int, k: int, count: int, done: Sequence[float]) -> str:
