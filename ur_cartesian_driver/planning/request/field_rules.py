@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from enum import IntEnum
-from math import hypot, isfinite, sqrt
+from math import hypot, inf, isfinite, sqrt
 from typing import Any
 
 import numpy as np
@@ -112,7 +112,8 @@ def _check_rows(
             is_pose = np.isfinite(column).all(axis=1) & _are_units(column[:, 3:])
             fine &= is_pose | ~getattr(rows, each.mask) if each.mask else is_pose
         elif field.form is Form.RATES:
-            fine &= np.isfinite(column).all(axis=1)
+            may_be_nan = nan_in_rates and field.range is not None and field.range.nan_in_splines
+            fine &= ((np.abs(column) < inf) | (may_be_nan & np.isnan(column))).all(axis=1)
         elif field.range is not None:
             fine &= field.range.holds(column)
     for i in rows_where(~fine):
