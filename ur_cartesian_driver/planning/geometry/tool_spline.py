@@ -17,7 +17,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.geometry.polynomials import (
     cubic_rows,
     evaluate,
@@ -149,7 +149,9 @@ class ToolSpline:
 
     def _turning(self, piece: Indices) -> Indices:
         """Return the rows of pieces (m,) on which the tool turns: often none."""
-        return np.flatnonzero(np.any(self.turns, axis=(1, 2))[piece])
+        first, end = piece.min(initial=len(self.turns)), piece.max(initial=0) + 1
+        turning: Flags = np.any(self.turns[first:end], axis=(1, 2))
+        return np.flatnonzero(turning[piece - first])
 
     def vectors(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
         """Return positions [m] and rotation vectors since the piece began [rad], (m, 3) each."""
