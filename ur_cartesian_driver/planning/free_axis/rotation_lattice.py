@@ -398,7 +398,7 @@ class RotationLattice:
         turn[:, ends[is_joint]] = (q_targets - q_sources)[:, is_joint]
         here = np.cumsum(turn, axis=1)
         here += (q_sources - (here - turn)[:, begins])[:, layer]
-        jumps: Flags = (np.abs(here[:, ends] - q_targets) > _MAX_JOINT_STEP).any(axis=0)
+        jumps: Flags = np.any(np.abs(here[:, ends] - q_targets) > _MAX_JOINT_STEP, axis=0)
         turn = np.abs(turn)
         is_joint = is_joint[:, None, None]
         cost = turn.sum(axis=0) + _taken(tables.cost[rows, None], entry)[0]
