@@ -470,7 +470,7 @@ class RotationLattice:
             )
         low = np.searchsorted(sources, targets - reach)
         width = int((np.searchsorted(sources, targets + reach, side='right') - low).max())
-        index = np.minimum(low[:, None] + np.arange(width), len(sources) - 1)
+        index = np.minimum(low[:, None] + np.arange(max(width, 1)), len(sources) - 1)
         change = targets[:, None] - sources[index]
         size = float(self.samples.sizes[layer.begin : layer.end].sum())
         total = np.where(np.abs(change) <= reach, _EVENNESS / max(size, 1e-6) * change**2, inf)
