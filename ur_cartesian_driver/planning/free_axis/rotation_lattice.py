@@ -317,8 +317,7 @@ class RotationLattice:
         q = solution.q.T
         distances = singularity_distance_rows(self.arm, q)
         bounds = np.array([getattr(self.options, m.option) for m in SINGULARITY_MEASURES])
-        margin = (distances / _SCALES).min(axis=1)
-        cost = _nearness(margin)
+        cost = _nearness((distances / _SCALES).min(axis=1))
         cost += np.where((distances < bounds).any(axis=1), _REFUSED, 0.0)
         cost[~solution.exists] = inf
         return q, cost
@@ -384,11 +383,8 @@ class RotationLattice:
         sources, q_sources = nodes[:-1][block, None], joints[:, :-1][:, block, None]
         targets, q_targets = nodes[1:][block, :, None], joints[:, 1:][:, block, :, None]
         change = targets - sources
-        fractions, sizes, times = (
-            column[rows, None, None]
-            for column in (self.samples.fractions, self.samples.sizes, self.samples.times)
-        )
-        rotations = sources[layer] + fractions * change[layer]
+        samples, sizes = self.samples, self.samples.sizes[rows, None, None]
+        rotations = sources[layer] + samples.fractions[rows, None, None] * change[layer]
         rotations[ends] = targets
         entry = tables.look_up(rows[:, None, None], rotations)
         q = _taken(tables.q[rows], entry)
@@ -404,12 +400,11 @@ class RotationLattice:
         cost = turn.sum(axis=0) + _taken(tables.cost[rows, None], entry)[0]
         cost += self._limits(here, np.where(is_joint[layer], 1.0, sizes))
         cost[(turn.max(axis=0) > _MAX_JOINT_STEP) & ~is_joint[layer]] = inf
-        turn -= self._speeds * times + tables.step
+        turn -= self._speeds * samples.times[rows, None, None] + tables.step
         cost += _TOO_FAST * np.maximum(turn, 0.0).sum(axis=0)
         evenness = _EVENNESS / np.maximum(np.add.reduceat(sizes, begins), 1e-6)
-        edges: Floats = np.add.reduceat(cost, begins) + np.where(
-            is_joint, 0.0, evenness * change**2
-        )
+        edges: Floats = np.add.reduceat(cost, begins)
+        edges += np.where(is_joint, 0.0, evenness * change**2)
         for number, each in enumerate(self.layers[block]):
             reach = inf if each.is_joint else min(each.max_change, _MAX_CHANGE) + 1e-9
             edges[number][(np.abs(change[number]) > reach) | jumps[number]] = inf
@@ -461,16 +456,10 @@ class RotationLattice:
         first, last = int(alive[0]), int(alive[-1]) + 1
         sources = rotations[first:last]
         targets = targets[(targets >= sources[0] - reach) & (targets <= sources[-1] + reach)]
-        if not len(targets):
-            return (
-                np.full((len(cost), 1), inf),
-                q[:, :, :1],
-                np.zeros((len(cost), 1), int),
-                targets,
-            )
         low = np.searchsorted(sources, targets - reach)
-        width = int((np.searchsorted(sources, targets + reach, side='right') - low).max())
-        index = np.minimum(low[:, None] + np.arange(max(width, 1)), len(sources) - 1)
+        counts = np.searchsorted(sources, targets + reach, side='right') - low
+        offsets = np.arange(counts.max(initial=1))
+        index = np.minimum(low[:, None] + offsets, len(sources) - 1)
         change = targets[:, None] - sources[index]
         size = float(self.samples.sizes[layer.begin : layer.end].sum())
         total = np.where(np.abs(change) <= reach, _EVENNESS / max(size, 1e-6) * change**2, inf)
@@ -496,12 +485,8 @@ class RotationLattice:
         total = total + self._off_posture(layer, here)
         best = np.argmin(total, axis=2)
         b, k = np.arange(len(cost))[:, None], np.arange(len(targets))
-        return (
-            total[b, k, best],
-            here[:, b, k, best],
-            index[k, best] + len(rotations) * b,
-            targets,
-        )
+        source = index[k, best] + len(rotations) * b
+        return total[b, k, best], here[:, b, k, best], source, targets
 
     def _joint_edges(
         self, tables: _Tables, layer: Layer, targets: Floats, cost: Floats, q: Floats
