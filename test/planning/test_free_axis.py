@@ -225,6 +225,22 @@ def test_a_joint_move_to_a_free_point_ends_where_the_path_needs_it():
     assert made.segments[0].joints[5] < pi
 
 
+def test_ranges_too_far_apart_for_a_short_way_leave_the_rotations_as_given():
+    home = ARM.forward(HOME)
+    x, y, z = home.position
+    goal = Goal(
+        waypoints=tuple(
+            Waypoint(pose=Pose((x, y, z - 0.01 * k), home.quaternion)) for k in (1, 2)
+        ),
+        segments=tuple(
+            Segment(type=kind, free_axis=FreeAxis.Z, free_min=low, free_max=low + 0.1)
+            for kind, low in ((SegmentType.JOINT, 1.2), (SegmentType.LINEAR, -0.8))
+        ),
+    )
+    made = plan(goal, STATE, ARM, OPTIONS)
+    assert 'rotations as given, because no rotation' in free_remark(made)
+
+
 def test_the_axis_follows_the_path_between_points():
     path = free_path(4)
     made = plan(path.goal, path.state, path.arm, OPTIONS)

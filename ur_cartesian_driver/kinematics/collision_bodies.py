@@ -23,6 +23,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from itertools import product
 from math import hypot, inf
 from typing import Literal, TypeAlias
 
@@ -82,6 +83,8 @@ _BODIES: tuple[tuple[Link, _Kind, int], ...] = (
 _CUT = 0.46
 # Rows per block, so that the intermediate arrays stay in the CPU cache.
 _BLOCK = 2048
+# The same where all pairs of bodies are compared at once.
+_PAIR_BLOCK = 256
 # Of this many consecutive rows, the middle one bounds the distances of the others.
 _STRIDE = 16
 # Calibration makes no arm longer than its model by more than this [m].
@@ -171,10 +174,18 @@ class CollisionBodies:
         self.pairs = tuple(pair for pair in PAIRS if Link.TOOL not in pair or self._tool_length)
         of = {link: slice(*np.searchsorted(self.links, (link, link + 1))) for link in Link}
         of_connector = slice(CONNECTOR, CONNECTOR + 1)
-        #: The bodies of both links of each pair.
-        self._compared = [
+        bodies_of = [
             (of_connector if (a, b) == CONNECTOR_PAIR else of[a], of[b]) for a, b in self.pairs
         ]
+        numbers = np.arange(len(bodies))
+        #: The pairs of bodies, (3, m): the number of their pair of links, and both bodies.
+        self._compared = np.array(
+            [
+                (k, i, j)
+                for k, (first, second) in enumerate(bodies_of)
+                for i, j in product(numbers[first], numbers[second])
+            ]
+        ).T
         self._reach = self._reaches(bodies)
 
     def distances(self, q: Floats, enough: float = inf) -> Floats:
@@ -207,26 +218,28 @@ class CollisionBodies:
 
     def _pair_distances(self, q: Floats, pairs: Flags) -> Floats:
         """Return the distances (n, m) of some pairs."""
-        wanted = [self._compared[k] for k in np.flatnonzero(pairs)]
-        result = np.empty((len(q), len(wanted)))
+        links, one, other = self._compared[:, pairs[self._compared[0]]]
+        begins = np.flatnonzero(np.diff(links, prepend=-1))
+        result = np.empty((len(q), len(begins)))
         for begin in range(0, len(q), _BLOCK):
-            rows = slice(begin, begin + _BLOCK)
-            skeletons = self._skeletons(self._lines(q[rows]))
-            for k, bodies in enumerate(wanted):
-                result[rows, k] = self._nearest(skeletons, *bodies)
+            skeletons = self._skeletons(self._lines(q[begin : begin + _BLOCK]))
+            rows = result[begin : begin + _BLOCK]
+            for row in range(0, len(rows), _PAIR_BLOCK):
+                some = slice(row, row + _PAIR_BLOCK)
+                start, vector, axis = (each[..., some] for each in skeletons)
+                distances = self._body_distances((start, vector, axis), one, other)
+                rows[some] = np.minimum.reduceat(distances, begins).T
         return result
 
-    def _nearest(self, skeletons: _Skeletons, first: slice, second: slice) -> Floats:
-        """Return the smallest distance (n,) between two groups of bodies."""
-        one, other = (first, None), (None, second)
+    def _body_distances(self, skeletons: _Skeletons, one: Indices, other: Indices) -> Floats:
+        """Return the distances (m, n) of pairs of bodies."""
         start, vector, axis = skeletons
-        gap = segment_gap(start[:, *one], vector[:, *one], start[:, *other], vector[:, *other])
+        gap = segment_gap(start[:, one], vector[:, one], start[:, other], vector[:, other])
         distance = np.sqrt(_dot(gap, gap))
         scale = 1.0 / np.maximum(distance, _TINY)
         for k in (one, other):
-            distance -= _beyond(_dot(gap, axis[:, *k]) * scale, self._insets[k], self._radii[k])
-        nearest: Floats = distance.min(axis=(0, 1))
-        return nearest
+            distance -= _beyond(_dot(gap, axis[:, k]) * scale, self._insets[k], self._radii[k])
+        return distance
 
     def _reaches(self, bodies: Sequence[_LinkBody]) -> Floats:
         """

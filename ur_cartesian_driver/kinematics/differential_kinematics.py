@@ -20,6 +20,8 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 # Added to Jacobians; far below the smallest singular value at which the arm is allowed to move.
 _MIN_SINGULAR_VALUE = 1e-12
 
+# Rows per block, so that the intermediate arrays stay in the CPU cache.
+_BLOCK = 1024
 _TRAVEL_AND_TURN = slice(0, 3), slice(3, 6)
 
 
@@ -41,13 +43,16 @@ def joint_rates(
     :param twist: (n, 6) twist of the TCP in base axes [m/s], [rad/s].
     :param acceleration: (n, 6) likewise [m/s^2], [rad/s^2].
     """
-    at = _jacobians(arm, T_flange_tcp, q)
-    # Avoid a division by zero for an arm at rest in a singularity.
-    regular = at.jacobian + _MIN_SINGULAR_VALUE * np.eye(6)
-    # To solve twice takes two thirds of the time that one inverse takes.
-    qd = _solved(regular, twist)
-    rest = acceleration - _bias_acceleration(at, qd)
-    return qd, _solved(regular, rest)
+    qd, qdd = np.empty((2, *q.shape))
+    for begin in range(0, len(q), _BLOCK):
+        rows = slice(begin, begin + _BLOCK)
+        at = _jacobians(arm, T_flange_tcp, q[rows])
+        # Avoid a division by zero for an arm at rest in a singularity.
+        regular = at.jacobian + _MIN_SINGULAR_VALUE * np.eye(6)
+        # To solve twice takes two thirds of the time that one inverse takes.
+        qd[rows] = _solved(regular, twist[rows])
+        qdd[rows] = _solved(regular, acceleration[rows] - _bias_acceleration(at, qd[rows]))
+    return qd, qdd
 
 
 def largest_joint_rates(

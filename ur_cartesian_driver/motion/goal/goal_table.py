@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, Field, field, fields, replace
+from functools import cache, lru_cache
 from itertools import chain
 from operator import eq
 from typing import Any, ClassVar, overload, TypeVar
@@ -52,6 +53,11 @@ def rows_where(mask: Flags | np.bool_) -> list[int]:
     return rows
 
 
+@cache
+def _names(kind: type[Rows[Any]]) -> tuple[str, ...]:
+    return tuple(each.name for each in fields(kind))
+
+
 def zeros(n: int, columns: int = 6) -> Floats:
     """Return an array (n, columns) of zeros that takes no memory."""
     return np.broadcast_to(np.zeros(()), (n, columns))
@@ -76,7 +82,7 @@ class Rows(Sequence[T]):
                 object.__setattr__(self, name, view)
 
     def _columns(self) -> list[tuple[str, Any]]:
-        return [(each.name, getattr(self, each.name)) for each in fields(self)]
+        return [(name, getattr(self, name)) for name in _names(type(self))]
 
     def _numbers(self, *names: str) -> Iterator[tuple[Any, ...]]:
         """Yield the rows of some columns as plain numbers, in blocks to save memory."""
@@ -251,6 +257,7 @@ class SegmentRows(GoalRows[Segment], SegmentColumns):
     kind: ClassVar[type[Segment]] = Segment
 
     @classmethod
+    @lru_cache(maxsize=8)  # a plan asks for them again and again
     def plain(cls, n: int) -> SegmentRows:
         """Return n default segments, for a goal that gives none."""
         return cls.of_columns(n, {})

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 import re
 
 import numpy as np
@@ -579,25 +579,18 @@ def _path_from(
     """Return copies of a path's rows from a time [s] on, so that the path itself can be freed."""
     row = max(int(np.searchsorted(path.time, start_time + tolerance, side='right')) - 1, 0)
     return ReferencePath(
-        poses=path.poses[row:].copy(),
-        time=path.time[row:].copy(),
-        point=path.point[row:].copy(),
-        blend_tolerance=path.blend_tolerance[row:].copy(),
-        fraction=path.fraction[row:].copy(),
+        **{each.name: getattr(path, each.name)[row:].copy() for each in fields(path)}
     )
 
 
 def _join_paths(first: ReferencePath, second: ReferencePath) -> ReferencePath:
     """Return two paths as one; the second begins where the first ends."""
-    poses = np.concatenate([first.poses, second.poses[1:]])
-    keep_hemisphere(poses)
-    return ReferencePath(
-        poses=poses,
-        time=np.concatenate([first.time, second.time[1:]]),
-        point=np.concatenate([first.point, second.point[1:]]),
-        blend_tolerance=np.concatenate([first.blend_tolerance, second.blend_tolerance[1:]]),
-        fraction=np.concatenate([first.fraction, second.fraction[1:]]),
-    )
+    columns = {
+        each.name: np.concatenate([getattr(first, each.name), getattr(second, each.name)[1:]])
+        for each in fields(ReferencePath)
+    }
+    keep_hemisphere(columns['poses'])
+    return ReferencePath(**columns)
 
 
 def _end_times(segments: Iterable[PlannedSegment], start_time: float) -> dict[int, float]:

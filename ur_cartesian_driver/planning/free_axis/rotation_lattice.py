@@ -34,7 +34,7 @@ from ur_cartesian_driver.kinematics.closed_form_rows import (
 )
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
-from ur_cartesian_driver.motion.geometry.arrays import Floats, Int64s
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int64s
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, multiply_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints
@@ -79,6 +79,8 @@ _TOO_FAST = 50.0
 _OFF_POSTURE = 20.0
 #: Joint moves are tried from at most this many nodes, the cheapest ones.
 _JOINT_SOURCES = 24
+#: Number of layers whose edges a finer search computes at once, small enough for the CPU cache.
+_BLOCK = 32
 _SCALES = np.array([measure.scale for measure in SINGULARITY_MEASURES])
 
 
@@ -169,8 +171,8 @@ class _Tables:
     #: Costs of these joint positions; inf = no solution.
     cost: Floats
 
-    def look_up(self, sample: int, rotations: Floats) -> Int64s:
-        """Return the indices, in the table, of the nearest rotations."""
+    def look_up(self, sample: int | Int64s, rotations: Floats) -> Int64s:
+        """Return the indices, in the table, of the nearest rotations; one sample, or many."""
         index: Int64s = np.rint((rotations - self.first[sample]) / self.step).astype(np.int64)
         count = self.q.shape[3]
         return np.mod(index, count) if self.is_round else np.clip(index, 0, count - 1)
@@ -197,9 +199,17 @@ class RotationLattice:
     _coarse: _Tables | None = None
     _speeds: Floats = field(init=False)
     _ranges: tuple[Floats, Floats] = field(init=False)
+    #: The layers as columns: first samples, then the number of samples; which are joint moves.
+    _begins: Int64s = field(init=False)
+    _is_joint: Flags = field(init=False)
+    #: (n,) the layer of each sample.
+    _layer: Int64s = field(init=False)
 
     def __post_init__(self) -> None:
-        """Read the limits of the joints."""
+        """Read the limits of the joints, and the layers."""
+        self._begins = np.array([*(layer.begin for layer in self.layers), len(self.samples)])
+        self._is_joint = np.array([layer.is_joint for layer in self.layers])
+        self._layer = np.repeat(np.arange(len(self.layers)), np.diff(self._begins))
         low, high = np.array(self.arm.model.position_limits).T
         self._ranges = _column(low), _column(high)
         self._speeds = _column(self.arm.model.max_joint_speed)
@@ -215,22 +225,16 @@ class RotationLattice:
             self._coarse = self._tables(
                 np.zeros(len(self.samples)), COARSE_STEP, TURN_COUNT, tuple(branches)
             )
-        tables = self._coarse
-        nodes = [self._coarse_nodes(layer) for layer in self.layers]
-        found = self._best_path(tables, nodes, COARSE_STEP, None)
+        found = self._best_path(self._coarse)
         for step in _FINE_STEPS:
             found = self._refined(found, step)
         return found
 
     def along(self, rotations: Floats) -> Floats:
         """Return the rotation at each sample (n,), interpolated between the layers."""
-        begins = [layer.begin for layer in self.layers]
-        counts = np.diff([*begins, len(self.samples)])
-        number = np.repeat(np.arange(len(begins)), counts)
-        before = np.concatenate([[0.0], rotations])[number]
-        joint = np.array([layer.is_joint for layer in self.layers])[number]
-        part = np.where(joint, 1.0, self.samples.fractions)
-        along: Floats = before + part * (rotations[number] - before)
+        before = np.concatenate([[0.0], rotations])[self._layer]
+        part = np.where(self._is_joint[self._layer], 1.0, self.samples.fractions)
+        along: Floats = before + part * (rotations[self._layer] - before)
         return along
 
     def joints_along(self, path: RotationPath) -> Floats:
@@ -256,8 +260,7 @@ class RotationLattice:
 
     def sample_branches(self, path: RotationPath) -> Int64s:
         """Return the branch of a rotation path at each sample (n,)."""
-        begins = [layer.begin for layer in self.layers]
-        return np.repeat(path.branches, np.diff([*begins, len(self.samples)]))
+        return path.branches[self._layer]
 
     @property
     def _start(self) -> int:
@@ -314,8 +317,7 @@ class RotationLattice:
         q = solution.q.T
         distances = singularity_distance_rows(self.arm, q)
         bounds = np.array([getattr(self.options, m.option) for m in SINGULARITY_MEASURES])
-        margin = (distances / _SCALES).min(axis=1)
-        cost = _nearness(margin)
+        cost = _nearness((distances / _SCALES).min(axis=1))
         cost += np.where((distances < bounds).any(axis=1), _REFUSED, 0.0)
         cost[~solution.exists] = inf
         return q, cost
@@ -332,68 +334,109 @@ class RotationLattice:
             one = one - tau * np.rint(one.mean() / tau)
         return np.concatenate([one + tau * k for k in _COPIES])
 
+    # -- finer searches --------------------------------------------------------------------------
+
     def _refined(self, path: RotationPath, step: float) -> RotationPath:
         """Return the best way in the neighbourhood of ``path``, with a finer step."""
         first = self.along(path.rotations) - _FINE_REACH * step
         tables = self._tables(first, step, 2 * _FINE_REACH + 1, self.sample_branches(path))
         offsets = step * np.arange(-_FINE_REACH, _FINE_REACH + 1)
-        nodes = []
-        for layer, rotation in zip(self.layers, path.rotations.tolist(), strict=True):
-            around = rotation + offsets
+        nodes = np.concatenate([[0.0], path.rotations])[:, None] + offsets
+        nodes[0] = 0.0  # the start
+        for number, layer in enumerate(self.layers, 1):
             if not layer.is_any:
-                turns = layer.turns(rotation)
-                around = np.unique(np.clip(around, layer.low + turns, layer.high + turns))
-            nodes.append(around)
-        return self._best_path(tables, nodes, step, path)
+                turns = layer.turns(float(path.rotations[number - 1]))
+                nodes[number] = np.clip(nodes[number], layer.low + turns, layer.high + turns)
+        ends = self._begins[1:] - 1
+        joints = _taken(tables.q[ends], tables.look_up(ends[:, None], nodes[1:]))
+        # As many full turns as on the path.
+        joints += tau * np.rint((path.joints.T[:, :, None] - joints) / tau)
+        start = np.broadcast_to(np.array(self.q_start)[:, None, None], (6, 1, len(offsets)))
+        joints = np.concatenate([start, joints], axis=1)
+        sources, cost = np.zeros(nodes.shape, dtype=np.int64), np.zeros(len(offsets))
+        for number in range(len(self.layers)):
+            if number % _BLOCK == 0:
+                edges = self._fine_edges(tables, nodes, joints, number)
+            total = edges[number % _BLOCK] + cost
+            sources[number + 1], cost = total.argmin(axis=1), total.min(axis=1)
+            if np.isinf(cost).all():
+                raise NoRotation(number)
+        best = np.empty(len(nodes), dtype=np.int64)
+        best[-1] = np.argmin(cost)
+        for number in range(len(self.layers), 0, -1):
+            best[number - 1] = sources[number, best[number]]
+        row, best = np.arange(1, len(nodes)), best[1:]
+        return RotationPath(nodes[row, best], path.branches, joints[:, row, best].T)
 
-    # -- dynamic programming ---------------------------------------------------------------------
-
-    def _best_path(
-        self, tables: _Tables, nodes: list[Floats], step: float, around: RotationPath | None
-    ) -> RotationPath:
+    def _fine_edges(self, tables: _Tables, nodes: Floats, joints: Floats, first: int) -> Floats:
         """
-        Return the best way through the nodes of all layers.
+        Return the costs (layers, targets, sources) of the edges to a block of layers.
 
-        :param around: the way near which the nodes lie; None = all branches are searched.
+        :param nodes: (1 + layers, k) rotations at the start and on all layers.
+        :param joints: (6, 1 + layers, k) joint positions there.
+        :param first: the first layer of the block.
         """
-        width = tables.q.shape[2]
-        branches = np.arange(8)[None] if width == 8 else np.array([[self._start]])
-        cost = np.where(np.equal(branches.T, self._start), 0.0, inf)
-        if around is not None:
-            branches, cost = around.branches[:, None], np.zeros((1, 1))
+        block = slice(first, first + _BLOCK)
+        is_joint, begins = self._is_joint[block], self._begins[first : first + _BLOCK + 1]
+        rows, layer = np.arange(begins[0], begins[-1]), self._layer[begins[0] : begins[-1]] - first
+        begins, ends = begins[:-1] - begins[0], begins[1:] - 1 - begins[0]
+        sources, q_sources = nodes[:-1][block, None], joints[:, :-1][:, block, None]
+        targets, q_targets = nodes[1:][block, :, None], joints[:, 1:][:, block, :, None]
+        change = targets - sources
+        samples, sizes = self.samples, self.samples.sizes[rows, None, None]
+        rotations = sources[layer] + samples.fractions[rows, None, None] * change[layer]
+        rotations[ends] = targets
+        entry = tables.look_up(rows[:, None, None], rotations)
+        q = _taken(tables.q[rows], entry)
+        turn = np.diff(q, axis=1, prepend=q[:, :1])
+        turn[:, begins] = q[:, begins] - q_sources
+        turn -= tau * np.rint(turn / tau)
+        turn[:, ends[is_joint]] = (q_targets - q_sources)[:, is_joint]
+        here = np.cumsum(turn, axis=1)
+        here += (q_sources - (here - turn)[:, begins])[:, layer]
+        jumps: Flags = np.any(np.abs(here[:, ends] - q_targets) > _MAX_JOINT_STEP, axis=0)
+        turn = np.abs(turn)
+        is_joint = is_joint[:, None, None]
+        cost = turn.sum(axis=0) + _taken(tables.cost[rows, None], entry)[0]
+        cost += self._limits(here, np.where(is_joint[layer], 1.0, sizes))
+        cost[(turn.max(axis=0) > _MAX_JOINT_STEP) & ~is_joint[layer]] = inf
+        turn -= self._speeds * samples.times[rows, None, None] + tables.step
+        cost += _TOO_FAST * np.maximum(turn, 0.0).sum(axis=0)
+        evenness = _EVENNESS / np.maximum(np.add.reduceat(sizes, begins), 1e-6)
+        edges: Floats = np.add.reduceat(cost, begins)
+        edges += np.where(is_joint, 0.0, evenness * change**2)
+        for number, each in enumerate(self.layers[block]):
+            reach = inf if each.is_joint else min(each.max_change, _MAX_CHANGE) + 1e-9
+            edges[number][(np.abs(change[number]) > reach) | jumps[number]] = inf
+            edges[number, None] += self._off_posture(each, q_targets[:, number, None])
+        return edges
+
+    # -- coarse search ---------------------------------------------------------------------------
+
+    def _best_path(self, tables: _Tables) -> RotationPath:
+        """Return the best way through the coarse nodes of all layers."""
+        branches = np.arange(8) if tables.q.shape[2] == 8 else np.array([self._start])
+        cost = np.where(branches == self._start, 0.0, inf)[:, None]
         q = np.broadcast_to(np.array(self.q_start)[:, None, None], (6, len(cost), 1))
         rotations = np.zeros(1)
         back: list[tuple[Int64s, Floats, Floats]] = []
-        for number, (layer, targets) in enumerate(zip(self.layers, nodes, strict=True)):
+        for number, layer in enumerate(self.layers):
+            targets = self._coarse_nodes(layer)
             if layer.is_joint:
-                near = None if around is None else around.joints[number]
-                step_to = self._joint_edges(tables, layer, targets, cost, q, near)
+                step_to = self._joint_edges(tables, layer, targets, cost, q)
             else:
-                step_to = self._edges(tables, layer, targets, rotations, cost, q, step)
-            cost, q, source, targets = step_to
+                step_to = self._edges(tables, layer, targets, rotations, cost, q)
+            cost, q, source, rotations = step_to
             if not np.isfinite(cost).any():
                 raise NoRotation(number)
-            back.append((source, targets, q))
-            rotations = targets
-        branches = np.broadcast_to(branches, (len(back), width))
-        return self._read_back(back, cost, branches)
-
-    @staticmethod
-    def _read_back(
-        back: list[tuple[Int64s, Floats, Floats]], cost: Floats, branches: Int64s
-    ) -> RotationPath:
-        """
-        Return the way to the best node of the last layer.
-
-        :param branches: (layers, b) the branches that the first index of the nodes selects.
-        """
+            back.append((source, rotations, q))
         n = len(back)
         path = RotationPath(np.empty(n), np.empty(n, dtype=np.int64), np.empty((n, 6)))
         b, k = divmod(int(np.argmin(cost)), cost.shape[1])
         for number in range(n - 1, -1, -1):
             source, rotations, q = back[number]
             path.rotations[number], path.joints[number] = rotations[k], q[:, b, k]
-            path.branches[number] = branches[number, b]
+            path.branches[number] = branches[b]
             width = len(back[number - 1][1]) if number else 1
             b, k = divmod(int(source[b, k]), width)
         return path
@@ -406,7 +449,6 @@ class RotationLattice:
         rotations: Floats,
         cost: Floats,
         q: Floats,
-        step: float,
     ) -> tuple[Floats, Floats, Int64s, Floats]:
         """Return costs (b, k), joints (6, b, k), sources (b, k) and rotations (k,) of a layer."""
         reach = min(layer.max_change, _MAX_CHANGE) + 1e-9
@@ -414,16 +456,10 @@ class RotationLattice:
         first, last = int(alive[0]), int(alive[-1]) + 1
         sources = rotations[first:last]
         targets = targets[(targets >= sources[0] - reach) & (targets <= sources[-1] + reach)]
-        if not len(targets):
-            return (
-                np.full((len(cost), 1), inf),
-                q[:, :, :1],
-                np.zeros((len(cost), 1), int),
-                targets,
-            )
         low = np.searchsorted(sources, targets - reach)
-        width = int((np.searchsorted(sources, targets + reach, side='right') - low).max())
-        index = np.minimum(low[:, None] + np.arange(width), len(sources) - 1)
+        counts = np.searchsorted(sources, targets + reach, side='right') - low
+        offsets = np.arange(counts.max(initial=1))
+        index = np.minimum(low[:, None] + offsets, len(sources) - 1)
         change = targets[:, None] - sources[index]
         size = float(self.samples.sizes[layer.begin : layer.end].sum())
         total = np.where(np.abs(change) <= reach, _EVENNESS / max(size, 1e-6) * change**2, inf)
@@ -444,52 +480,34 @@ class RotationLattice:
             total += self._limits(here, float(self.samples.sizes[sample]))
             total[turn.max(axis=0) > _MAX_JOINT_STEP] = inf
             if (time := self.samples.times[sample]) < inf:
-                excess = turn - (self._speeds * time + step)
+                excess = turn - (self._speeds * time + COARSE_STEP)
                 total += _TOO_FAST * np.maximum(excess, 0.0).sum(axis=0)
         total = total + self._off_posture(layer, here)
         best = np.argmin(total, axis=2)
         b, k = np.arange(len(cost))[:, None], np.arange(len(targets))
-        return (
-            total[b, k, best],
-            here[:, b, k, best],
-            index[k, best] + len(rotations) * b,
-            targets,
-        )
+        source = index[k, best] + len(rotations) * b
+        return total[b, k, best], here[:, b, k, best], source, targets
 
     def _joint_edges(
-        self,
-        tables: _Tables,
-        layer: Layer,
-        targets: Floats,
-        cost: Floats,
-        q: Floats,
-        near: Floats | None,
+        self, tables: _Tables, layer: Layer, targets: Floats, cost: Floats, q: Floats
     ) -> tuple[Floats, Floats, Int64s, Floats]:
-        """
-        Return what :meth:`_edges` returns, for a joint move, which connects any two nodes.
-
-        :param near: joint positions near which the move has to end; None = anywhere.
-        """
+        """Return what :meth:`_edges` returns, for a joint move, which connects any two nodes."""
         sample = layer.end - 1
         flat = cost.ravel()
         sources = np.argsort(flat)[:_JOINT_SOURCES]
         sources = sources[np.isfinite(flat[sources])]
         there = tables.q[sample][:, :, tables.look_up(sample, targets), None]
         start = q.reshape(6, -1)[:, None, None, sources]
-        if near is None:
-            turn = there - start
-            turn -= tau * np.rint(turn / tau)
-            # The copies of a rotation are reached by full turns of the last joint.
-            copies = np.repeat(tau * np.array(_COPIES), len(targets) // len(_COPIES))
-            turn[5] += copies[:, None]
-        else:
-            there = there + tau * np.rint((near[:, None, None, None] - there) / tau)
-            turn = there - start
+        turn = there - start
+        turn -= tau * np.rint(turn / tau)
+        # The copies of a rotation are reached by full turns of the last joint.
+        copies = np.repeat(tau * np.array(_COPIES), len(targets) // len(_COPIES))
+        turn[5] += copies[:, None]
         end = start + turn
         total = flat[sources] + np.abs(turn).sum(axis=0)
         total = total + tables.cost[sample][:, tables.look_up(sample, targets)][:, :, None]
         total += self._limits(end, 1.0)
-        if layer.is_nearest and near is None:
+        if layer.is_nearest:
             distance = np.where(np.isfinite(total), np.linalg.norm(turn, axis=0), inf)
             nearest = distance.min(axis=(0, 1))
             total = np.where(distance <= nearest + 1e-9, total, inf)
@@ -498,7 +516,7 @@ class RotationLattice:
         b, k = np.arange(total.shape[0])[:, None], np.arange(len(targets))
         return total[b, k, best], end[:, b, k, best], sources[best], targets
 
-    def _limits(self, q: Floats, size: float) -> Floats:
+    def _limits(self, q: Floats, size: float | Floats) -> Floats:
         """Return the costs of nearness to joint limits on a path of ``size``; inf if exceeded."""
         low, high = self._ranges
         margin = np.minimum(q - low, high - q).min(axis=0)
@@ -515,6 +533,13 @@ class RotationLattice:
 def _column(joints: Sequence[float]) -> Floats:
     """Return a value for each joint as an array (6, 1, 1, 1)."""
     return np.array(joints)[:, None, None, None]
+
+
+def _taken(table: Floats, entry: Int64s) -> Floats:
+    """Return entries (n, ...) of a branch's table (n, k, 1, rotations) as (k, n, ...)."""
+    rows = table[:, :, 0].swapaxes(0, 1)
+    taken: Floats = np.take_along_axis(rows, entry.reshape(1, len(entry), -1), axis=2)
+    return taken.reshape(len(rows), *entry.shape)
 
 
 def _nearness(margin: Floats) -> Floats:

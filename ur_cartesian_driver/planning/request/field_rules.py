@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from enum import IntEnum
-from math import hypot, isfinite, sqrt
+from math import hypot, inf, isfinite, sqrt
 from typing import Any
 
 import numpy as np
@@ -82,10 +82,7 @@ def check_record(
         elif each.range is not None:
             may_be_nan = nan_in_rates and each.range.nan_in_splines
             for name, number in _numbers(each, field, value):
-                if not (
-                    each.range.holds(np.array(number, dtype=np.float64))
-                    or (may_be_nan and number != number)
-                ):
+                if not (each.range.holds(number) or (may_be_nan and number != number)):
                     raise InvalidGoal(name, *each.range.refusal(number))
 
 
@@ -110,12 +107,13 @@ def _check_rows(
     for each in rows.columns():
         column, field = getattr(rows, each.name), each.field
         if field.form is Form.CHOICE:
-            fine &= np.isin(column, list(field.type))
+            fine &= (column == np.array(list(field.type))[:, None]).any(axis=0)
         elif field.form is Form.POSE:
             is_pose = np.isfinite(column).all(axis=1) & _are_units(column[:, 3:])
             fine &= is_pose | ~getattr(rows, each.mask) if each.mask else is_pose
         elif field.form is Form.RATES:
-            fine &= np.isfinite(column).all(axis=1)
+            may_be_nan = nan_in_rates and field.range is not None and field.range.nan_in_splines
+            fine &= ((np.abs(column) < inf) | (may_be_nan & np.isnan(column))).all(axis=1)
         elif field.range is not None:
             fine &= field.range.holds(column)
     for i in rows_where(~fine):

@@ -27,7 +27,12 @@ from ur_cartesian_driver.motion.geometry.polynomials import (
     quintic_rows,
     values,
 )
-from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, compose_rows, distance_rows
+from ur_cartesian_driver.motion.geometry.pose_rows import (
+    angle_rows,
+    compose_rows,
+    distance_rows,
+    length_rows,
+)
 from ur_cartesian_driver.motion.goal.goal_table import zeros
 from ur_cartesian_driver.motion.plan.move_rows import SplineRows
 from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows, ReferencePath
@@ -46,6 +51,8 @@ _MIN_PIECE_TIME = 0.002
 _DIGITS = 12
 #: Minimum and maximum number of samples inside a piece at which the deviation is computed.
 COMPARED_SAMPLES = 7, 23
+# Number of pieces that are compared at a time, so that the arrays stay in the CPU cache.
+_BLOCK = 256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -221,19 +228,23 @@ class _PieceRefinement:
 
     def _deviations(self, rows: Indices) -> Floats:
         """Return the maximum deviations (n, 2) of the tool on pieces [m], [rad]."""
+        begin, end = np.searchsorted(self._sample_times, self.times[[rows, rows + 1]])
+        count = int(np.clip((end - begin).max(), *self._compared))
+        parts = np.arange(1, count + 1) / (count + 1)
+        blocks = [rows[k : k + _BLOCK] for k in range(0, len(rows), _BLOCK)]
+        return np.concatenate([self._deviations_at(parts, block) for block in blocks])
+
+    def _deviations_at(self, parts: Floats, rows: Indices) -> Floats:
+        """Return the maximum deviations (n, 2) at some parts of the pieces' times."""
         begin, end = self.times[rows], self.times[rows + 1]
-        sample_count = np.searchsorted(self._sample_times, end) - np.searchsorted(
-            self._sample_times, begin
-        )
-        count = int(np.clip(sample_count.max(), *self._compared))
-        t = (end - begin)[:, None] * (np.arange(1, count + 1) / (count + 1))
+        t = (end - begin)[:, None] * parts
         q = values(self._coefficients(rows), t).reshape(-1, 6)
         tool = tcp_rows(self.kinematics.arm, self.kinematics.T_flange_tcp, q)
-        spline, piece = self.path.spline, np.repeat(self.piece[rows], count)
+        spline, piece = self.path.spline, np.repeat(self.piece[rows], len(parts))
         wanted = spline.poses(piece, (begin[:, None] + t).ravel() - spline.times[piece])
-        distance = np.linalg.norm(tool[:, :3] - wanted[:, :3], axis=1)
+        distance = length_rows(tool[:, :3] - wanted[:, :3])
         deviation = np.stack([distance, angle_rows(wanted[:, 3:], tool[:, 3:])], axis=1)
-        largest: Floats = deviation.reshape(len(rows), count, 2).max(axis=1)
+        largest: Floats = deviation.reshape(*t.shape, 2).max(axis=1)
         return largest
 
     def _halve(self, rows: Indices) -> None:
