@@ -135,7 +135,12 @@ def test_a_tool_may_go_back_farther_than_max_plan_deviation(begins_later):
             await cell.until(lambda: place(cell) > wall - 0.08, 5.0)
             answer = await watch(cell)
         places = []
-        await cell.until(lambda: places.append(place(cell)) or motion.outcome, 10.0)
+
+        def has_ended():
+            places.append(place(cell))
+            return motion.outcome
+
+        await cell.until(has_ended, 10.0)
         assert STOPPED in motion.outcome.text
         await cell.until(answer)
         assert answer().ok
