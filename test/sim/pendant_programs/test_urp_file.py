@@ -55,7 +55,7 @@ def test_a_program_may_loop():
     [
         (b'def p():\nend\n', 'is no program file of PolyScope 3 or 5: '),
         (b'\x1f\x8bno gzip', 'is no program file of PolyScope 3 or 5: '),
-        (gzip.compress(b'<a/>')[:12], 'is no program file of PolyScope 3 or 5: '),
+        (gzip.compress(b'<a/>', mtime=0)[:12], 'is no program file of PolyScope 3 or 5: '),
         (b'<?xml version="1.0" encoding="martian"?><a/>', 'unknown encoding'),
         (gzip.compress(b' ' * 10_000_001), 'larger than 10000000 bytes'),
         (b'<!DOCTYPE a><a/>', 'it has a DOCTYPE'),
