@@ -79,8 +79,12 @@ def check_goes_on(driver, ur_sim):
 
 
 def test_a_congested_link_makes_no_reaction_late(ur_sim, driver, motion):
-    """States take about twice these 200 kB/s: each comes later than the one before."""
-    ur_sim.inject('throttle rtde 200000')
+    """
+    States take about four times these 100 kB/s: each comes later than the one before.
+
+    A busy computer that sends only half of the states congests the link, too.
+    """
+    ur_sim.inject('throttle rtde 100000')
     sleep(1.5)
     ur_sim.inject('offset pose x 0.004')
     begin = monotonic()
