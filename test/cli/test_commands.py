@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line: its output and its exit status."""
 
+from argparse import Namespace
+import asyncio
 from contextlib import nullcontext
 from io import StringIO
 import json
@@ -22,6 +24,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.ros.client import load_goal
+from ur_cartesian_driver.sim.command_line.console import run_command
 
 EXAMPLES = ['postures', 'seam', 'square']
 HOME = (
@@ -244,3 +247,42 @@ def test_the_picture_shows_what_was_recorded(tmp_path):
     drawing = tmp_path / 'picture.png'
     feedback_plot.draw(record, drawing, 'a line')
     assert drawing.read_bytes().startswith(b'\x89PNG')
+
+
+@pytest.fixture
+def own_signals():
+    """Restore the handlers that a command has set."""
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@pytest.mark.parametrize('number', SIGNALS)
+def test_a_signal_ends_a_loop_but_none_of_its_callbacks(own_signals, number):
+    """A callback that an exception ends may be the one that wakes a task."""
+    gone_on = []
+
+    def callback():
+        signal.raise_signal(number)
+        gone_on.append(number)
+
+    async def serve():
+        asyncio.get_running_loop().call_soon(callback)
+        await asyncio.sleep(10.0)
+
+    def run(_):
+        asyncio.run(serve())
+
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    assert run_command('serve', run, Namespace()) == 128 + number
+    assert gone_on == [number]
+
+
+@pytest.mark.parametrize('number', SIGNALS)
+def test_a_signal_interrupts_a_command_without_a_loop(own_signals, number):
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    assert run_command('serve', lambda _: signal.raise_signal(number), Namespace()) == 128 + number

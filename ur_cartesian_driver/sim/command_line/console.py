@@ -27,15 +27,25 @@ def run_command(
     # Background processes of a shell ignore SIGINT, and processes of nohup ignore SIGHUP. Only
     # SIGHUP stays ignored here.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    ended_by = signal.SIGINT
+
+    def end(number: int, frame: FrameType | None) -> None:
+        """Do what Ctrl-C does here: asyncio.run() cancels its task, so no callback is lost."""
+        nonlocal ended_by
+        ended_by = signal.Signals(number)
+        interrupt = signal.getsignal(signal.SIGINT)
+        assert callable(interrupt)
+        interrupt(number, frame)
+
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) != signal.SIG_IGN:
-            signal.signal(number, _end)
+            signal.signal(number, end)
     try:
         status = run(arguments)
         sys.stdout.flush()
         return status
     except KeyboardInterrupt as interrupt:
-        return SIGNAL_STATUS + (interrupt.args[0] if interrupt.args else signal.SIGINT)
+        return SIGNAL_STATUS + (interrupt.args[0] if interrupt.args else ended_by)
     except (DriverError, OSError, ValueError) as error:
         _discard_unwritten_output()
         with contextlib.suppress(OSError):
@@ -43,11 +53,6 @@ def run_command(
             print(f'{name}: {text}', file=sys.stderr)
         is_output_closed = isinstance(error, BrokenPipeError)
         return SIGNAL_STATUS + signal.SIGPIPE if is_output_closed else 1
-
-
-def _end(number: int, _frame: FrameType | None) -> None:
-    """Clean up as after Ctrl-C, but end with the exit status of this signal."""
-    raise KeyboardInterrupt(number)
 
 
 def _discard_unwritten_output() -> None:
