@@ -385,7 +385,9 @@ class GoalMonitor:
             return None
         clause = self._joint_check.path_violation(state)
         if clause is None and (self._path_check or press):
-            desired = self._retracted(self._tracked(state.actual_tcp_pose), self._desired(state))
+            desired = self._desired(state)
+            if self._may_retract():
+                desired = self._retracted(self._tracked(state.actual_tcp_pose), desired)
             if press is not None:
                 clause = press.excess(desired, state, self._tracker.time())
                 state = press.stiff_state(desired, state)
@@ -428,10 +430,13 @@ class GoalMonitor:
         shift = self._applied_offset.shift
         return Pose(subtract(pose.position, shift), pose.quaternion) if any(shift) else pose
 
+    def _may_retract(self) -> bool:
+        press = self._press()
+        return self.contact_is_watched or (press is not None and press.ends_at_contact)
+
     def _retracted(self, pose: Pose, planned: Pose) -> Pose:
         """Return the planned pose, or an earlier one if the tool retracts after contact."""
-        press = self._press()
-        if not self.contact_is_watched and (press is None or not press.ends_at_contact):
+        if not self._may_retract():
             return planned
         behind = self._tracker.behind(pose)
         return behind if behind.distance_to(pose) < planned.distance_to(pose) else planned

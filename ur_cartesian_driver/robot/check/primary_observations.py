@@ -233,7 +233,7 @@ async def _motion_version(
 ) -> Finding:
     """Ask for the motion version of movej and movel where the software has several."""
     check = 'motion_version'
-    known = has_feature(check, (version.major, version.minor, version.bugfix))
+    known = has_feature(check, version.release)
     if not known and version.major < POLYSCOPE_X:
         return ok(check, 'The software has motion version 1 only.', motion_version=1)
     if not (known and takes_scripts):
