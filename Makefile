@@ -44,7 +44,7 @@ demo-two: $(stamp)  ## The same with two arms at once, each with a goal of its o
 	$(bin)/ur-cartesian demo --arms 2
 
 test: $(stamp)  ## Lint, then all tests (PYTEST_ARGS='-k name' chooses)
-	$(MAKE) --no-print-directory --jobs 2 --output-sync lint interfaces
+	$(MAKE) --no-print-directory --jobs 2 lint interfaces
 	$(bin)/pytest --no-skips $(PYTEST_ARGS)
 
 # The UR driver's messages, for tests. Their build takes longer than a test may.
