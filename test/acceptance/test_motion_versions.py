@@ -60,9 +60,18 @@ def test_the_status_and_the_log_say_by_which_version_the_robot_moves(robot, repo
     run_cell(scenario, robot=robot)
 
 
+def test_the_version_is_unknown_while_the_robot_is_lost():
+    async def scenario(cell):
+        assert await known(cell) == 2
+        cell.robot.inject('drop rtde')
+        await cell.until(lambda: not cell.status.program_is_own)
+        assert cell.status.motion_version == 0
+
+    run_cell(scenario, robot=SECOND)
+
+
 async def hang_up(cell):
     await cell.end_driver()
-    cell.owner.silent = True
     await cell.start_driver()
 
 

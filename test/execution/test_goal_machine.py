@@ -725,7 +725,9 @@ def test_a_cancel_before_the_motion_waits_until_no_tcp_is_on_its_way():
     assert 'before anything moved' in end.text
 
 
-@pytest.mark.parametrize('result', set(TrajectoryResult) - {TrajectoryResult.TOUCHED})
+@pytest.mark.parametrize(
+    'result', [each for each in TrajectoryResult if each is not TrajectoryResult.TOUCHED]
+)
 def test_a_late_result_of_the_goal_before_does_not_arm(result):
     machine, _ = lent()
     assert machine.step(TrajectoryEnded(result=result), 0.1) == []

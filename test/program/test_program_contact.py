@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The watch for contact beside messages that come at the same time, for all delays between them.
+The watch for contact beside messages that come at the same time, for many delays between them.
 
 The threads of the program are switched at random.
 """

@@ -83,6 +83,9 @@ def test_a_watch_is_cancelled_and_refuses_another_one(single_cell, client):
 def test_a_watch_without_a_robot_program_is_aborted(single_cell, client):
     cell = single_cell
     watching = send(cell, client)
+    cell.spin_until(lambda: not cell.node.contact_action.idle)
+    # Calls are carried out in their order, so the watch has begun when this one is answered.
+    assert cell.node.driver.zero_ftsensor().ok
     cell.sim.stop_program()
     status, success, message = end(cell, watching)
     assert (status, success) == (GoalStatus.STATUS_ABORTED, False)

@@ -17,6 +17,8 @@ COMPUTING = (
     'test/acceptance/test_pre_flight.py',
     'test/faults/',
     'test/acceptance/test_announced_speeds.py',
+    'test/acceptance/test_contact_watch.py',
+    'test/acceptance/test_motion_versions.py',
     'test/acceptance/test_append.py',
     'test/acceptance/test_dwells.py',
     'test/acceptance/test_event_chains.py',

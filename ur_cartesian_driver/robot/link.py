@@ -403,6 +403,7 @@ class RobotLink:
             ConnectionEvent.ROBOT_LOST,
             calibration_known=False,
             program_is_own=False,
+            motion_version=0,
             last_error=last_error,
             message=f'No connection to the robot: {status_text.rstrip(".")}.',
         )

@@ -163,6 +163,7 @@ def test_a_watch_rejects_another_one_and_is_cancelled(ur, capfd):
 def test_a_watch_ends_with_the_program(ur, capfd):
     contact = watch(ur)
     watching = ur.send(contact, contact._action_type.Goal())
+    assert ur.io('zero_ftsensor').success  # carried out after the watch has begun
     assert ur.io('hand_back_control').success
     assert ur.result(watching)[0] == GoalStatus.STATUS_ABORTED
     assert 'The watch for contact ended with the robot program: ' in capfd.readouterr().err
