@@ -4,7 +4,6 @@
 
 import gc
 from importlib.util import find_spec
-import os
 import socket
 
 from hypothesis import settings
@@ -67,12 +66,11 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
-    if config.getoption('--overlap') and hasattr(config, 'workerinput'):
-        from overlap import is_for_computing, LOW_PRIORITY
-
-        if is_for_computing(config.workerinput['workerid']):
-            os.nice(LOW_PRIORITY)
     plugins = config.pluginmanager
+    if config.getoption('--overlap') and hasattr(config, 'workerinput'):
+        from overlap import LowPriority
+
+        plugins.register(LowPriority())
     if all(map(plugins.hasplugin, ('rerunfailures', 'xdist'))) and not config.option.usepdb:
         from standstill import Standstill
 

@@ -3,13 +3,15 @@
 """
 Tests that compute fill the time in which others wait for a clock.
 
-``--overlap`` makes every other worker of pytest-xdist one for tests that only compute. It runs at
-a low priority, so that a test with sockets and deadlines has a processor when it needs one; the
-other workers help when no such test is left.
+``--overlap`` makes every other worker of pytest-xdist one for tests that only compute. These run
+at a low priority, so that a test with sockets and deadlines has a processor when it needs one. The
+other workers help, at the same priority, when no such test is left.
 """
 
 from bisect import bisect_left
+import os
 
+import pytest
 from xdist.scheduler import LoadScheduling
 
 #: Tests that read no clock, by the rules for their packages or in virtual time; long ones first.
@@ -75,6 +77,20 @@ def is_for_computing(worker: str) -> bool:
 def rank(test: str) -> int:
     """Return the place of a test's path among those that compute; -1: it waits."""
     return next((i for i, path in enumerate(COMPUTING) if test.startswith(path)), -1)
+
+
+class LowPriority:
+    """A plugin for a worker: from its first test that computes on, it has a low priority."""
+
+    def __init__(self) -> None:
+        self.is_low = False
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        """No test that waits follows on this worker: the scheduler hands these out first."""
+        if not self.is_low and rank(nodeid) >= 0:
+            os.nice(LOW_PRIORITY)
+            self.is_low = True
 
 
 class Overlap(LoadScheduling):
