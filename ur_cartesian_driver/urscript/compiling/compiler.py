@@ -9,7 +9,8 @@ Work is counted in nodes of the tree. Entering a block of statements pays for al
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+import inspect
 from types import CodeType
 
 from ur_cartesian_driver.urscript.compiling.expression_compiler import (
@@ -20,6 +21,7 @@ from ur_cartesian_driver.urscript.compiling.expression_compiler import (
 )
 from ur_cartesian_driver.urscript.compiling.generated_code import (
     FILE_NAME,
+    FunctionCode,
     GeneratedCode,
     GeneratedFunction,
     global_name,
@@ -33,6 +35,11 @@ from ur_cartesian_driver.urscript.script_errors import CompileError
 #: Python keeps the interpreter lock while it compiles, which delays the cycles. So a long block of
 #: a program's body is compiled in parts of about this many nodes, about 3 ms.
 MAX_NODES = 400
+
+
+#: The code of the functions that were compiled last, see :func:`_function_code`.
+_functions: dict[Hashable, FunctionCode] = {}
+MAX_FUNCTIONS = 2000
 
 
 def compile_program(
@@ -60,14 +67,35 @@ def compile_program(
         for i, scope in enumerate(scopes)
     }
     shared = Shared(builtins, interleaves, {**known, **functions})
-    units = [unit for scope in scopes for unit in _FunctionCompiler(scope, shared).units()]
+    timed = frozenset(
+        name for name, builtin in builtins.items() if inspect.isgeneratorfunction(builtin)
+    )
+    names = interleaves, timed, frozenset(root.globals), tuple(functions.values())
     return GeneratedCode(
         scope=root,
         main=functions[id(root)],
         functions=functions,
-        units=tuple(units),
-        constants=shared.constants,
+        code=[_function_code(scope, shared, None if known else names) for scope in scopes],
     )
+
+
+def _function_code(scope: Scope, shared: Shared, names: Hashable) -> FunctionCode:
+    """
+    Return the code of a function, which is compiled only once.
+
+    Clients send programs that differ in a constant or two, such as a port.
+
+    :param names: all that the names in the function can mean; None = compile in any case.
+    """
+    key = names, shared.functions[id(scope)], scope.definition
+    found = _functions.get(key) if names and scope.definition else None
+    if found is None:
+        found = _FunctionCompiler(scope, shared).code()
+        if names and scope.definition:
+            while len(_functions) >= MAX_FUNCTIONS:
+                _functions.pop(next(iter(_functions)), None)
+            _functions[key] = found
+    return found
 
 
 #: Statements that leave a loop or the function around it.
@@ -88,8 +116,8 @@ class _FunctionCompiler(ExpressionCompiler):
         #: Global variables that the present part assigns to.
         self._assigned: set[str] = set()
 
-    def units(self) -> Iterator[CodeType]:
-        """Yield the code of the parts, then that of the function itself."""
+    def code(self) -> FunctionCode:
+        """Return the code of the function and of its parts."""
         self.at(self._scope.owner)
         body: list[ast.stmt] = []
         definition = self._scope.definition
@@ -104,8 +132,7 @@ class _FunctionCompiler(ExpressionCompiler):
                 body.append(self.if_true(is_unset, [self.set(name, default.python)]))
         body += self._block(self._scope.body, self._scope.owner)
         unit = self._unit(self._function.name, body, parameters)
-        yield from self._parts
-        yield unit
+        return FunctionCode((*self._parts, unit), self._constants)
 
     def _unit(
         self,
@@ -148,8 +175,9 @@ class _FunctionCompiler(ExpressionCompiler):
 
     def _runs(self, statements: tree.StatementBlock) -> Iterator[tree.StatementBlock]:
         """Divide statements into runs; each of several ones is compiled as a part."""
-        sizes = [_count_nodes(statement) for statement in statements]
-        if self._scope.definition is not None or sum(sizes) < 2 * MAX_NODES:
+        # The variables of a function are not global.
+        sizes = [0 if self._scope.definition else _count_nodes(each) for each in statements]
+        if sum(sizes) < 2 * MAX_NODES:
             yield from ((statement,) for statement in statements)
             return
         begin, size = 0, 0

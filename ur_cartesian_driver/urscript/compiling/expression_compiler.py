@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 import inspect
 
 from ur_cartesian_driver.urscript import script_values as values
@@ -54,13 +54,12 @@ class Code:
 
 @dataclass(slots=True)
 class Shared:
-    """What the code of all functions of a program has in common."""
+    """What the functions of a program have in common."""
 
     builtins: Mapping[str, Builtin]
     interleaves: bool
     #: Functions by the identity of their scopes.
     functions: dict[int, GeneratedFunction]
-    constants: dict[str, Value] = field(default_factory=dict)
 
 
 class ExpressionCompiler(PythonWriter):
@@ -71,6 +70,8 @@ class ExpressionCompiler(PythonWriter):
         self._scope = scope
         self._shared = shared
         self._temporaries = 0
+        #: Values that the code finds by name; none of them can change.
+        self._constants: dict[str, Value] = {}
 
     def temporary(self) -> str:
         """Return the name of a new variable for intermediate values."""
@@ -173,8 +174,9 @@ class ExpressionCompiler(PythonWriter):
             return Code(self.call('make_list' if is_list else 'make_pose', items), weight)
         if is_list:
             return Code(items, weight)
-        name = f'pose{len(self._shared.constants)}'
-        self._shared.constants[name] = values.make_pose(numbers)
+        function = self._shared.functions[id(self._scope)].name
+        name = f'{function}_pose{len(self._constants)}'
+        self._constants[name] = values.make_pose(numbers)
         return Code(self.name(name), weight)
 
     def _unary(self, node: tree.UnaryExpression) -> Code:

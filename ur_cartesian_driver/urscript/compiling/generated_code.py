@@ -10,7 +10,7 @@ position of an error, or of a call, is that of its instruction.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 import dis
 from itertools import islice
@@ -49,6 +49,16 @@ class GeneratedFunction:
     suspends: bool
 
 
+@dataclass(frozen=True, slots=True)
+class FunctionCode:
+    """The code of a function and of its parts."""
+
+    #: Each defines a function of Python when it is executed.
+    units: Sequence[CodeType]
+    #: Values that the code finds by name; none of them can change.
+    constants: dict[str, Value]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GeneratedCode:
     """The code of a program or line. It holds no state, so any number of interpreters run it."""
@@ -57,10 +67,7 @@ class GeneratedCode:
     main: GeneratedFunction
     #: The functions and threads, by the identity of their scopes.
     functions: dict[int, GeneratedFunction]
-    #: Each defines a function when it is executed.
-    units: tuple[CodeType, ...]
-    #: Values that the code uses by name; none can change.
-    constants: dict[str, Value]
+    code: Sequence[FunctionCode]
 
 
 def builtin_name(function: str) -> str:

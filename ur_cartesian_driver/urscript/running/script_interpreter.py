@@ -191,9 +191,10 @@ class ScriptInterpreter:
 
     def begin(self, code: GeneratedCode) -> ScriptSteps:
         """Add the code of the program or of a line; return the steps of its main thread."""
-        self._names |= code.constants
-        for unit in code.units:
-            exec(unit, self._names)
+        for function in code.code:
+            self._names |= function.constants
+            for unit in function.units:
+                exec(unit, self._names)
         return _steps(self._names.pop(code.main.name))
 
     def forget(self, variables: Iterable[str]) -> None:
