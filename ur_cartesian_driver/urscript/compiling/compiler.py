@@ -301,14 +301,14 @@ class _FunctionCompiler(ExpressionCompiler):
     def _assign_part(self, node: tree.AssignStatement) -> tuple[list[ast.stmt], int]:
         """Compile an assignment to a part of a variable, such as `a.b[i] = value`."""
         value = self.copied(node.value)
-        stored = self.temporary()
+        stored, path = self.temporary(), self.temporary()
         self.at(node)
         python = [self.set(stored, value.python)]
         base, keys, weight = self._path(node.target)
         self.at(node)
+        python.append(self.set(path, self.key(keys)))
         name = self._assigned_variable(base.identifier)
-        path = self.key(keys)
-        changed = self.call('set_part', self.name(name), path, self.name(stored))
+        changed = self.call('set_part', self.name(name), self.name(path), self.name(stored))
         return [*python, self.set(name, changed)], 1 + value.weight + weight
 
     def _path(self, target: tree.Expression) -> tuple[tree.NameExpression, list[ast.expr], int]:

@@ -293,26 +293,21 @@ class ExpressionCompiler(PythonWriter):
 
     def _call(self, node: tree.CallExpression, callee: Scope) -> Code:
         assert callee.definition is not None
-        bound = bind(callee.definition, node)
-        arguments = {name: self.copied(argument.value) for name, argument in bound.items()}
+        positional: list[ast.expr] = []
+        named: dict[str, ast.expr] = {}
+        weight = 1
+        for name, argument in bind(callee.definition, node).items():
+            code = self.copied(argument.value)
+            weight += code.weight
+            if argument.name is None and not named:
+                positional.append(code.python)
+            else:
+                named[local_name(name)] = code.python
         self.at(node)
         depth = self.node(ast.BinOp, self.name(DEPTH), ast.Add(), self.constant(1))
         function = self._shared.functions[id(callee)]
-        named = {local_name(name): code.python for name, code in arguments.items()}
-        in_order = [local_name(each.name) for each in callee.definition.parameters]
-        count = next(
-            (
-                i
-                for i, names in enumerate(zip(named, in_order, strict=False))
-                if len(set(names)) > 1
-            ),
-            len(named),
-        )
-        positional = [named.pop(name) for name in list(named)[:count]]
         call: ast.expr = self.call(function.name, depth, *positional, **named)
-        if function.suspends:
-            call = self.steps(call)
-        return Code(call, 1 + sum(code.weight for code in arguments.values()))
+        return Code(self.steps(call) if function.suspends else call, weight)
 
     def _builtin(self, node: tree.CallExpression) -> Code:
         call = self._builtin_call(node)
