@@ -7,12 +7,14 @@ The manual deduces the type of a variable from its first assignment, and says no
 fraction that an int is given then.
 """
 
+import ast
 from itertools import chain
 
 import pytest
 
+from ur_cartesian_driver.sim.programs import program_runner
 from ur_cartesian_driver.urscript.compiling import compiler
-from ur_cartesian_driver.urscript.compiling.closures import CompiledNode
+from ur_cartesian_driver.urscript.compiling.operations import operations
 from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
 from ur_cartesian_driver.urscript.script_values import Matrix
 
@@ -28,33 +30,35 @@ def kinds(value):
 def widened(monkeypatch):
     """Return the names of variables that have been given a fraction after an int."""
     found = set()
-    assign = compiler._Compiler._assign
+    assign = compiler._FunctionCompiler._assign
 
     def checked(self, node):
-        code = assign(self, node)
+        python, weight = assign(self, node)
         name = node.target
         while not isinstance(name, tree.NameExpression):
             name = name.target
-        slot, is_local = self._slot(name.identifier, node.qualifier)
+        variable, held_ints = self.variable(name.identifier, node.qualifier), self.temporary()
+        text = (
+            f'try:\n {held_ints} = holds_ints({variable})\n'
+            f'except NameError:\n {held_ints} = False\n'
+            f'check_kinds({name.identifier!r}, {held_ints}, {variable})\n'
+        )
+        before, after = ast.parse(text).body
+        return [before, *python, after], weight
 
-        def holds_ints(frame):
-            return kinds((frame if is_local else self._runtime.globals)[slot]) == {int}
+    def holds_ints(value):
+        return kinds(value) == {int}
 
-        def check(frame, before):
-            if before and float in kinds((frame if is_local else self._runtime.globals)[slot]):
-                found.add(name.identifier)
+    def check_kinds(name, held_ints, value):
+        if held_ints and float in kinds(value):
+            found.add(name)
 
-        def plain(frame):
-            before = holds_ints(frame)
-            code.run(frame)
-            check(frame, before)
+    def with_checks(runtime):
+        checks = {'holds_ints': holds_ints, 'check_kinds': check_kinds}
+        return operations(runtime) | checks
 
-        def steps(frame):
-            before = holds_ints(frame)
-            yield from code.run(frame)
-            check(frame, before)
-
-        return CompiledNode(steps if code.suspends else plain, code.suspends, code.weight)
-
-    monkeypatch.setattr(compiler._Compiler, '_assign', checked)
+    monkeypatch.setattr(compiler._FunctionCompiler, '_assign', checked)
+    interpreter = 'ur_cartesian_driver.urscript.running.script_interpreter'
+    monkeypatch.setattr(f'{interpreter}.operations', with_checks)
+    monkeypatch.setattr(program_runner, '_compiled', {})
     return found

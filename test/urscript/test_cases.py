@@ -96,10 +96,10 @@ def standard_builtins(output: list[str]) -> dict[str, Any]:
     }
 
 
-def run(text: str, *, lazily: bool) -> Outcome:
+def run(text: str) -> Outcome:
     outcome = Outcome()
     try:
-        machine = ScriptInterpreter(parse(text), standard_builtins(outcome.output), lazily=lazily)
+        machine = ScriptInterpreter(parse(text), standard_builtins(outcome.output))
     except CompileError as error:
         outcome.compile_error = f'{error.line}:{error.column} {error.text}'
         return outcome
@@ -127,8 +127,7 @@ def expectations(text: str) -> Outcome:
 @pytest.mark.parametrize('path', CASES, ids=lambda path: f'{path.parent.name}/{path.stem}')
 def test_program_does_what_its_comments_say(path: Path) -> None:
     text = path.read_text()
-    for lazily in (False, True):
-        assert run(text, lazily=lazily) == expectations(text)
+    assert run(text) == expectations(text)
 
 
 def test_every_program_expects_something() -> None:

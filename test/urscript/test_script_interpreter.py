@@ -558,7 +558,7 @@ def test_programs_with_one_scope_share_neither_variables_nor_lines() -> None:
     first = ScriptInterpreter(program, builtins)
     first.step()
     first.lines.compile('added = 2')
-    second = ScriptInterpreter(program, builtins, scope=first.scope)
+    second = ScriptInterpreter(program, builtins, code=first.code)
     assert second.variables == {}
     second.step()
     assert first.variables == second.variables == {'count': 1}

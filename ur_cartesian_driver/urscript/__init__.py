@@ -4,7 +4,7 @@
 URScript, the language of the robot's programs, without a robot.
 
 `parsing` turns text into tokens and a syntax tree, `compiling` resolves the names and turns the
-tree into Python closures, and `running` runs them in threads, one controller cycle at a time, with
+tree into Python code, and `running` runs them in threads, one controller cycle at a time, with
 the values of `script_values`. Builtins give a program access to a robot; the code that makes the
 interpreter provides them. `core_builtins` contains the builtins that need no robot.
 """

@@ -110,7 +110,11 @@ def type_name(value: Value) -> str:
     return names.get(type(value), type(value).__name__)
 
 
-_NUMBERS = frozenset({int, float})
+#: Types of numbers; a bool is none.
+NUMBERS = frozenset({int, float})
+
+
+_FLOATS = frozenset({float})
 
 
 def is_number(value: Value) -> TypeGuard[int | float]:
@@ -137,16 +141,18 @@ SIZED = frozenset({list, Matrix, Struct})
 def size_of(value: Value) -> int:
     """Return the number of plain values that a value holds."""
     kind = type(value)
+    if kind not in SIZED:
+        return 1
     if kind is list:
         return sum(map(size_of, value)) if Struct in map(type, value) else len(value)
     if kind is Matrix:
         return len(value.rows) * len(value.rows[0])
-    return sum(map(size_of, value.fields.values())) if kind is Struct else 1
+    return sum(map(size_of, value.fields.values()))
 
 
 def work_on(a: Value, b: Value) -> int:
     """Return the number of plain values that an operation on two values handles."""
-    if isinstance(a, Matrix) and isinstance(b, Matrix):
+    if type(a) is Matrix and type(b) is Matrix:
         return size_of(a) * b.shape[1]
     return size_of(a) + size_of(b)
 
@@ -191,7 +197,7 @@ def truth(value: Value) -> bool:
 def _ordering(symbol: str, holds: Callable[[Any, Any], bool]) -> Callable[[Value, Value], bool]:
     def compare(a: Value, b: Value) -> bool:
         kind_a, kind_b = type(a), type(b)
-        if (kind_a in _NUMBERS and kind_b in _NUMBERS) or (kind_a is str and kind_b is str):
+        if (kind_a in NUMBERS and kind_b in NUMBERS) or (kind_a is str and kind_b is str):
             return holds(a, b)
         raise _unsupported(symbol, a, b)
 
@@ -212,13 +218,6 @@ def bounded(text: str) -> str:
     if len(text) > MAX_STRING:
         raise RuntimeException(f'The string is longer than {MAX_STRING} characters.')
     return text
-
-
-def _add(a: Value, b: Value) -> Value:
-    """Return a sum, or the concatenation of two strings."""
-    if type(a) is str and type(b) is str:
-        return bounded(a + b)
-    return _sum(a, b)
 
 
 def _checked(result: int | float) -> int | float:
@@ -249,7 +248,7 @@ def _arithmetic(
 
     def operate(a: Value, b: Value) -> Value:
         kind_a, kind_b = type(a), type(b)
-        if kind_a in _NUMBERS and kind_b in _NUMBERS:
+        if kind_a in NUMBERS and kind_b in NUMBERS:
             result = compute(a, b)
             return _checked(result) if type(result) is int else result
         if kind_a is Matrix or kind_b is Matrix:
@@ -259,15 +258,22 @@ def _arithmetic(
                 raise RuntimeException(
                     f'{symbol!r} needs lists of equal length, not {len(a)} and {len(b)}'
                 )
-            return [on_items(x, y) for x, y in zip(a, b, strict=True)]
-        if kind_a is list and is_number(b):
-            return [on_items(x, b) for x in a]
-        if kind_b is list and is_number(a):
-            return [on_items(a, y) for y in b]
+            return on_lists(a, b)
+        if kind_a is list and kind_b in NUMBERS:
+            return on_lists(a, [b] * len(a))
+        if kind_b is list and kind_a in NUMBERS:
+            return on_lists([a] * len(b), b)
+        if symbol == '+' and kind_a is str and kind_b is str:
+            return bounded(a + b)
         raise _unsupported(symbol, a, b)
 
+    def on_lists(a: list[Value], b: list[Value]) -> list[Value]:
+        if _FLOATS.issuperset(map(type, a)) and _FLOATS.issuperset(map(type, b)):
+            return list(map(compute, a, b))  # most lists; none of the results needs a check
+        return list(map(on_items, a, b))
+
     def on_items(a: Value, b: Value) -> int | float:
-        if type(a) in _NUMBERS and type(b) in _NUMBERS:
+        if type(a) in NUMBERS and type(b) in NUMBERS:
             result = compute(a, b)
             return _checked(result) if type(result) is int else result
         raise _unsupported(symbol, a, b)
@@ -330,10 +336,8 @@ def identity(value: Value) -> Value:
     raise RuntimeException(f"Type error: '+' is not defined for {type_name(value)}")
 
 
-_sum = _arithmetic('+', operator.add)
-
 BINARY: dict[str, Callable[[Value, Value], Value]] = {
-    '+': _add,
+    '+': _arithmetic('+', operator.add),
     '-': _arithmetic('-', operator.sub),
     '*': _arithmetic('*', operator.mul),
     '/': _arithmetic('/', _divide),
@@ -345,19 +349,6 @@ BINARY: dict[str, Callable[[Value, Value], Value]] = {
     '>': _ordering('>', operator.gt),
     '>=': _ordering('>=', operator.ge),
 }
-
-#: The operations of BINARY that cannot fail on two floats.
-ON_FLOATS: dict[str, Callable[[Value, Value], Value]] = {
-    '+': operator.add, '-': operator.sub, '*': operator.mul, '==': operator.eq,
-    '!=': operator.ne, '<': operator.lt, '<=': operator.le, '>': operator.gt, '>=': operator.ge,
-}  # fmt: skip
-
-UNARY: dict[str, Callable[[Value], Value]] = {
-    '-': negate,
-    '+': identity,
-    'not': lambda value: not truth(value),
-}
-
 
 # Parts of values
 

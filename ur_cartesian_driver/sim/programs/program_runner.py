@@ -33,7 +33,7 @@ from ur_cartesian_driver.urscript import (
     ScriptInterpreter,
     ScriptProgram,
 )
-from ur_cartesian_driver.urscript.compiling.scopes import Scope
+from ur_cartesian_driver.urscript.compiling.generated_code import GeneratedCode
 
 _log = logging.getLogger(__name__)
 
@@ -43,6 +43,11 @@ GenerateScript: TypeAlias = Callable[[Callable[[str], None]], None]
 
 #: A cache, because clients send the same program again and again; syntax trees are immutable.
 _parse_cached = lru_cache(maxsize=8)(parse)
+
+#: The code of the programs that were compiled last, for all controllers of this process: each with
+#: the program, whose identity is part of the key.
+_compiled: dict[Hashable, tuple[ScriptProgram, GeneratedCode]] = {}
+MAX_COMPILED = 8
 
 #: States of a program that has not ended.
 RUNNING = frozenset(
@@ -134,8 +139,10 @@ class ProgramRunner:
         self._awaited: object | None = None
         #: Why the program that `play` should start has not started; empty = it has.
         self.start_failure = ''
-        #: Names of the program that was compiled last, for reuse if the same program follows.
-        self._newest_scope: Scope | None = None
+        #: What compiled code depends on, beside the program.
+        self._signatures = frozenset(
+            (name, getattr(function, '__code__', function)) for name, function in builtins.items()
+        )
         #: Name of the program that was loaded for `play`, empty if none was.
         self.loaded = ''
         self.state = RuntimeState.STOPPED
@@ -256,17 +263,19 @@ class ProgramRunner:
         generate(lambda text: self.compile_aside(lambda: self._compile_text(text), end_wait))
 
     def _compile(self, program: ScriptProgram) -> ScriptInterpreter:
-        known = self._newest_scope
+        key = id(program), self._interleaving is not None, self._signatures
+        _, code = _compiled.get(key, (program, None))
         interpreter = ScriptInterpreter(
             program,
             self._builtins,
             thread_delay=self._thread_delay,
             interleaving=self._interleaving,
-            # A separate thread compiles the whole program at once, so no cycle has to wait later.
-            lazily=self.compile_aside is _compile_at_once,
-            scope=known if known is not None and known.owner is program else None,
+            code=code,
         )
-        self._newest_scope = interpreter.scope
+        if code is None:
+            while len(_compiled) >= MAX_COMPILED:
+                _compiled.pop(next(iter(_compiled)), None)
+            _compiled[key] = program, interpreter.code
         return interpreter
 
     def _queue_start(self, name: str, interpreter: ScriptInterpreter) -> None:

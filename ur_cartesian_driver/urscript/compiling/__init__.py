@@ -1,3 +1,3 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Syntax tree to resolved names to Python closures."""
+"""Syntax tree to resolved names to Python code."""

@@ -1,374 +1,393 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Compiles syntax trees to Python closures, once per program, so that a cycle costs little.
+Compiles syntax trees to Python code, once per program, so that a cycle costs little.
 
 Work is counted in nodes of the tree. Entering a block of statements pays for all its nodes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any, NoReturn
+import ast
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+import inspect
+from types import CodeType
 
-from ur_cartesian_driver.urscript import script_values as values
-from ur_cartesian_driver.urscript.compiling.closures import (
-    BREAK,
-    choose_runner,
-    CompiledFunction,
-    CompiledNode,
-    CONTINUE,
-    ProgramHalted,
-    RETURN,
-    Runtime,
-    ScriptSteps,
-    sequence,
-    StackFrame,
-    SWITCH,
-    UNSET,
+from ur_cartesian_driver.urscript.compiling.expression_compiler import (
+    Code,
+    DEPTH,
+    ExpressionCompiler,
+    Shared,
 )
-from ur_cartesian_driver.urscript.compiling.expression_compiler import ExpressionCompiler
-from ur_cartesian_driver.urscript.compiling.scopes import Builtin, FIRST_LOCAL, Scope
+from ur_cartesian_driver.urscript.compiling.generated_code import (
+    FILE_NAME,
+    FunctionCode,
+    GeneratedCode,
+    GeneratedFunction,
+    global_name,
+    local_name,
+    MAX_CALL_DEPTH,
+)
+from ur_cartesian_driver.urscript.compiling.scopes import Builtin, Scope
 from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
-from ur_cartesian_driver.urscript.script_values import Value
+from ur_cartesian_driver.urscript.script_errors import CompileError
+
+#: Python keeps the interpreter lock while it compiles, which delays the cycles. So a long block of
+#: a program's body is compiled in parts of about this many nodes, about 3 ms.
+MAX_NODES = 400
+
+
+#: The code of the functions that were compiled last, see :func:`_function_code`.
+_functions: dict[Hashable, FunctionCode] = {}
+MAX_FUNCTIONS = 2000
 
 
 def compile_program(
     root: Scope,
     builtins: Mapping[str, Builtin],
-    runtime: Runtime,
-    procedures: dict[int, CompiledFunction],
+    known: Mapping[int, GeneratedFunction],
     *,
-    lazily: bool = False,
-) -> CompiledFunction:
+    interleaves: bool,
+    prefix: str = '',
+) -> GeneratedCode:
     """
-    Compile a checked program and return the body of its main thread.
+    Compile a checked program.
 
-    :param procedures: the functions that exist already, by the id of their scopes; the functions
-        of the program are added to them.
-    :param lazily: compile each function when it is called for the first time.
+    :param known: the functions that exist already, by the identity of their scopes.
+    :param interleaves: whether threads may be switched between any two statements.
+    :param prefix: begin of the names of all generated functions.
+    :raises CompileError: more loops in loops than Python can have.
     """
-    procedures |= {id(scope): _procedure(scope, runtime.interleaves) for scope in root.walk()}
-    for scope in root.walk():
-        compiler = _Compiler(scope, builtins, runtime, procedures)
-        compiler.fill(procedures[id(scope)], lazily=lazily)
-    return procedures.pop(id(root))
-
-
-def _procedure(scope: Scope, interleaves: bool) -> CompiledFunction:
-    """Return a function without its body; bodies come later, because functions call each other."""
-    return CompiledFunction(
-        name=scope.definition.name if scope.definition else '',
-        suspends=scope.suspends or interleaves,
-        template=[None] + [UNSET] * len(scope.locals),
+    scopes = list(root.walk())
+    functions = {
+        id(scope): GeneratedFunction(
+            f'{prefix}f{i}_{scope.definition.name}' if scope.definition else f'{prefix}main',
+            scope.suspends or interleaves,
+        )
+        for i, scope in enumerate(scopes)
+    }
+    shared = Shared(builtins, interleaves, {**known, **functions})
+    timed = frozenset(
+        name for name, builtin in builtins.items() if inspect.isgeneratorfunction(builtin)
+    )
+    names = interleaves, timed, frozenset(root.globals), tuple(functions.values())
+    return GeneratedCode(
+        scope=root,
+        main=functions[id(root)],
+        functions=functions,
+        code=[_function_code(scope, shared, None if known else names) for scope in scopes],
     )
 
 
-class _Compiler(ExpressionCompiler):
-    """Compiles the body of one function."""
+def _function_code(scope: Scope, shared: Shared, names: Hashable) -> FunctionCode:
+    """
+    Return the code of a function, which is compiled only once.
 
-    def fill(self, procedure: CompiledFunction, *, lazily: bool) -> None:
-        """Compile body and defaults into a procedure."""
-        procedure.body = self._body_of_first_call(procedure) if lazily else self._body()
-        parameters = self._scope.definition.parameters if self._scope.definition else ()
-        for slot, parameter in enumerate(parameters, FIRST_LOCAL):
+    Clients send programs that differ in a constant or two, such as a port.
+
+    :param names: all that the names in the function can mean; None = compile in any case.
+    """
+    key = names, shared.functions[id(scope)], scope.definition
+    found = _functions.get(key) if names and scope.definition else None
+    if found is None:
+        found = _FunctionCompiler(scope, shared).code()
+        if names and scope.definition:
+            while len(_functions) >= MAX_FUNCTIONS:
+                _functions.pop(next(iter(_functions)), None)
+            _functions[key] = found
+    return found
+
+
+#: Statements that leave a loop or the function around it.
+_BREAK, _CONTINUE, _RETURN = 'break', 'continue', 'return'
+
+
+class _FunctionCompiler(ExpressionCompiler):
+    """Compiles one function, thread or body of a program."""
+
+    def __init__(self, scope: Scope, shared: Shared) -> None:
+        super().__init__(scope, shared)
+        self._function = shared.functions[id(scope)]
+        self._parts: list[CodeType] = []
+        #: Loops around the present statement in the present part.
+        self._loops = 0
+        #: The statements by which the present part leaves code around it; None = this is no part.
+        self._exits: set[str] | None = None
+        #: Global variables that the present part assigns to.
+        self._assigned: set[str] = set()
+
+    def code(self) -> FunctionCode:
+        """Return the code of the function and of its parts."""
+        self.at(self._scope.owner)
+        body: list[ast.stmt] = []
+        definition = self._scope.definition
+        parameters = definition.parameters if definition else ()
+        if definition is not None:
+            is_too_deep = self.compare(self.name(DEPTH), ast.Gt(), self.constant(MAX_CALL_DEPTH))
+            body.append(self.if_true(is_too_deep, [self.do(self.call('too_deep'))]))
+        for parameter in parameters:
             if parameter.default is not None:
-                procedure.defaults[slot] = self.copied_expression(parameter.default)
+                name, default = local_name(parameter.name), self.copied(parameter.default)
+                is_unset = self.compare(self.name(name), ast.Is(), self.name('UNSET'))
+                body.append(self.if_true(is_unset, [self.set(name, default.python)]))
+        body += self._block(self._scope.body, self._scope.owner)
+        unit = self._unit(self._function.name, body, parameters)
+        return FunctionCode((*self._parts, unit), self._constants)
 
-    def _body(self) -> CompiledNode:
-        return self._block(self._scope.body, self._scope.owner)
+    def _unit(
+        self,
+        name: str,
+        body: list[ast.stmt],
+        parameters: Sequence[tree.FunctionParameter] = (),
+    ) -> CodeType:
+        """Compile the definition of a function of Python."""
+        self.at(self._scope.owner)
+        if self._assigned:
+            body.insert(0, self.node(ast.Global, sorted(self._assigned)))
+        if self._function.suspends:  # also if nothing in it takes time
+            body.append(self.if_true(self.constant(False), [self.do(self.wait())]))
+        # Python wants a default for each parameter behind the first one that has one.
+        optional = [i for i, each in enumerate(parameters) if each.default is not None]
+        defaults = len(parameters) - optional[0] if optional else 0
+        names = (DEPTH, *(local_name(parameter.name) for parameter in parameters))
+        function = self.function(name, names, defaults, body)
+        try:
+            return compile(ast.Module([function], []), FILE_NAME, 'exec', dont_inherit=True)
+        except SyntaxError as error:  # too many loops in loops
+            owner = self._scope.owner
+            text = f'syntax_error_on_line:{owner.line}:'
+            raise CompileError(owner.line, owner.column, text, error.msg) from None
 
-    def _body_of_first_call(self, procedure: CompiledFunction) -> CompiledNode:
-        """Return code that, when first run, replaces itself by the compiled body and runs that."""
+    # Statements of the program
 
-        def plain(frame: StackFrame) -> Any:
-            procedure.body = self._body()
-            return procedure.body.run(frame)
-
-        def steps(frame: StackFrame) -> ScriptSteps:
-            body = procedure.body = self._body()
-            return (yield from body.run(frame)) if body.suspends else body.run(frame)
-
-        return CompiledNode(steps if procedure.suspends else plain, procedure.suspends)
-
-    def _block(self, statements: tree.StatementBlock, owner: tree.SyntaxNode) -> CompiledNode:
+    def _block(self, statements: tree.StatementBlock, owner: tree.SyntaxNode) -> list[ast.stmt]:
         """Compile consecutive statements; all their nodes are paid for at the beginning."""
-        first = statements[0] if statements else owner
-        call_location = (first.line, first.column)
-        codes = [code for statement in statements for code in self._statement(statement)]
-        weight = 1 + sum(code.weight for code in codes)
-        runs = [code.run for code in codes]
-        pairs = [(code.run, code.suspends) for code in codes]
-        runtime = self._runtime
+        weight = 1
+        body: list[ast.stmt] = []
+        for run in self._runs(statements):
+            python, cost = self._part(run) if len(run) > 1 else self._statement_at_switch(run[0])
+            body += python
+            weight += cost
+        self.at(statements[0] if statements else owner)
+        is_spent = self.compare(self.runtime('fuel'), ast.Lt(), self.constant(0))
+        exceed = self.if_true(is_spent, [self.do(self.call('exceed_budget'))])
+        return [self.pay(weight), exceed, *body]
 
-        def plain(frame: StackFrame) -> str | None:
-            runtime.fuel -= weight
-            if runtime.fuel < 0:
-                runtime.raise_budget_exceeded(*call_location)
-            for run in runs:
-                signal: str | None = run(frame)
-                if signal is not None:
-                    return signal
-            return None
+    def _runs(self, statements: tree.StatementBlock) -> Iterator[tree.StatementBlock]:
+        """Divide statements into runs; each of several ones is compiled as a part."""
+        # The variables of a function are not global.
+        sizes = [0 if self._scope.definition else _count_nodes(each) for each in statements]
+        if sum(sizes) < 2 * MAX_NODES:
+            yield from ((statement,) for statement in statements)
+            return
+        begin, size = 0, 0
+        for i, each in enumerate(sizes):
+            size += each
+            if size >= MAX_NODES:
+                yield statements[begin : i + 1]
+                begin, size = i + 1, 0
+        if begin < len(statements):
+            yield statements[begin:]
 
-        def steps(frame: StackFrame) -> ScriptSteps:
-            runtime.fuel -= weight
-            if runtime.fuel < 0:
-                runtime.raise_budget_exceeded(*call_location)
-            for run, suspends in pairs:
-                signal = (yield from run(frame)) if suspends else run(frame)
-                if signal is not None:
-                    return signal
-            return None
+    def _part(self, statements: tree.StatementBlock) -> tuple[list[ast.stmt], int]:
+        """Compile statements as a function of their own; all their variables are global."""
+        around = self._loops, self._exits, self._assigned
+        self._loops, exits, self._assigned = 0, set[str](), set()
+        self._exits = exits
+        body, weight = [], 0
+        for statement in statements:
+            python, cost = self._statement_at_switch(statement)
+            body += python
+            weight += cost
+        name = f'{self._function.name}_{len(self._parts)}'
+        self._parts.append(self._unit(name, body or [self.node(ast.Pass)]))
+        self._loops, self._exits, self._assigned = around
+        self.at(statements[0])
+        call: ast.expr = self.call(name, self.name(DEPTH))
+        if self._function.suspends:
+            call = self.steps(call)
+        if not exits:
+            return [self.do(call)], weight
+        found = self.temporary()
+        return [
+            self.set(found, call),
+            *(
+                self.if_true(
+                    self.compare(self.name(found), ast.Eq(), self.constant(way)),
+                    [self._leave(way)],
+                )
+                for way in sorted(exits)
+            ),
+        ], weight
 
-        def interleaved_steps(frame: StackFrame) -> ScriptSteps:
-            runtime.fuel -= weight
-            if runtime.fuel < 0:
-                runtime.raise_budget_exceeded(*call_location)
-            for run, suspends in pairs:
-                if runtime.switches_now():
-                    yield SWITCH
-                signal = (yield from run(frame)) if suspends else run(frame)
-                if signal is not None:
-                    return signal
-            return None
+    def _leave(self, way: str) -> ast.stmt:
+        """Leave a loop, or the function; outside of loops, `break` and `continue` do that, too."""
+        if self._loops and way != _RETURN:
+            return self.node(ast.Break if way == _BREAK else ast.Continue)
+        if self._exits is None:
+            return self.node(ast.Return, None)
+        self._exits.add(way)
+        return self.node(ast.Return, self.constant(way))
 
-        if runtime.interleaves:
-            return CompiledNode(interleaved_steps, True, 0)
-        suspends = any(code.suspends for code in codes)
-        return CompiledNode(steps if suspends else plain, suspends, 0)
+    def _statement_at_switch(self, node: tree.Statement) -> tuple[list[ast.stmt], int]:
+        """Compile a statement before which threads may be switched; return also its cost."""
+        if isinstance(node, tree.LabelStatement | tree.FunctionDefinition):
+            return [], 0
+        python, weight = self._statement(node)
+        if self._shared.interleaves:
+            self.at(node)
+            python.insert(0, self.switch_threads())
+        return python, weight
 
-    def _statement(self, node: tree.Statement) -> Iterator[CompiledNode]:
-        """Yield the code of a statement; labels and definitions have none."""
+    def _statement(self, node: tree.Statement) -> tuple[list[ast.stmt], int]:
         match node:
             case tree.AssignStatement():
-                yield self._assign(node)
+                return self._assign(node)
             case tree.CallStatement():
-                yield self._call_statement(node)
+                call = self.expression(node.call)
+                return [self.do(call.python)], 1 + call.weight
             case tree.IfStatement():
-                yield self._if(node)
+                return self._if(node)
             case tree.SwitchStatement():
-                yield self._switch(node)
+                return self._switch(node)
             case tree.WhileStatement():
-                yield self._while(node)
-            case tree.BreakStatement():
-                yield CompiledNode(lambda frame: BREAK)
-            case tree.ContinueStatement():
-                yield CompiledNode(lambda frame: CONTINUE)
+                return self._while(node)
             case tree.ReturnStatement():
-                yield self._return(node)
-            case tree.HaltStatement():
-                yield CompiledNode(_halt)
-            case tree.PauseStatement():
-                yield self._pause()
+                return self._return(node)
             case tree.JoinStatement():
-                yield self._join(node)
+                return self._join(node)
             case tree.KillStatement():
-                kill = self._runtime.kill
-                yield sequence([self.expression(node.handle)], lambda frame, found: kill(*found))
+                handle = self.expression(node.handle)
+                self.at(node)
+                return [self.do(self.call('kill', handle.python))], 1 + handle.weight
+        self.at(node)
+        match node:
+            case tree.BreakStatement():
+                return [self._leave(_BREAK)], 1
+            case tree.ContinueStatement():
+                return [self._leave(_CONTINUE)], 1
+            case tree.HaltStatement():
+                return [self.do(self.call('halt'))], 1
+            case tree.PauseStatement():
+                pause = self.set_runtime('paused', self.constant(True))
+                return [pause, self.do(self.wait())], 1
             case tree.CriticalStatement():
-                yield self._critical(node)
-            case tree.LabelStatement() | tree.FunctionDefinition():
-                return
+                enter = self.constant(node.enter)
+                return [self.set_runtime('in_critical_section', enter)], 1
+        raise AssertionError(node)
 
-    def _critical(self, node: tree.CriticalStatement) -> CompiledNode:
-        """Compile the entry or exit of a critical section, which stops random thread switches."""
-        runtime, enter = self._runtime, node.enter
-
-        def plain(frame: StackFrame) -> None:
-            runtime.thread.in_critical_section = enter
-
-        return CompiledNode(plain)
-
-    def _call_statement(self, node: tree.CallStatement) -> CompiledNode:
-        call = self.expression(node.call)
-        run = call.run
-
-        def plain(frame: StackFrame) -> None:
-            run(frame)
-
-        def steps(frame: StackFrame) -> ScriptSteps:
-            yield from run(frame)
-            return None
-
-        return choose_runner(plain, steps, [call])
-
-    def _assign(self, node: tree.AssignStatement) -> CompiledNode:
+    def _assign(self, node: tree.AssignStatement) -> tuple[list[ast.stmt], int]:
         if not isinstance(node.target, tree.NameExpression):
             return self._assign_part(node)
-        slot, is_local = self._slot(node.target.identifier, node.qualifier)
-        value = self.copied_expression(node.value)
-        run, runtime, shared = value.run, self._runtime, self._runtime.globals
+        value = self.copied(node.value)
+        self.at(node)
+        name = self._assigned_variable(node.target.identifier, node.qualifier)
+        if self._shared.interleaves and name in self._assigned:
+            found = self.temporary()
+            return [
+                self.set(found, value.python),
+                self.switch_threads(),
+                self.set(name, self.name(found)),
+            ], 1 + value.weight
+        return [self.set(name, value.python)], 1 + value.weight
 
-        def plain_local(frame: StackFrame) -> None:
-            frame[slot] = run(frame)
+    def _assigned_variable(self, name: str, qualifier: str = '') -> str:
+        """Return the name of a variable that is assigned to."""
+        variable = self.variable(name, qualifier)
+        if variable == global_name(name):
+            self._assigned.add(variable)
+        return variable
 
-        def plain_global(frame: StackFrame) -> None:
-            shared[slot] = run(frame)
-
-        def steps(frame: StackFrame) -> ScriptSteps:
-            found = yield from run(frame)
-            (frame if is_local else shared)[slot] = found
-            return None
-
-        def interleaved_steps(frame: StackFrame) -> ScriptSteps:
-            found = (yield from run(frame)) if value.suspends else run(frame)
-            if runtime.switches_now():
-                yield SWITCH
-            shared[slot] = found
-            return None
-
-        if runtime.interleaves and not is_local:
-            return CompiledNode(interleaved_steps, True, 1 + value.weight)
-        return choose_runner(plain_local if is_local else plain_global, steps, [value])
-
-    def _assign_part(self, node: tree.AssignStatement) -> CompiledNode:
+    def _assign_part(self, node: tree.AssignStatement) -> tuple[list[ast.stmt], int]:
         """Compile an assignment to a part of a variable, such as `a.b[i] = value`."""
-        base, keys, indices = self._path(node.target)
-        read = self._name(base).run
-        slot, is_local = self._slot(base.identifier)
-        shared = self._runtime.globals
+        value = self.copied(node.value)
+        stored, path = self.temporary(), self.temporary()
+        self.at(node)
+        python = [self.set(stored, value.python)]
+        base, keys, weight = self._path(node.target)
+        self.at(node)
+        python.append(self.set(path, self.key(keys)))
+        name = self._assigned_variable(base.identifier)
+        changed = self.call('set_part', self.name(name), self.name(path), self.name(stored))
+        return [*python, self.set(name, changed)], 1 + value.weight + weight
 
-        def finish(frame: StackFrame, found: list[Value]) -> None:
-            rest = iter(found[1:])
-            path = [
-                key if isinstance(key, str) else tuple(next(rest) for _ in range(key))
-                for key in keys
-            ]
-            container = values.set_part(read(frame), path, found[0])
-            (frame if is_local else shared)[slot] = container
-
-        return self._positioned(node, [self.copied_expression(node.value), *indices], finish)
-
-    def _path(
-        self, target: tree.Expression
-    ) -> tuple[tree.NameExpression, list[str | int], list[CompiledNode]]:
-        """Return the variable, the keys (field name or count of indices), and code of indices."""
+    def _path(self, target: tree.Expression) -> tuple[tree.NameExpression, list[ast.expr], int]:
+        """Return the variable, the keys of its part from outside to inside, and their cost."""
+        if isinstance(target, tree.NameExpression):
+            return target, [], 0
+        assert isinstance(target, tree.FieldExpression | tree.IndexExpression)
+        base, keys, weight = self._path(target.target)
         if isinstance(target, tree.FieldExpression):
-            base, keys, indices = self._path(target.target)
-            return base, [*keys, target.name], indices
-        if isinstance(target, tree.IndexExpression):
-            base, keys, indices = self._path(target.target)
-            own = [self.expression(index) for index in target.indices]
-            return base, [*keys, len(own)], indices + own
-        assert isinstance(target, tree.NameExpression)
-        return target, [], []
+            self.at(target)
+            return base, [*keys, self.constant(target.name)], weight
+        indices = [self.expression(index) for index in target.indices]
+        self.at(target)
+        key = self.key([index.python for index in indices])
+        return base, [*keys, key], weight + sum(index.weight for index in indices)
 
-    def _if(self, node: tree.IfStatement) -> CompiledNode:
-        truth = values.truth
-        conditions = [self.expression(branch.condition) for branch in node.branches]
-        bodies = [self._block(branch.body, branch) for branch in node.branches]
-        otherwise = self._block(node.otherwise, node)
-        pairs = list(zip(conditions, bodies, strict=True))
-        runs = [(condition.run, body.run) for condition, body in pairs]
-        run_otherwise = otherwise.run
+    def _if(self, node: tree.IfStatement) -> tuple[list[ast.stmt], int]:
+        weight = 1
+        conditions: list[Code] = []
+        bodies = []
+        for branch in node.branches:
+            conditions.append(self.condition(branch.condition))
+            bodies.append(self._block(branch.body, branch))
+        python = self._block(node.otherwise, node)
+        for condition, body, branch in zip(
+            reversed(conditions), reversed(bodies), reversed(node.branches), strict=True
+        ):
+            self.at(branch)
+            python = [self.if_true(condition.python, body, python)]
+            weight += condition.weight
+        return python, weight
 
-        def plain(frame: StackFrame) -> Any:
-            for condition, body in runs:
-                value = condition(frame)
-                if value is True or (value is not False and truth(value)):
-                    return body(frame)
-            return run_otherwise(frame)
-
-        def steps(frame: StackFrame) -> ScriptSteps:
-            for condition, body in pairs:
-                run = condition.run
-                if truth((yield from run(frame)) if condition.suspends else run(frame)):
-                    return (yield from body.run(frame)) if body.suspends else body.run(frame)
-            run = run_otherwise
-            return (yield from run(frame)) if otherwise.suspends else run(frame)
-
-        return choose_runner(plain, steps, [*conditions, *bodies, otherwise])
-
-    def _switch(self, node: tree.SwitchStatement) -> CompiledNode:
+    def _switch(self, node: tree.SwitchStatement) -> tuple[list[ast.stmt], int]:
         subject = self.expression(node.subject)
+        wanted, weight = self.temporary(), 1 + subject.weight
+        self.at(node)
+        begin = self.set(wanted, subject.python)
         cases = [
             (self.expression(case.condition), self._block(case.body, case)) for case in node.cases
         ]
-        otherwise = self._block(node.otherwise, node)
-        parts = [subject, otherwise, *(code for case in cases for code in case)]
+        python = self._block(node.otherwise, node)
+        for (value, body), case in zip(reversed(cases), reversed(node.cases), strict=True):
+            self.at(case)
+            fits = self.compare(self.name(wanted), ast.Eq(), value.python)
+            python = [self.if_true(fits, body, python)]
+            weight += value.weight
+        return [begin, *python], weight
 
-        def steps(frame: StackFrame) -> ScriptSteps:
-            wanted = (yield from subject.run(frame)) if subject.suspends else subject.run(frame)
-            for value, body in cases:
-                run = value.run
-                found = (yield from run(frame)) if value.suspends else run(frame)
-                if wanted == found:
-                    return (yield from body.run(frame)) if body.suspends else body.run(frame)
-            run = otherwise.run
-            return (yield from run(frame)) if otherwise.suspends else run(frame)
-
-        return choose_runner(lambda frame: _finish(steps(frame)), steps, parts)
-
-    def _while(self, node: tree.WhileStatement) -> CompiledNode:
-        truth, runtime = values.truth, self._runtime
-        condition = self.expression(node.condition)
+    def _while(self, node: tree.WhileStatement) -> tuple[list[ast.stmt], int]:
+        condition = self.condition(node.condition)
+        self._loops += 1
         body = self._block(node.body, node)
-        run_condition, run_body, weight = condition.run, body.run, condition.weight
+        self._loops -= 1
+        self.at(node)
+        python = [self.pay(condition.weight), *body]
+        loop = self.loop(condition.python, python)
+        return [loop], 1 + condition.weight
 
-        def plain(frame: StackFrame) -> str | None:
-            while truth(run_condition(frame)):
-                runtime.fuel -= weight
-                signal: str | None = run_body(frame)
-                if signal is BREAK:
-                    break
-                if signal is RETURN:
-                    return signal
-            return None
+    def _return(self, node: tree.ReturnStatement) -> tuple[list[ast.stmt], int]:
+        if node.value is None:
+            self.at(node)
+            return [self._leave(_RETURN)], 2
+        value = self.copied(node.value)
+        self.at(node)
+        if self._exits is not None:
+            return [self.do(value.python), self._leave(_RETURN)], 1 + value.weight
+        return [self.node(ast.Return, value.python)], 1 + value.weight
 
-        def steps(frame: StackFrame) -> ScriptSteps:
-            while truth(
-                (yield from run_condition(frame)) if condition.suspends else run_condition(frame)
-            ):
-                runtime.fuel -= weight
-                signal = (yield from run_body(frame)) if body.suspends else run_body(frame)
-                if signal is BREAK:
-                    break
-                if signal is RETURN:
-                    return signal
-            return None
-
-        return choose_runner(plain, steps, [condition, body])
-
-    def _return(self, node: tree.ReturnStatement) -> CompiledNode:
-        value = self._constant(None) if node.value is None else self.copied_expression(node.value)
-
-        def finish(frame: StackFrame, found: list[Value]) -> str:
-            frame[0] = found[0]
-            return RETURN
-
-        return sequence([value], finish)
-
-    def _pause(self) -> CompiledNode:
-        runtime = self._runtime
-
-        def steps(frame: StackFrame) -> ScriptSteps:
-            runtime.paused = True
-            yield
-
-        return CompiledNode(steps, True)
-
-    def _join(self, node: tree.JoinStatement) -> CompiledNode:
+    def _join(self, node: tree.JoinStatement) -> tuple[list[ast.stmt], int]:
         handle = self.expression(node.handle)
-        alive = self._runtime.alive
-
-        def steps(frame: StackFrame) -> ScriptSteps:
-            run = handle.run
-            thread = (yield from run(frame)) if handle.suspends else run(frame)
-            while alive(thread):
-                yield
-
-        return CompiledNode(steps, True, 1 + handle.weight)
+        self.at(node)
+        joined = self.temporary()
+        is_alive = self.call('alive', self.name(joined))
+        wait = self.loop(is_alive, [self.do(self.wait())])
+        return [self.set(joined, handle.python), wait], 1 + handle.weight
 
 
-def _halt(frame: StackFrame) -> NoReturn:
-    raise ProgramHalted
-
-
-def _finish(steps: ScriptSteps) -> Value:
-    """Run steps that cannot take time."""
-    try:
-        next(steps)
-    except StopIteration as end:
-        return end.value
-    raise AssertionError('code took time where none was expected')
+def _count_nodes(node: tree.SyntaxNode) -> int:
+    """Return the number of nodes that are compiled with a node."""
+    if isinstance(node, tree.FunctionDefinition):
+        return 0
+    return 1 + sum(map(_count_nodes, tree.children(node)))

@@ -1,60 +1,92 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Compiles expressions to closures.
+Compiles expressions to expressions of Python.
 
-Lists are values in this language: a list that is stored, passed or returned is copied if it may
-also be stored elsewhere. An error gets the position of its operator, index or call.
+Numbers are nearly always floats, so an operation on two of them is Python's own; everything else
+is a call of one of the `operations`. Lists are values in this language: a list that is stored,
+passed or returned is copied if it may also be stored elsewhere.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import ast
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 import inspect
 
 from ur_cartesian_driver.urscript import script_values as values
-from ur_cartesian_driver.urscript.compiling.closures import (
-    choose_runner,
-    CompiledFunction,
-    CompiledNode,
-    MAX_CALL_DEPTH,
-    recursion_error,
-    Runtime,
-    ScriptSteps,
-    sequence,
-    StackFrame,
-    Thread,
-    UNSET,
+from ur_cartesian_driver.urscript.compiling.generated_code import (
+    builtin_name,
+    GeneratedFunction,
+    global_name,
+    local_name,
 )
+from ur_cartesian_driver.urscript.compiling.operations import OPERATORS
+from ur_cartesian_driver.urscript.compiling.python_writer import PythonWriter
 from ur_cartesian_driver.urscript.compiling.scopes import bind, Builtin, Scope
-from ur_cartesian_driver.urscript.container_methods import call_method
 from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
-from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import Value
 
+#: Operators that Python has for floats, and which of them return a truth value.
+_ARITHMETIC: dict[str, ast.operator] = {
+    '+': ast.Add(), '-': ast.Sub(), '*': ast.Mult(), '/': ast.Div(),
+}  # fmt: skip
+_COMPARISONS: dict[str, ast.cmpop] = {
+    '==': ast.Eq(), '!=': ast.NotEq(), '<': ast.Lt(), '<=': ast.LtE(),
+    '>': ast.Gt(), '>=': ast.GtE(),
+}  # fmt: skip
+#: Name of the parameter of generated functions that counts the nesting of calls.
+DEPTH = 'depth'
 
-class ExpressionCompiler:
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """The code of an expression, and its cost in nodes of the tree."""
+
+    python: ast.expr
+    weight: int = 1
+    #: Whether the value is True or False.
+    is_truth: bool = False
+    #: Whether evaluating it twice costs next to nothing and changes nothing.
+    is_simple: bool = False
+
+
+@dataclass(slots=True)
+class Shared:
+    """What the functions of a program have in common."""
+
+    builtins: Mapping[str, Builtin]
+    interleaves: bool
+    #: Functions by the identity of their scopes.
+    functions: dict[int, GeneratedFunction]
+
+
+class ExpressionCompiler(PythonWriter):
     """Compiles the expressions of one function."""
 
-    def __init__(
-        self,
-        scope: Scope,
-        builtins: Mapping[str, Builtin],
-        runtime: Runtime,
-        procedures: Mapping[int, CompiledFunction],
-    ) -> None:
+    def __init__(self, scope: Scope, shared: Shared) -> None:
+        super().__init__()
         self._scope = scope
-        self._builtins = builtins
-        self._runtime = runtime
-        #: Functions by the id of their scope; their bodies may not be compiled yet.
-        self._procedures = procedures
+        self._shared = shared
+        self._temporaries = 0
+        #: Values that the code finds by name; none of them can change.
+        self._constants: dict[str, Value] = {}
 
-    def expression(self, node: tree.Expression) -> CompiledNode:
+    def temporary(self) -> str:
+        """Return the name of a new variable for intermediate values."""
+        self._temporaries += 1
+        return f't{self._temporaries}'
+
+    def expression(self, node: tree.Expression) -> Code:
         match node:
             case tree.ConstantExpression():
-                return self._constant(node.value)
+                self.at(node)
+                is_truth = isinstance(node.value, bool)
+                return Code(self.constant(node.value), is_truth=is_truth, is_simple=True)
             case tree.NameExpression():
-                return self._name(node)
+                self.at(node)
+                return Code(self.name(self.variable(node.identifier)), is_simple=True)
             case tree.UnaryExpression():
                 return self._unary(node)
             case tree.BinaryExpression():
@@ -66,64 +98,49 @@ class ExpressionCompiler:
             case tree.IndexExpression():
                 return self._index(node)
             case tree.FieldExpression():
-                key = node.name
-                target = [self.expression(node.target)]
-                return self._positioned(
-                    node, target, lambda frame, found: values.get_part(found[0], key)
-                )
+                target = self.expression(node.target)
+                self.at(node)
+                part = self.call('get_part', target.python, self.constant(node.name))
+                return Code(part, 1 + target.weight)
             case tree.CallExpression():
-                return self._call(node)
+                callee = self._scope.function(node.function)
+                return self._builtin(node) if callee is None else self._call(node, callee)
             case tree.MethodCallExpression():
-                return self._method_call(node)
+                return self._method(node)
             case tree.RunExpression():
-                return self._run(node)
+                callee = self._scope.function(node.thread)
+                assert callee is not None
+                self.at(node)
+                function = self._shared.functions[id(callee)].name
+                return Code(self.call('spawn', self.name(function)))
         raise AssertionError(node)
 
-    def _literal(self, node: tree.ListLiteral | tree.PoseLiteral) -> CompiledNode:
-        is_list = isinstance(node, tree.ListLiteral)
-        make = values.make_list if is_list else values.make_pose
-        numbers = [_number(item) for item in node.items]
-        if None in numbers:
-            items = [self.expression(item) for item in node.items]
-            runtime, sized = self._runtime, values.SIZED
+    def condition(self, node: tree.Expression) -> Code:
+        """Compile an expression of which only the truth counts."""
+        return self._truth(self.expression(node))
 
-            def made(frame: StackFrame, found: list[Value]) -> Value:
-                if found and type(found[0]) in sized:
-                    runtime.pay_for(sum(map(values.size_of, found)), node.line, node.column)
-                return make(found)
-
-            return self._positioned(node, items, made)
-        value = make(numbers)  # cannot fail
-        signs = sum(isinstance(item, tree.UnaryExpression) for item in node.items)
-        run = (lambda frame: value[:]) if is_list else (lambda frame: value)
-        return CompiledNode(run, False, 1 + len(numbers) + signs)
-
-    def copied_expression(self, node: tree.Expression) -> CompiledNode:
-        """Compile an expression whose value will be stored or passed on."""
-        code = self.expression(node)
-        if self._is_temporary(node):
+    def _truth(self, code: Code) -> Code:
+        if code.is_truth:
             return code
-        run, runtime, sized = code.run, self._runtime, values.SIZED
-        place = node.line, node.column
+        return Code(self.call('truth', code.python), code.weight, is_truth=True)
 
-        def copied(value: Value) -> Value:
-            runtime.pay_for(values.size_of(value), *place)
-            return values.copy(value)
+    def copied(self, node: tree.Expression) -> Code:
+        """Compile an expression whose value will be stored or passed on."""
+        if isinstance(node, tree.CallExpression) and self._scope.function(node.function) is None:
+            call = self._builtin_call(node)
+            self.at(node)
+            return replace(call, python=self.call('copied', call.python))
+        code = self.expression(node)
+        if code.is_truth or not self._may_be_stored(node, code):
+            return code
+        self.at(node)
+        first, again = self._twice(code)
+        python = self.choose(self.has_type(first, 'float'), again, self.call('copied', again))
+        return replace(code, python=python, is_simple=False)
 
-        def plain(frame: StackFrame) -> Value:
-            value = run(frame)
-            return copied(value) if type(value) in sized else value
-
-        def steps(frame: StackFrame) -> ScriptSteps:
-            value = yield from run(frame)
-            return copied(value) if type(value) in sized else value
-
-        return CompiledNode(steps if code.suspends else plain, code.suspends, code.weight)
-
-    def _is_temporary(self, node: tree.Expression) -> bool:
-        """Return whether an expression's value is stored nowhere else, so it needs no copy."""
-        if isinstance(node, tree.CallExpression):
-            return self._scope.function(node.function) is not None
+    @staticmethod
+    def _may_be_stored(node: tree.Expression, code: Code) -> bool:
+        """Return whether the value of an expression may be stored elsewhere, too."""
         stored = (
             tree.NameExpression
             | tree.IndexExpression
@@ -131,314 +148,206 @@ class ExpressionCompiler:
             | tree.UnaryExpression
             | tree.MethodCallExpression
         )
-        return not isinstance(node, stored)
+        return isinstance(node, stored) and not isinstance(code.python, ast.Constant)
 
-    @staticmethod
-    def _positioned(
-        node: tree.SyntaxNode,
-        parts: Sequence[CompiledNode],
-        finish: Callable[[StackFrame, list[Value]], Value],
-    ) -> CompiledNode:
-        """Evaluate parts in sequence; errors in `finish` get the position of this node."""
+    def _twice(self, code: Code) -> tuple[ast.expr, ast.expr]:
+        """Return code that evaluates an expression, and code that has its value afterwards."""
+        if code.is_simple:
+            return code.python, code.python
+        name = self.temporary()
+        return self.keep(name, code.python), self.name(name)
 
-        def positioned(frame: StackFrame, found: list[Value]) -> Value:
-            try:
-                return finish(frame, found)
-            except RuntimeException as error:
-                raise error.at(node.line, node.column) from None
-
-        return sequence(parts, positioned)
-
-    @staticmethod
-    def _constant(value: Value) -> CompiledNode:
-        return CompiledNode(lambda frame: value)
-
-    def _name(self, node: tree.NameExpression) -> CompiledNode:
-        name = node.identifier
-        slot, is_local = self._slot(name)
-        shared = self._runtime.globals
-
-        def read_local(frame: StackFrame) -> Value:
-            value = frame[slot]
-            if value is UNSET:
-                raise _unset(node)
-            return value
-
-        def read_global(frame: StackFrame) -> Value:
-            value = shared[slot]
-            if value is UNSET:
-                raise _unset(node)
-            return value
-
-        return CompiledNode(read_local if is_local else read_global)
-
-    def _slot(self, name: str, qualifier: str = '') -> tuple[int, bool]:
-        """Return the slot of a variable and whether it is in the frame."""
+    def variable(self, name: str, qualifier: str = '') -> str:
+        """Return the name of a variable in the code."""
         if name in self._scope.locals and qualifier != 'global':
-            return self._scope.locals[name], True
-        return self._scope.globals[name], False
+            return local_name(name)
+        return global_name(name)
 
-    def _unary(self, node: tree.UnaryExpression) -> CompiledNode:
-        operate = values.UNARY[node.operator]
-        return self._positioned(
-            node, [self.copied_expression(node.operand)], lambda frame, found: operate(found[0])
+    def _literal(self, node: tree.ListLiteral | tree.PoseLiteral) -> Code:
+        is_list = isinstance(node, tree.ListLiteral)
+        codes = [self.expression(item) for item in node.items]
+        self.at(node)
+        weight = 1 + sum(code.weight for code in codes)
+        numbers = [_number(code.python) for code in codes]
+        items = self.items([code.python for code in codes])
+        if None in numbers:
+            return Code(self.call('make_list' if is_list else 'make_pose', items), weight)
+        if is_list:
+            return Code(items, weight)
+        function = self._shared.functions[id(self._scope)].name
+        name = f'{function}_pose{len(self._constants)}'
+        self._constants[name] = values.make_pose(numbers)
+        return Code(self.name(name), weight)
+
+    def _unary(self, node: tree.UnaryExpression) -> Code:
+        if node.operator == 'not':
+            code = self.condition(node.operand)
+            self.at(node)
+            return Code(
+                self.node(ast.UnaryOp, ast.Not(), code.python), 1 + code.weight, is_truth=True
+            )
+        code = self.expression(node.operand)
+        self.at(node)
+        number = _number(code.python)
+        if number is not None:
+            signed = -number if node.operator == '-' else number
+            return Code(self.constant(signed), 1 + code.weight, is_simple=True)
+        if node.operator == '+':
+            return Code(self.call('plus', code.python), 1 + code.weight)
+        first, again = self._twice(code)
+        negative = self.node(ast.UnaryOp, ast.USub(), again)
+        python = self.choose(self.has_type(first, 'float'), negative, self.call('minus', again))
+        return Code(python, 1 + code.weight)
+
+    def _binary(self, node: tree.BinaryExpression) -> Code:
+        symbol = node.operator
+        left, right = self.expression(node.left), self.expression(node.right)
+        self.at(node)
+        weight = 1 + left.weight + right.weight
+        is_truth = symbol in _COMPARISONS
+        constants = [isinstance(code.python, ast.Constant) for code in (left, right)]
+        if symbol in ('==', '!=') and any(constants):
+            python = self.compare(left.python, _COMPARISONS[symbol], right.python)
+            return Code(python, weight, is_truth)
+        if symbol == '%' or not all(
+            _number(code.python) is not None
+            for code, is_constant in zip((left, right), constants, strict=True)
+            if is_constant
+        ):
+            return Code(self.call(OPERATORS[symbol], left.python, right.python), weight, is_truth)
+        if not right.is_simple and not self._is_fixed(left):
+            left = replace(left, is_simple=False)  # the right side may change its value
+        (first_a, a), (first_b, b) = self._twice(left), self._twice(right)
+        is_quick = self._are_quick(symbol, constants, first_a, first_b, right.is_simple)
+        if is_quick is None:  # two constants
+            return Code(self.call(OPERATORS[symbol], a, b), weight, is_truth)
+        if symbol == '/':
+            is_quick = self.both([is_quick, b])
+        quick = (
+            self.compare(a, _COMPARISONS[symbol], b)
+            if is_truth
+            else self.node(ast.BinOp, a, _ARITHMETIC[symbol], b)
+        )
+        slow = self.call(OPERATORS[symbol], a, b)
+        return Code(self.choose(is_quick, quick, slow), weight, is_truth)
+
+    def _is_fixed(self, code: Code) -> bool:
+        """Return whether nothing but this function changes the value of simple code."""
+        return isinstance(code.python, ast.Constant) or (
+            isinstance(code.python, ast.Name) and not code.python.id.startswith('g_')
         )
 
-    def _binary(self, node: tree.BinaryExpression) -> CompiledNode:
-        on_values = values.BINARY[node.operator]
-        on_floats = values.ON_FLOATS.get(node.operator, on_values)
-        left, right = self.expression(node.left), self.expression(node.right)
-        run_left, run_right = left.run, right.run
-        runtime, sized = self._runtime, values.SIZED
+    def _are_quick(
+        self,
+        symbol: str,
+        constants: Sequence[bool],
+        left: ast.expr,
+        right: ast.expr,
+        right_is_simple: bool,
+    ) -> ast.expr | None:
+        """Return a condition for Python's own operation, which also evaluates both operands."""
+        check = self.is_number if symbol in _COMPARISONS else lambda x: self.has_type(x, 'float')
+        checks = [
+            check(operand)
+            for operand, is_constant in zip((left, right), constants, strict=True)
+            if not is_constant
+        ]
+        if len(checks) < 2 or right_is_simple:
+            return self.both(checks) if checks else None
+        # `and` would leave out the right operand if the left one is no float.
+        return self.node(ast.BinOp, checks[0], ast.BitAnd(), checks[1])
 
-        def operate(a: Value, b: Value) -> Value:
-            if type(a) in sized or type(b) in sized:
-                runtime.pay_for(values.work_on(a, b), node.line, node.column)
-            return on_values(a, b)
-
-        if left.suspends or right.suspends:
-            return self._positioned(node, [left, right], lambda frame, found: operate(*found))
-
-        def run(frame: StackFrame) -> Value:
-            a, b = run_left(frame), run_right(frame)
-            try:
-                if type(a) is float and type(b) is float:
-                    return on_floats(a, b)
-                if type(a) in sized or type(b) in sized:
-                    return operate(a, b)
-                return on_values(a, b)
-            except RuntimeException as error:
-                raise error.at(node.line, node.column) from None
-
-        return CompiledNode(run, False, 1 + left.weight + right.weight)
-
-    def _logical(self, node: tree.LogicalExpression) -> CompiledNode:
-        left, right = self.expression(node.left), self.expression(node.right)
-        truth = values.truth
+    def _logical(self, node: tree.LogicalExpression) -> Code:
+        left, right = self.condition(node.left), self.condition(node.right)
+        self.at(node)
+        weight = 1 + left.weight + right.weight
         if node.operator == 'xor':
-            return sequence([left, right], lambda frame, both: truth(both[0]) != truth(both[1]))
-        decisive = node.operator == 'or'
-        run_left, run_right = left.run, right.run
+            return Code(
+                self.compare(left.python, ast.NotEq(), right.python), weight, is_truth=True
+            )
+        operator = ast.Or() if node.operator == 'or' else ast.And()
+        both = self.node(ast.BoolOp, operator, [left.python, right.python])
+        return Code(both, weight, is_truth=True)
 
-        def plain(frame: StackFrame) -> bool:
-            return decisive if truth(run_left(frame)) is decisive else truth(run_right(frame))
-
-        def steps(frame: StackFrame) -> ScriptSteps:
-            value = (yield from run_left(frame)) if left.suspends else run_left(frame)
-            if truth(value) is decisive:
-                return decisive
-            return truth((yield from run_right(frame)) if right.suspends else run_right(frame))
-
-        return choose_runner(plain, steps, [left, right])
-
-    def _index(self, node: tree.IndexExpression) -> CompiledNode:
-        parts = [self.expression(node.target), *map(self.expression, node.indices)]
-        if len(parts) == 2 and not any(part.suspends for part in parts):
-            return self._item(node, *parts)
-        return self._positioned(
-            node, parts, lambda frame, found: values.get_part(found[0], tuple(found[1:]))
-        )
-
-    @staticmethod
-    def _item(
-        node: tree.IndexExpression, target: CompiledNode, index: CompiledNode
-    ) -> CompiledNode:
-        """Compile the common case `list[int]`, with a fast path for a valid index."""
-        run_target, run_index = target.run, index.run
-
-        def run(frame: StackFrame) -> Value:
-            container, position = run_target(frame), run_index(frame)
-            if (
-                type(container) is list
-                and type(position) is int
-                and 0 <= position < len(container)
-            ):
-                return container[position]
-            try:
-                return values.get_part(container, (position,))
-            except RuntimeException as error:
-                raise error.at(node.line, node.column) from None
-
-        return CompiledNode(run, False, 1 + target.weight + index.weight)
+    def _index(self, node: tree.IndexExpression) -> Code:
+        target = self.expression(node.target)
+        indices = [self.expression(index) for index in node.indices]
+        self.at(node)
+        weight = 1 + target.weight + sum(index.weight for index in indices)
+        key = [index.python for index in indices]
+        index = indices[0].python
+        if not (
+            len(indices) == 1
+            and isinstance(index, ast.Constant)
+            and type(index.value) is int
+            and index.value >= 0
+        ):
+            return Code(self.call('get_item', target.python, *key), weight)
+        first, again = self._twice(target)
+        fits = self.compare(self.call('len', again), ast.Gt(), index)
+        item = self.item(again, index)
+        is_quick = self.both([self.has_type(first, 'list'), fits])
+        return Code(self.choose(is_quick, item, self.call('get_item', again, index)), weight)
 
     # Calls
 
-    def _call(self, node: tree.CallExpression) -> CompiledNode:
-        callee = self._scope.function(node.function)
-        if callee is not None:
-            return self._call_function(node, callee)
-        return self._call_builtin(node, self._builtins[node.function])
-
-    def _call_function(self, node: tree.CallExpression, callee: Scope) -> CompiledNode:
-        """Bind arguments to slots of a new frame and run the body in it."""
-        procedure = self._procedures[id(callee)]
-        make_frame = self._make_frame(node, callee)
-        make = make_frame.run
-        enter = self._enter(node)
-
-        def plain(frame: StackFrame) -> Value:
-            new = make(frame)
-            thread = enter()
-            try:
-                for slot, default in procedure.defaults.items():
-                    if new[slot] is UNSET:
-                        new[slot] = default.run(new)
-                procedure.body.run(new)
-            finally:
-                thread.depth -= 1
-            return new[0]
-
-        def steps(frame: StackFrame) -> ScriptSteps:
-            new = (yield from make(frame)) if make_frame.suspends else make(frame)
-            thread = enter()
-            try:
-                for slot, default in procedure.defaults.items():
-                    if new[slot] is UNSET:
-                        run = default.run
-                        new[slot] = (yield from run(new)) if default.suspends else run(new)
-                run = procedure.body.run
-                (yield from run(new)) if procedure.body.suspends else run(new)
-            finally:
-                thread.depth -= 1
-            return new[0]
-
-        suspends = procedure.suspends or make_frame.suspends
-        return CompiledNode(steps if suspends else plain, suspends, make_frame.weight)
-
-    def _make_frame(self, node: tree.CallExpression, callee: Scope) -> CompiledNode:
-        """Compile the arguments of a call into a new frame of the callee."""
+    def _call(self, node: tree.CallExpression, callee: Scope) -> Code:
         assert callee.definition is not None
-        bound = bind(callee.definition, node)
-        slots = [callee.locals[name] for name in bound]
-        arguments = [self.copied_expression(argument.value) for argument in bound.values()]
-        template = self._procedures[id(callee)].template
+        positional: list[ast.expr] = []
+        named: dict[str, ast.expr] = {}
+        weight = 1
+        for name, argument in bind(callee.definition, node).items():
+            code = self.copied(argument.value)
+            weight += code.weight
+            if argument.name is None and not named:
+                positional.append(code.python)
+            else:
+                named[local_name(name)] = code.python
+        self.at(node)
+        depth = self.node(ast.BinOp, self.name(DEPTH), ast.Add(), self.constant(1))
+        function = self._shared.functions[id(callee)]
+        call: ast.expr = self.call(function.name, depth, *positional, **named)
+        return Code(self.steps(call) if function.suspends else call, weight)
 
-        def new_frame(frame: StackFrame, found: list[Value]) -> StackFrame:
-            new = template.copy()
-            for slot, value in zip(slots, found, strict=True):
-                new[slot] = value
-            return new
+    def _builtin(self, node: tree.CallExpression) -> Code:
+        call = self._builtin_call(node)
+        if isinstance(call.python, ast.YieldFrom):
+            return call
+        return replace(call, python=self.call('paid', call.python))
 
-        return sequence(arguments, new_frame)
+    def _builtin_call(self, node: tree.CallExpression) -> Code:
+        codes = [self.copied(argument.value) for argument in node.arguments]
+        self.at(node)
+        positional = [
+            code.python
+            for code, argument in zip(codes, node.arguments, strict=True)
+            if argument.name is None
+        ]
+        named = {
+            argument.name: code.python
+            for code, argument in zip(codes, node.arguments, strict=True)
+            if argument.name is not None
+        }
+        call: ast.expr = self.call(builtin_name(node.function), *positional, **named)
+        if inspect.isgeneratorfunction(self._shared.builtins[node.function]):
+            call = self.steps(call)
+        return Code(call, 1 + sum(code.weight for code in codes))
 
-    def _enter(self, node: tree.CallExpression) -> Callable[[], Thread]:
-        """Return a function that adds a call to the depth of its thread, up to a limit."""
-        runtime = self._runtime
-        call_location = (node.line, node.column)
-
-        def enter() -> Thread:
-            thread = runtime.thread
-            if thread.depth >= MAX_CALL_DEPTH:
-                raise recursion_error(*call_location)
-            thread.depth += 1
-            thread.location = call_location
-            return thread
-
-        return enter
-
-    def _call_builtin(self, node: tree.CallExpression, builtin: Builtin) -> CompiledNode:
-        arguments = [self.copied_expression(argument.value) for argument in node.arguments]
-        names = [argument.name for argument in node.arguments if argument.name is not None]
-        split = len(arguments) - len(names)
-        runtime, sized = self._runtime, values.SIZED
-        call_location = (node.line, node.column)
-
-        def finish(frame: StackFrame, found: list[Value]) -> Value:
-            runtime.thread.location = call_location
-            try:
-                if names:
-                    named = dict(zip(names, found[split:], strict=True))
-                    value = builtin(*found[:split], **named)
-                else:
-                    value = builtin(*found)
-            except Exception as error:
-                raise _from_builtin(node, error) from error
-            if type(value) in sized:
-                runtime.pay_for(values.size_of(value), *call_location)
-            return value
-
-        call = sequence(arguments, finish)
-        if inspect.isgeneratorfunction(builtin):
-            return self._suspending(node, call)
-        return call
-
-    def _suspending(
-        self, node: tree.CallExpression | tree.MethodCallExpression, call: CompiledNode
-    ) -> CompiledNode:
-        """Compile a call that may return a generator, which then runs cycle by cycle."""
-        name = node.function if isinstance(node, tree.CallExpression) else node.method
-
-        def steps(frame: StackFrame) -> ScriptSteps:
-            result = (yield from call.run(frame)) if call.suspends else call.run(frame)
-            if not inspect.isgenerator(result):
-                return result
-            try:
-                return (yield from result)
-            except Exception as error:
-                raise _from_builtin(node, error, name) from error
-
-        return CompiledNode(steps, True, call.weight)
-
-    def _method_call(self, node: tree.MethodCallExpression) -> CompiledNode:
-        parts = [self.expression(node.target)]
-        parts += [self.copied_expression(argument.value) for argument in node.arguments]
-        runtime = self._runtime
-        call_location = (node.line, node.column)
-
-        def finish(frame: StackFrame, found: list[Value]) -> Value:
-            runtime.thread.location = call_location
-            target, arguments = found[0], found[1:]
-            try:
-                if isinstance(target, values.RemoteObject):
-                    return target.call(node.method, arguments)
-                # Shifting the items of a list is quicker than copying them.
-                runtime.pay_for(values.size_of(target) // 16, *call_location)
-                return call_method(target, node.method, arguments)
-            except Exception as error:
-                raise _from_builtin(node, error, node.method) from error
-
-        return self._suspending(node, sequence(parts, finish))
-
-    def _run(self, node: tree.RunExpression) -> CompiledNode:
-        callee = self._scope.function(node.thread)
-        assert callee is not None
-        procedure = self._procedures[id(callee)]
-        runtime = self._runtime
-
-        def run(frame: StackFrame) -> Value:
-            try:
-                return runtime.spawn(procedure)
-            except RuntimeException as error:
-                raise error.at(node.line, node.column) from None
-
-        return CompiledNode(run)
+    def _method(self, node: tree.MethodCallExpression) -> Code:
+        target = self.expression(node.target)
+        codes = [self.copied(argument.value) for argument in node.arguments]
+        self.at(node)
+        arguments = self.items([code.python for code in codes])
+        call = self.call('call', target.python, self.constant(node.method), arguments)
+        result = self.temporary()
+        takes_time = self.has_type(self.keep(result, call), 'Generator')
+        python = self.choose(takes_time, self.steps(self.name(result)), self.name(result))
+        return Code(python, 1 + target.weight + sum(code.weight for code in codes))
 
 
-def _unset(node: tree.NameExpression) -> RuntimeException:
-    text = f'The variable {node.identifier!r} is read before a value is assigned to it.'
-    return RuntimeException(text, node.line, node.column)
-
-
-def _from_builtin(
-    node: tree.CallExpression | tree.MethodCallExpression, error: Exception, name: str = ''
-) -> RuntimeException | RecursionError:
-    """Turn an error of a builtin, except RecursionError, into a runtime exception at its call."""
-    if isinstance(error, RecursionError):
-        return error
-    if isinstance(error, RuntimeException):
-        return error.at(node.line, node.column)
-    name = node.function if isinstance(node, tree.CallExpression) else name
-    text = f'{name}: {error}' if str(error) else f'{name}: {type(error).__name__}'
-    return RuntimeException(text, node.line, node.column)
-
-
-def _number(node: tree.Expression) -> int | float | None:
-    """Return the value of a literal number, with its sign; None = the node is something else."""
-    if isinstance(node, tree.UnaryExpression) and node.operator == '-':
-        number = (
-            _number(node.operand) if isinstance(node.operand, tree.ConstantExpression) else None
-        )
-        return None if number is None else -number
-    if isinstance(node, tree.ConstantExpression) and values.is_number(node.value):
-        return node.value
+def _number(python: ast.expr) -> int | float | None:
+    """Return the value of a constant that is a number, with its sign; None = it is none."""
+    if isinstance(python, ast.Constant) and values.is_number(python.value):
+        number: int | float = python.value
+        return number
     return None

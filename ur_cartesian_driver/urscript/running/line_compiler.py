@@ -10,20 +10,28 @@ forgotten, all of them at once.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
-from ur_cartesian_driver.urscript.compiling.closures import (
-    CompiledFunction,
-    Runtime,
-    ScriptSteps,
-    UNSET,
-)
 from ur_cartesian_driver.urscript.compiling.compiler import compile_program
+from ur_cartesian_driver.urscript.compiling.generated_code import GeneratedCode, ScriptSteps
 from ur_cartesian_driver.urscript.compiling.scopes import Builtin, resolve, Scope
 from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
 from ur_cartesian_driver.urscript.parsing.parser import parse_line
 from ur_cartesian_driver.urscript.script_errors import CompileError
+
+
+class Runtime(Protocol):
+    """The interpreter that runs the program."""
+
+    interleaves: bool
+
+    def begin(self, code: GeneratedCode) -> ScriptSteps:
+        """Add the code of a line; return the steps of its statements."""
+
+    def forget(self, variables: Iterable[str]) -> None:
+        """Forget global variables."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,32 +47,24 @@ class LineCompiler:
     """Compiles the lines of one program and keeps their variables and functions."""
 
     def __init__(
-        self,
-        program: Scope,
-        procedures: dict[int, CompiledFunction],
-        builtins: Mapping[str, Builtin],
-        runtime: Runtime,
+        self, program: GeneratedCode, builtins: Mapping[str, Builtin], runtime: Runtime
     ) -> None:
-        """
-        Start without lines.
-
-        :param program: the scope of the program's body.
-        :param procedures: the program's compiled functions, by the identity of their scopes.
-        """
+        """Start without lines."""
         self._program = program
-        self._of_program = procedures
         self._builtins = builtins
         self._runtime = runtime
-        self._slots = len(runtime.globals)
-        self.forget()
+        self._count = 0
+        self._reset()
+
+    def _reset(self) -> None:
+        scope = self._program.scope
+        self._scope = Scope(parent=scope, owner=scope.owner, globals=dict(scope.globals))
+        self._functions = dict(self._program.functions)
 
     def forget(self) -> None:
         """Forget the variables and functions of all lines."""
-        self._scope = Scope(
-            parent=self._program, owner=self._program.owner, globals=dict(self._program.globals)
-        )
-        self._procedures = dict(self._of_program)
-        del self._runtime.globals[self._slots :]
+        self._runtime.forget(self._scope.globals.keys() - self._program.scope.globals)
+        self._reset()
 
     def compile(self, text: str) -> CompiledLine:
         """
@@ -74,18 +74,25 @@ class LineCompiler:
             arguments.
         """
         program = parse_line(text)
+        self._count += 1
         try:
             scope = resolve(program, self._builtins, enclosing=self._scope)
-            procedure = compile_program(scope, self._builtins, self._runtime, self._procedures)
+            code = compile_program(
+                scope,
+                self._builtins,
+                self._functions,
+                interleaves=self._runtime.interleaves,
+                prefix=f'line{self._count}_',
+            )
         except RecursionError:
             raise CompileError(1, 1, 'syntax_error_on_line:1:', 'nested too deeply') from None
         self._scope.globals = scope.globals
         self._scope.functions.update(scope.functions)
-        variables = self._runtime.globals
-        variables.extend([UNSET] * (len(scope.globals) - len(variables)))
+        self._functions |= code.functions
+        del self._functions[id(scope)]
         calls = frozenset(
             node.call.function
             for node in program.body
             if isinstance(node, tree.CallStatement) and isinstance(node.call, tree.CallExpression)
         )
-        return CompiledLine(procedure.steps(), calls)
+        return CompiledLine(self._runtime.begin(code), calls)

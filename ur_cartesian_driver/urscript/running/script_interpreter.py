@@ -21,21 +21,27 @@ by itself, the threads that it started continue; when it is killed, they are kil
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+import inspect
 from random import Random
+import sys
 from typing import Any, NoReturn
 
-from ur_cartesian_driver.urscript.compiling.closures import (
-    CompiledFunction,
+from ur_cartesian_driver.urscript.compiling.compiler import compile_program
+from ur_cartesian_driver.urscript.compiling.generated_code import (
+    builtin_name,
+    GeneratedCode,
+    global_name,
+    place_of_call,
+    place_of_steps,
     ProgramHalted,
-    recursion_error,
+    runtime_exception,
     ScriptSteps,
     SWITCH,
-    UNSET,
 )
-from ur_cartesian_driver.urscript.compiling.compiler import compile_program
-from ur_cartesian_driver.urscript.compiling.scopes import Builtin, resolve, Scope
+from ur_cartesian_driver.urscript.compiling.operations import operations
+from ur_cartesian_driver.urscript.compiling.scopes import Builtin, resolve
 from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
 from ur_cartesian_driver.urscript.running.line_compiler import LineCompiler
 from ur_cartesian_driver.urscript.script_errors import CompileError, RuntimeException
@@ -51,6 +57,10 @@ MAX_THREADS = 256
 SWITCH_PROBABILITY = 0.1
 
 
+#: Generated code of a function; its argument is the depth of the call.
+ThreadFunction = Callable[[int], Any]
+
+
 class _ThreadKilled(BaseException):
     """Unwinds a thread that has killed itself or one of its ancestors."""
 
@@ -62,8 +72,6 @@ class _Thread:
     number: int
     steps: ScriptSteps
     parent: _Thread | None
-    depth: int = 0
-    location: tuple[int, int] = (0, 0)
     alive: bool = True
     in_critical_section: bool = False
     #: Frames until the thread begins.
@@ -94,10 +102,8 @@ class ScriptInterpreter:
     :param thread_delay: frames after which a new thread begins.
     :param interleaving: the random numbers that decide when threads are switched; None = threads
         are switched only when one takes time.
-    :param lazily: compile each function when it is called for the first time: the interpreter is
-        ready much sooner, but a frame with such a call takes longer.
-    :param scope: the `scope` of an earlier interpreter of the same program and builtins; None =
-        resolve the names of the program.
+    :param code: the `code` of an earlier interpreter of the same program and interleaving, whose
+        builtins have the same names and signatures; None = compile the program.
     :raises CompileError: the program cannot run; nothing of it has run.
     """
 
@@ -110,8 +116,7 @@ class ScriptInterpreter:
         total_budget: int | None = None,
         thread_delay: int = 0,
         interleaving: Random | None = None,
-        lazily: bool = False,
-        scope: Scope | None = None,
+        code: GeneratedCode | None = None,
     ) -> None:
         #: This function is called with the number of each thread that ends, for any reason.
         self.on_thread_end: Callable[[Hashable], None] | None = None
@@ -129,22 +134,20 @@ class ScriptInterpreter:
         self._is_secondary = program.kind == 'sec'
         self._current: _Thread | None = None
         self._halted = False
-        try:
-            #: The resolved names of the program; they never change.
-            self.scope = resolve(program, builtins) if scope is None else scope
-            self.globals: list[Any] = [UNSET] * len(self.scope.globals)
-            procedures: dict[int, CompiledFunction] = {}
-            main = compile_program(self.scope, builtins, self, procedures, lazily=lazily)
-        except RecursionError:
-            text = f'syntax_error_on_line:{program.line}:{program.name}:'
-            reason = 'the program is nested too deeply'
-            raise CompileError(program.line, program.column, text, reason) from None
-        self._main = _Thread(0, main.steps(), None)
+        if code is None:
+            code = _compile(program, builtins, self.interleaves)
+        #: The compiled program; it never changes.
+        self.code = code
+        #: The global variables, and all else that the code finds by name.
+        self._names: dict[str, Any] = operations(self) | {
+            builtin_name(name): function for name, function in builtins.items()
+        }
+        self._main = _Thread(0, self.begin(code), None)
         self._threads = [self._main]
         #: Number of threads started so far; the next one gets this number.
         self.threads_started = 1
         #: Compiles lines for the running program.
-        self.lines = LineCompiler(self.scope, procedures, builtins, self)
+        self.lines = LineCompiler(code, builtins, self)
 
     @property
     def running(self) -> bool:
@@ -152,8 +155,7 @@ class ScriptInterpreter:
         return bool(self._threads)
 
     @property
-    def thread(self) -> _Thread:
-        """The running thread; for compiled code."""
+    def _running_thread(self) -> _Thread:
         assert self._current is not None
         return self._current
 
@@ -169,19 +171,36 @@ class ScriptInterpreter:
 
     @property
     def location(self) -> tuple[int, int]:
-        """Line and column of the running call."""
-        return (0, 0) if self._current is None else self._current.location
+        """Line and column of the running call; for the builtin that is called."""
+        return place_of_call(sys._getframe())
 
     @property
     def main_location(self) -> tuple[int, int]:
-        """Line and column of the newest call of the main thread."""
-        return self._main.location
+        """Line and column at which the main thread waits; 0, 0 = it does not."""
+        return place_of_steps(self._main.steps)
 
     @property
     def variables(self) -> dict[str, Value]:
         """The global variables that have a value."""
-        named = ((name, self.globals[slot]) for name, slot in self.scope.globals.items())
-        return {name: value for name, value in named if value is not UNSET}
+        names = self._names
+        return {
+            name: names[global_name(name)]
+            for name in self.code.scope.globals
+            if global_name(name) in names
+        }
+
+    def begin(self, code: GeneratedCode) -> ScriptSteps:
+        """Add the code of the program or of a line; return the steps of its main thread."""
+        for function in code.code:
+            self._names |= function.constants
+            for unit in function.units:
+                exec(unit, self._names)
+        return _steps(self._names.pop(code.main.name))
+
+    def forget(self, variables: Iterable[str]) -> None:
+        """Forget global variables."""
+        for name in variables:
+            self._names.pop(global_name(name), None)
 
     def step(self) -> None:
         """Run one frame: every live thread until it yields or ends."""
@@ -254,10 +273,8 @@ class ScriptInterpreter:
             self._halted = True
         except _ThreadKilled:
             ended = thread.alive
-        except RuntimeException as error:
-            self.error, self._halted = error, True
-        except RecursionError:
-            self.error, self._halted = recursion_error(*thread.location), True
+        except Exception as error:  # of a builtin, too
+            self.error, self._halted = runtime_exception(error), True
         finally:
             self._current = None
             thread.fuel -= available - self.fuel
@@ -272,8 +289,8 @@ class ScriptInterpreter:
         previous, self._current = self._current, thread
         try:
             thread.steps.close()
-        except RuntimeException as error:  # a builtin failed to clean up
-            self.error = self.error or error
+        except Exception as error:  # a builtin failed to clean up
+            self.error = self.error or runtime_exception(error)
         finally:
             self._current = previous
         if self.on_thread_end is not None:
@@ -281,25 +298,28 @@ class ScriptInterpreter:
 
     # Called by compiled code
 
-    def raise_budget_exceeded(self, line: int, column: int) -> NoReturn:
-        """Raise an error: the thread used up its budget without yielding."""
-        raise RuntimeException(BUDGET_EXCEEDED, line, column)
+    @property
+    def in_critical_section(self) -> bool:
+        """Whether the running thread is in a critical section."""
+        return self._running_thread.in_critical_section
 
-    def pay_for(self, items: int, line: int, column: int) -> None:
-        """Spend fuel on the items of a long value; raise an error if too little is left."""
-        self.fuel -= items
-        if self.fuel < 0:
-            self.raise_budget_exceeded(line, column)
+    @in_critical_section.setter
+    def in_critical_section(self, value: bool) -> None:
+        self._running_thread.in_critical_section = value
+
+    def exceed_budget(self) -> NoReturn:
+        """Raise an error: the thread used up its budget without yielding."""
+        raise RuntimeException(BUDGET_EXCEEDED)
 
     def switches_now(self) -> bool:
         """Return whether another thread runs before the next statement."""
         return (
             self._random is not None
-            and not self.thread.in_critical_section
+            and not self.in_critical_section
             and self._random.random() < SWITCH_PROBABILITY
         )
 
-    def spawn(self, procedure: CompiledFunction) -> ThreadHandle:
+    def spawn(self, function: ThreadFunction) -> ThreadHandle:
         """Start a thread; without a delay it can run in this frame."""
         if self._is_secondary:
             raise RuntimeException('A secondary program cannot start threads.')
@@ -307,8 +327,8 @@ class ScriptInterpreter:
             raise RuntimeException(f'More than {MAX_THREADS} threads run at once.')
         thread = _Thread(
             self.threads_started,
-            procedure.steps(),
-            self.thread,
+            _steps(function),
+            self._running_thread,
             delay=self._thread_delay,
             fuel=self._budget,
         )
@@ -343,3 +363,28 @@ class ScriptInterpreter:
             return None
         alive = (thread for thread in self._threads if thread.alive)
         return next((thread for thread in alive if thread.number == handle.number), None)
+
+
+def _compile(
+    program: tree.ScriptProgram, builtins: Mapping[str, Builtin], interleaves: bool
+) -> GeneratedCode:
+    try:
+        return compile_program(resolve(program, builtins), builtins, {}, interleaves=interleaves)
+    except RecursionError:
+        text = f'syntax_error_on_line:{program.line}:{program.name}:'
+        reason = 'the program is nested too deeply'
+        raise CompileError(program.line, program.column, text, reason) from None
+
+
+def _steps(function: ThreadFunction) -> ScriptSteps:
+    """Return the steps of a thread, whether its function can take time or not."""
+    if inspect.isgeneratorfunction(function):
+        steps: ScriptSteps = function(0)
+        return steps
+    return _only_step(function)
+
+
+def _only_step(function: ThreadFunction) -> ScriptSteps:
+    function(0)
+    return
+    yield
