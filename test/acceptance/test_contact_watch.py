@@ -35,6 +35,10 @@ pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 ARM, OPTIONS = Arm(robot_model('ur5e')), PlanningOptions()
 #: How far beside the tool the surface is [m], and how near to it the arm stops [m].
 DISTANCE, ACCURACY = 0.03, 1e-3
+#: How deep a tool is pressed in [m], far beyond the force that is a contact [N].
+PRESSED, TOUCHING = 0.004, 5.0
+#: How far a wall pushes the tool [m]: 20 N, less what the arm gives way.
+PUSHED = 0.001
 STOPPED = 'the watch for contact (detect_tool_contact) stops every motion'
 
 
@@ -103,7 +107,7 @@ async def touched(cell, answer, wall):
     assert float(said[1]) == pytest.approx(place(cell), abs=2e-4)
     assert cell.at_rest()
     assert place(cell) == pytest.approx(wall, abs=ACCURACY)
-    assert abs(cell.robot.controller.tcp_wrench[1]) < 5.0
+    assert abs(cell.robot.controller.tcp_wrench[1]) < TOUCHING
 
 
 @pytest.mark.parametrize('mode', [mode for mode in ExecutionMode if mode])
@@ -158,7 +162,7 @@ def test_a_cancel_on_the_way_back_leaves_the_arm_there_and_the_watch_succeeds(de
         answer = await watch(cell)
         tolerance = Tolerance(position=(0.001, 0.006, 0.001))
         motion = cell.owner.start(line(cell, 0.16, speed=0.16, path_tolerance=tolerance))
-        await cell.until(lambda: abs(cell.robot.controller.tcp_wrench[1]) > 5.0, 5.0)
+        await cell.until(lambda: abs(cell.robot.controller.tcp_wrench[1]) > TOUCHING, 5.0)
         await cell.sleep(delay * CYCLE)
         cell.owner.cancel()
         await cell.until(lambda: motion.outcome)
@@ -213,7 +217,7 @@ def test_a_goal_that_begins_beside_a_contact_moves_nothing_after_its_end(threads
         for half_cycles in range(24):
             wall, answer = put_wall(cell), await watch(cell)
             goal = line(cell, -0.003)
-            move_wall(cell, wall, -DISTANCE - 0.0005)
+            move_wall(cell, wall, -DISTANCE - PUSHED)
             await cell.sleep(half_cycles * 0.5 * CYCLE)
             motion = cell.owner.start(goal)
             await cell.until(lambda motion=motion: motion.outcome, 5.0)
@@ -235,7 +239,7 @@ def test_contact_at_rest_is_found_and_moves_the_arm_by_no_more_than_it_was_pushe
         wall, before, answer = put_wall(cell), place(cell), await watch(cell)
         await cell.sleep(0.5)
         assert answer() is None
-        move_wall(cell, wall, -DISTANCE - 0.0005)  # 10 N
+        move_wall(cell, wall, -DISTANCE - PUSHED)
         await cell.until(answer, 5.0)
         assert answer().ok, answer().text
         assert place(cell) == pytest.approx(before, abs=1e-3)
@@ -246,13 +250,14 @@ def test_contact_at_rest_is_found_and_moves_the_arm_by_no_more_than_it_was_pushe
 
 def test_a_tool_may_leave_what_it_touches():
     async def scenario(cell):
-        wall = put_wall(cell)
-        motion = cell.owner.start(line(cell, DISTANCE + 0.0005))
+        put_wall(cell)
+        motion = cell.owner.start(line(cell, DISTANCE + PRESSED))
         await cell.until(lambda: motion.outcome, 10.0)
         assert motion.outcome.succeeded, motion.outcome.text
         motion = cell.owner.start(line(cell, -0.02))
-        await cell.until(lambda: place(cell) < wall, 5.0)
+        await cell.until(lambda: not cell.at_rest())
         answer = await watch(cell)
+        assert abs(cell.robot.controller.tcp_wrench[1]) > TOUCHING
         await cell.until(lambda: motion.outcome, 10.0)
         assert motion.outcome.succeeded, motion.outcome.text
         assert answer() is None
@@ -295,6 +300,7 @@ def test_a_watch_is_ended_before_the_program_has_identified_itself():
         cell.resend()
         await cell.until(lambda: not cell.status.program_is_own)
         await cell.until(cell.is_ready)
+        assert not cell.status.program_is_own
         number = cell.owner.call(WatchContactCall())
         cell.owner.call(EndContactWatchCall())
         await cell.until(lambda: number in cell.owner.call_answers)
@@ -386,7 +392,7 @@ def test_contact_ends_freedrive():
             StartMotion(motion=1, points=b'', job=stationary_job(plan), freedrive=True)
         )
         await cell.until(lambda: motion.progress)
-        move_wall(cell, wall, -DISTANCE - 0.0005)
+        move_wall(cell, wall, -DISTANCE - PUSHED)
         await cell.until(lambda: motion.outcome, 2.0)
         assert STOPPED in motion.outcome.text
         await cell.until(answer)
@@ -404,7 +410,7 @@ def test_contact_ends_an_open_goal_that_waits_for_points():
         points, job = encode_part(part)
         motion = cell.owner.run(points, job)
         await cell.until(lambda: any(each.awaiting_points for each in motion.progress), 5.0)
-        move_wall(cell, wall, 0.01 - DISTANCE - 0.0005)
+        move_wall(cell, wall, 0.01 - DISTANCE - PUSHED)
         await cell.until(lambda: motion.outcome, 2.0)
         assert motion.outcome.code is ErrorCode.EXECUTION_FAILED
         assert STOPPED in motion.outcome.text
