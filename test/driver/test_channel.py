@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages between the owner and the robot loop."""
 
+from collections import deque
 import socket
 import threading
 
@@ -58,12 +59,20 @@ def test_a_large_order_arrives_whole():
     )
     ours, theirs = socket.socketpair()
     with ours, theirs:
-        thread = threading.Thread(target=ours.sendall, args=(channel.pack(sent),))
+        parts = channel.pack_parts(sent)
+        thread = threading.Thread(target=lambda: deque(map(ours.sendall, parts)))
         thread.start()
         arrived = channel.receive(theirs)
         thread.join()
     assert arrived.points == sent.points
     assert np.array_equal(arrived.job.reference.time, reference.time)
+    assert np.array_equal(arrived.job.reference.poses, reference.poses)
+    # Arrays are not copied; what arrives is part of the message, and numpy likes it in place.
+    assert any(np.shares_memory(np.frombuffer(part, 'u1'), reference.poses) for part in parts)
+    assert arrived.job.reference.poses.base is not None
+    assert arrived.job.reference.poses.flags.aligned
+    # The channel has one form, whoever sends.
+    assert b''.join(parts) == channel.pack(sent)
 
 
 def test_the_end_of_the_pipe_is_none_also_inside_a_message():

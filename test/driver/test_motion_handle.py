@@ -23,8 +23,7 @@ class PlanWithReport:
     offset_band: Any = None
     made = 0
 
-    @property
-    def report(self):
+    def short_report(self):
         self.made += 1
         return ('point 0: LINEAR -> MOVEL',)
 
@@ -85,8 +84,7 @@ def test_the_end_does_not_wait_for_a_report_that_is_being_made():
     begun, may_end = Event(), Event()
 
     class SlowReport(PlanWithReport):
-        @property
-        def report(self):
+        def short_report(self):
             begun.set()
             assert may_end.wait(10.0)
             return ('point 0: LINEAR -> MOVEL',)

@@ -152,6 +152,24 @@ def test_pieces_of_a_spline_are_encoded_from_columns(quintic):
         encode_rows(short)
 
 
+def test_only_lines_that_are_read_are_made():
+    made = []
+
+    def make(rows):
+        made.append(rows)
+        return [str(row) for row in rows]
+
+    lines = LateLines(range(5000), make)
+    part = lines[100:2500]
+    assert (len(lines), len(part), part[0], part[-1]) == (5000, 2400, '100', '2499')
+    assert made == [range(100, 101), range(2499, 2500)]
+    made.clear()
+    assert list(part) == [str(row) for row in range(100, 2500)]
+    assert made == [range(100, 1100), range(1100, 2100), range(2100, 2500)]
+    with pytest.raises(IndexError):
+        part[2400]
+
+
 def test_lines_are_made_when_one_is_read():
     made = []
 
@@ -159,7 +177,7 @@ def test_lines_are_made_when_one_is_read():
         made.append(1)
         return ['a', 'b', 'c']
 
-    lines = LateLines(3, make)
+    lines = LateLines.at_once(3, make)
     part = lines[1:]
     assert (len(lines), len(part), made) == (3, 2, [])
     assert (part[0], part[-1], lines[0], list(lines)) == ('b', 'c', 'a', ['a', 'b', 'c'])

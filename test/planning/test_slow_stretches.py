@@ -161,3 +161,16 @@ def test_times_ask_for_their_mean_and_twists_for_less():
     slower = (0.0, 0.05, 0.0, 0.0, 0.0, 0.0)
     asked = replace(of, waypoints=(points[0], replace(points[1], twist=slower), *points[2:]))
     assert set(causes(asked)) == {SlowCause.RAMP}
+
+
+def test_a_short_report_has_the_first_and_last_lines_and_counts_the_others():
+    made = planned(goal(*(at(y=0.002 * i) for i in range(1, 41)), segment=Segment()))
+    whole, slow = made.report, made.find_slow_stretches()
+    assert 10 < len(slow) < len(whole) // 2
+    assert made.short_report(len(whole)) == whole
+    for limit in (20, len(whole) - 2):
+        short = made.short_report(limit)
+        half = limit // 2
+        assert short[:half] == whole[:half]
+        assert short[half + 1 :] == whole[-half:]
+        assert short[half] == f'({len(whole) - 2 * half} lines are left out here)'

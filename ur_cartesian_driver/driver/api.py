@@ -23,7 +23,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
     LiveSetup,
     Notification,
     OwnerHeartbeat,
-    pack,
+    pack_parts,
     Request,
     ResendProgram,
     SetLiveTarget,
@@ -447,7 +447,7 @@ class Driver(RobotServices, InteractiveMotions):
             if self.config.record_directory
             else '',
         )
-        data = pack(request)
+        data = pack_parts(request)
         active = ActiveMotion(number, plan, on_progress, self._send)
         if part is not None:
             active.motion.appender = self._make_appender(active.motion, part)

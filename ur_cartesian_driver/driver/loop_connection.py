@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import contextlib
 import threading
 
@@ -102,13 +102,14 @@ class LoopConnection:
 
         :raises LocalProtocolError: the request cannot be pickled.
         """
-        self.send_packed(channel.pack(request))
+        self.send_packed(channel.pack_parts(request))
 
-    def send_packed(self, data: bytes) -> None:
+    def send_packed(self, parts: Sequence[channel.Buffer]) -> None:
         """Send a packed request."""
         with self.lock, contextlib.suppress(OSError):
             if self.host is not None:
-                self.host.pipe.sendall(data)
+                for part in parts:
+                    self.host.pipe.sendall(part)
 
     def _start_thread(self, name: str, target: Callable[[], None]) -> None:
         thread = threading.Thread(target=target, name=name, daemon=True)

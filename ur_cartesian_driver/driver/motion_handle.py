@@ -208,7 +208,7 @@ class ActiveMotion:
             plan, self._plan = self._plan, None
         if plan is None:
             return
-        report = plan.report
+        report = plan.short_report()
         with self._lock:
             self._plan_report, ended = report, self._ended
         if ended is not None:

@@ -4,17 +4,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import Future
 import itertools
 
 from ur_cartesian_driver.driver.ipc.channel import (
     AppendAnswered,
+    Buffer,
     CallAnswered,
     CallRobot,
     MotionEnded,
     MotionProgress,
     Notification,
-    pack,
+    pack_parts,
     Request,
     TemporaryTcpSet,
 )
@@ -40,7 +42,7 @@ class RunningMotions:
         self._motions: dict[int, ActiveMotion] = {}
         self._calls: dict[int, Future[ServiceAnswer]] = {}
 
-    def start(self, active: ActiveMotion, request: bytes, not_ready: str) -> None:
+    def start(self, active: ActiveMotion, request: Sequence[Buffer], not_ready: str) -> None:
         """
         Send the request that starts a motion.
 
@@ -63,7 +65,7 @@ class RunningMotions:
         future: Future[ServiceAnswer] = Future()
         future.set_running_or_notify_cancel()
         number = next(self.numbers)
-        data = pack(CallRobot(number=number, call=call))
+        data = pack_parts(CallRobot(number=number, call=call))
         with self._loop.lock:
             if self._loop.is_open:
                 self._calls[number] = future

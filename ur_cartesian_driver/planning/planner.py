@@ -15,7 +15,7 @@ reference path and report. The first stage that finds a fault in the goal raises
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from math import inf
@@ -403,7 +403,7 @@ class GoalPlanner:
         segments: PlannedRows,
         motion: ReferencePath,
         remarks: Iterable[str],
-        find_slow_stretches: Callable[[], tuple[SlowStretch, ...]],
+        find_slow_stretches: Callable[[], Sequence[SlowStretch]],
         point_times: Floats | None = None,
     ) -> Plan:
         """

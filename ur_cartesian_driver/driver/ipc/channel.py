@@ -3,11 +3,12 @@
 """
 The pipe between the owner of a driver and the robot loop.
 
-A message is sent as its length, then two pickles. The second pickle is the message itself, one of
-the dataclasses below. The first is the notification that refuses the message, for a receiver that
-cannot read the second (None = the message needs no answer). Both ends run this package, and no
-other process can open the pipe (a pair of sockets), so pickle is safe here. Pickle is used because
-it moves the arrays of a large plan without conversion.
+A message is sent as its length, then three pickles and its large arrays. The first pickle is the
+notification that refuses the message, for a receiver that cannot read it (None = the message needs
+no answer). The second has the sizes of the arrays, which follow it, each at a multiple of
+:data:`ALIGNMENT`. The last is the message itself, one of the dataclasses below. Both ends run this
+package, and no other process can open the pipe (a pair of sockets), so pickle is safe here. A
+large plan has 60 MB of arrays, which are copied neither to be sent nor to be read (PEP 574).
 """
 
 from __future__ import annotations
@@ -35,6 +36,9 @@ from ur_cartesian_driver.robot.connection_status import ConnectionStatus, LinkGa
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, ServiceCall
 
 LENGTH = struct.Struct('>I')
+Buffer: TypeAlias = bytes | memoryview
+#: Arrays of at least the first size are sent beside the pickle, at multiples of the second [B].
+LARGE_ARRAY, ALIGNMENT = 1 << 16, 16
 #: The reason of the refusal that is sent when the receiver cannot read the message.
 UNREADABLE = (
     'The robot process cannot read the request, because it contains objects of classes that only '
@@ -319,31 +323,57 @@ def pack(message: Request | Notification) -> bytes:
 
     :raises LocalProtocolError: a part of the message cannot be pickled.
     """
-    stream = io.BytesIO()  # written once: a long goal has 50 MB, so each copy would take long
-    stream.write(bytes(LENGTH.size))
+    return b''.join(pack_parts(message))
+
+
+def pack_parts(message: Request | Notification) -> list[Buffer]:
+    """
+    Return a message in parts, which are sent one after the other; large arrays are not copied.
+
+    :raises LocalProtocolError: a part of the message cannot be pickled.
+    """
+    arrays: list[memoryview] = []
+
+    def keep_inside(buffer: pickle.PickleBuffer) -> bool:
+        """Return whether a buffer stays inside of the pickle."""
+        array = buffer.raw()
+        is_small = array.nbytes < LARGE_ARRAY
+        if not is_small:
+            arrays.append(array)
+        return is_small
+
     try:
-        pickle.dump(refusal_of(message, UNREADABLE), stream)
-        pickle.dump(message, stream, protocol=pickle.HIGHEST_PROTOCOL)
-        size = stream.tell() - LENGTH.size
-        stream.seek(0)
-        stream.write(LENGTH.pack(size))
-        return stream.getvalue()
+        refusal = pickle.dumps(refusal_of(message, UNREADABLE))
+        body = pickle.dumps(message, protocol=5, buffer_callback=keep_inside)
     except Exception as error:  # pickling calls methods of every object in the message
         raise LocalProtocolError(
             f'{type(message).__name__} cannot be sent to the robot process: {error}.'
         ) from error
+    begin = refusal + pickle.dumps([array.nbytes for array in arrays])
+    parts: list[Buffer] = []
+    size = len(begin)
+    for array in arrays:
+        parts += [bytes(-size % ALIGNMENT), array]
+        size += len(parts[-2]) + array.nbytes
+    begin = LENGTH.pack(size + len(body)) + begin
+    return [begin, *parts, body] if arrays else [begin + body]
 
 
 def unpack(body: bytes) -> Request | Notification:
     """
-    Return the message in the bytes that follow the length.
+    Return the message in the bytes that follow the length; its large arrays are parts of them.
 
     :raises Unreadable: the bytes are no pickles, or use classes that this process does not have.
     """
     stream, refusal = io.BytesIO(body), None
     try:
         refusal = pickle.load(stream)
-        message: Request | Notification = pickle.load(stream)
+        arrays, whole = [], memoryview(body)
+        for size in pickle.load(stream):
+            first = stream.tell() + -stream.tell() % ALIGNMENT
+            arrays.append(whole[first : first + size])
+            stream.seek(first + size)
+        message: Request | Notification = pickle.load(stream, buffers=arrays)
     except Exception as error:  # unpickling calls the functions that the bytes name
         raise Unreadable(f'{type(error).__name__}: {error}', refusal) from error
     return message

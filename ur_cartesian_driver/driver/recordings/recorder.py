@@ -52,12 +52,9 @@ MEGABYTE = 1_000_000
 
 def plan_metadata(plan: Plan, options: PlanningOptions) -> str:
     """Return the metadata that only the planning process has, as JSON: report and options."""
-    lines = plan.report
-    if len(lines) > MAX_REPORT_LINES:
-        lines = (*lines[:MAX_REPORT_LINES], f'... and {len(lines) - MAX_REPORT_LINES} more lines')
     return json.dumps(
         {
-            'report': lines,
+            'report': plan.short_report(MAX_REPORT_LINES),
             'frame_id': plan.goal.frame_id,
             'controlled_frame': plan.goal.controlled_frame,
             'planning': _parameters(options),

@@ -93,6 +93,8 @@ class BlendEntry(NamedTuple):
     half: float
 
 
+#: Segments and remarks with a line in a short report; lines that are made at once.
+MAX_REPORT_LINES, _LINES_AT_ONCE = 10_000, 1000
 _NO_BLEND = BlendEntry(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -121,19 +123,31 @@ class PlannedSegment:
 
 
 class LateLines(Sequence[str]):
-    """Lines of a report, all made when any of them is first read: long goals have many."""
+    """Lines of a report, made when they are read: long goals have many."""
 
-    def __init__(self, count: int, make: Callable[[], Sequence[str]]) -> None:
+    def __init__(self, rows: range, make: Callable[[range], Sequence[str]]) -> None:
         """
-        Keep the function that makes all lines.
+        Keep the function that makes lines.
 
-        :param count: the number of lines that ``make`` returns.
+        :param rows: the rows of the lines, one after the other.
+        :param make: returns the lines of some of these rows, one after the other.
         """
-        self._rows, self._lines = range(count), cache(make)
+        self._rows, self._make = rows, make
+
+    @classmethod
+    def at_once(cls, count: int, make: Callable[[], Sequence[str]]) -> LateLines:
+        """Return lines that are all made when any of them is first read."""
+        lines = cache(make)
+        return cls(range(count), lambda rows: lines()[rows.start : rows.stop])
 
     def __len__(self) -> int:
         """Return the number of lines."""
         return len(self._rows)
+
+    def __iter__(self) -> Iterator[str]:
+        """Make the lines block by block."""
+        for first in range(0, len(self), _LINES_AT_ONCE):
+            yield from self._make(self._rows[first : first + _LINES_AT_ONCE])
 
     @overload
     def __getitem__(self, index: int) -> str: ...
@@ -142,12 +156,11 @@ class LateLines(Sequence[str]):
     def __getitem__(self, index: slice) -> LateLines: ...
 
     def __getitem__(self, index: int | slice) -> str | LateLines:
-        """Return a line, or a slice of the lines; taking a slice does not make the lines yet."""
-        if isinstance(index, int):
-            return self._lines()[self._rows[index]]
-        part = LateLines(0, self._lines)
-        part._rows = self._rows[index]
-        return part
+        """Return a line, or a slice of the lines with a step of 1, not made yet."""
+        if isinstance(index, slice):
+            return LateLines(self._rows[index], self._make)
+        row = self._rows[index]
+        return self._make(range(row, row + 1))[0]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -263,7 +276,7 @@ class Plan:
     #: Lines of the report about ignored, slowed or changed requests, or about the whole goal.
     remarks: tuple[str, ...] = field(default=())
     #: Finds the slow stretches; called only on demand, because long goals have many.
-    find_slow_stretches: Callable[[], tuple[SlowStretch, ...]] = field(default=tuple)
+    find_slow_stretches: Callable[[], Sequence[SlowStretch]] = field(default=tuple)
 
     @property
     def duration(self) -> float:
@@ -278,15 +291,39 @@ class Plan:
     @property
     def report(self) -> tuple[str, ...]:
         """One line for each segment, the remarks, and one line for each slow stretch."""
-        rows = self.rows
-        # A piece that passes several points has a line for each.
-        lines = (
-            line
-            for i, lines in enumerate(rows.report_lines)
-            for line in (lines + rows.notes.get(i, '')).split('\n')
+        return (*self._segment_lines(range(len(self.segments))), *self._last_lines())
+
+    def short_report(self, limit: int = MAX_REPORT_LINES) -> tuple[str, ...]:
+        """Return the report; if it has more lines than a limit, only the first and last ones."""
+        count, last = len(self.segments), self._last_lines()
+        total = count + len(last)
+        if total <= limit:
+            return self.report
+        half = limit // 2
+        last = last[-half:]
+        first = range(min(half, count))
+        end = range(max(len(first), count + len(last) - half), count)
+        left_out = total - len(first) - len(end) - len(last)
+        return (
+            *self._segment_lines(first),
+            f'({left_out} lines are left out here)',
+            *self._segment_lines(end),
+            *last,
         )
-        slow = (stretch.line for stretch in self.find_slow_stretches())
-        return (*filter(None, lines), *self.remarks, *slow)
+
+    def _segment_lines(self, rows: range) -> tuple[str, ...]:
+        planned = self.rows
+        lines = planned.report_lines[rows.start : rows.stop]
+        # A piece that passes several points has a line for each.
+        return tuple(
+            line
+            for row, lines in zip(rows, lines, strict=True)
+            for line in (lines + planned.notes.get(row, '')).split('\n')
+            if line
+        )
+
+    def _last_lines(self) -> tuple[str, ...]:
+        return (*self.remarks, *(stretch.line for stretch in self.find_slow_stretches()))
 
     @property
     def joint_spline(self) -> JointSpline:

@@ -30,16 +30,18 @@ def segment_lines(
     :param reasons: for each point, the reasons for the choice of its primitive.
     """
 
-    def make() -> list[str]:
+    def make(rows: range) -> list[str]:
         lines, path = [], geometries.path
+        part = slice(rows.start, rows.stop)
         columns = zip(
-            geometries.segments.types.tolist(),
-            primitives,
-            path.radius.tolist(),
-            geometries.tightest_margins,
+            rows,
+            geometries.segments.types[part].tolist(),
+            primitives[part],
+            path.radius[part].tolist(),
+            geometries.tightest_margins[part],
             strict=True,
         )
-        for row, (asked, primitive, radius, margin) in enumerate(columns):
+        for row, asked, primitive, radius, margin in columns:
             why = reasons.get(geometries.begin + row)
             parts = [
                 f'point {geometries.begin + row}: {SegmentType(asked).name} -> {_name(primitive)}'
@@ -52,7 +54,7 @@ def segment_lines(
             lines.append(f'{", ".join(parts)}; margin {margin}')
         return lines
 
-    return LateLines(len(geometries), make)
+    return LateLines(range(len(geometries)), make)
 
 
 def stop_remarks(geometries: SegmentGeometries) -> list[str]:

@@ -11,13 +11,16 @@ planned path, which follows an assumed law (:mod:`~.move_chain`).
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.goal.goal import SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import rows_where
+from ur_cartesian_driver.motion.goal.goal_table import Rows, rows_where
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SLOWER_BY, SlowStretch
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
@@ -30,6 +33,8 @@ _REVERSAL = -0.98
 #: Fraction of ``slower_by`` that is tolerated in blends sampled by chords: the speed of a chord is
 #: a mean, above the lowest speed.
 _CHORD_PART = 0.5
+#: A column of objects that many rows share.
+Shared = NDArray[Any]
 _TINY = 1e-12
 #: Rows of the reference path whose times differ by less than this [s] count as equal.
 _SAME_TIME = 1e-6
@@ -44,12 +49,49 @@ def unknown_speeds(geometries: SegmentGeometries) -> tuple[list[int], list[int]]
     )
 
 
+@dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
+class SlowStretches(Rows[SlowStretch]):
+    """Slow stretches in columns, each (n,): a goal with many points can have several at each."""
+
+    first: Indices
+    first_fraction: Floats
+    last: Indices
+    last_fraction: Floats
+    asked: Floats
+    lowest: Floats
+    causes: Shared
+    #: Texts in which the reason has ``{point}`` and ``{speed}``.
+    reasons: Shared
+    points: Indices
+    #: Speeds in the reasons [m/s].
+    speeds: Floats
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def __iter__(self) -> Iterator[SlowStretch]:
+        for first, begin, last, end, asked, lowest, cause, reason, point, speed in self._numbers(
+            *self.__dataclass_fields__
+        ):
+            yield SlowStretch(
+                first=first,
+                first_fraction=begin,
+                last=last,
+                last_fraction=end,
+                asked=asked,
+                lowest=lowest,
+                cause=cause,
+                reason=reason.format(point=point, speed=speed),
+                point=point,
+            )
+
+
 def slow_move_stretches(
     geometries: SegmentGeometries,
     timings: SegmentTimings,
     reference: ReferencePath,
     slower_by: float = SLOWER_BY,
-) -> tuple[SlowStretch, ...]:
+) -> SlowStretches:
     """
     Return the slow stretches of a plan of moves, in the order of the path.
 
@@ -85,10 +127,15 @@ class _SlowMoves:
         self._wanted = (1.0 - slower_by) * self._asked / np.maximum(self._ratio, _TINY)
         self._too_slow = self._carries & (times.cruise < self._wanted)
 
-    def stretches(self) -> tuple[SlowStretch, ...]:
+    def stretches(self) -> SlowStretches:
         """Return the stretches in the order of the path."""
-        found = [*self._at_points(), *self._cruises(), *self._blends()]
-        return tuple(sorted(found, key=lambda each: (each.first, each.first_fraction)))
+        groups = [*self._at_points(), self._cruises(), self._blends()]
+        columns = {
+            name: np.concatenate([getattr(group, name) for group in groups])
+            for name in SlowStretches.__dataclass_fields__
+        }
+        order = np.lexsort((columns['first_fraction'], columns['first']))
+        return SlowStretches(**{name: column[order] for name, column in columns.items()})
 
     # -- between the blends ----------------------------------------------------------------------
 
@@ -132,13 +179,9 @@ class _SlowMoves:
         fractions: Floats = path.u_join + (path.u_leave - path.u_join) * distances / full
         return fractions
 
-    def _at_points(self) -> Iterator[SlowStretch]:
-        """Return the stretches around points at which the tool brakes or speeds up."""
-        begin, path, times = (
-            self._geometries.begin,
-            self._geometries.path,
-            self._timings.chain.times,
-        )
+    def _at_points(self) -> Iterator[SlowStretches]:
+        """Yield the stretches around points at which the tool brakes or speeds up."""
+        path, times = self._geometries.path, self._timings.chain.times
         speeds_up, brakes = self._ramps()
         begins, ends = self._fractions(brakes), self._fractions(speeds_up)
         # Whether each segment is the first after a joint move, and whether it is the last before
@@ -147,36 +190,57 @@ class _SlowMoves:
         heads, tails = speeds_up > 0.0, brakes < times.length - times.tail
         entering, leaving = times.enter * self._ratio, times.leave * self._ratio
         blended = path.has_blend_after
-        if heads[0]:
-            where = (0, path.u_join[0], 0, ends[0])
-            reason = 'the arm starts from rest'
-            yield self._stretch(where, entering[0], SlowCause.RAMP, reason, begin)
-        for row in rows_where(tails & blended):
-            yield self._stretch(
-                (row, begins[row], row, path.u_leave[row]),
-                leaving[row],
-                SlowCause.RAMP if closes[row] else SlowCause.BLEND,
-                f'it brakes because of the blend at point {begin + row}',
-                begin + row,
-            )
-        for row in rows_where(heads & path.has_blend_before):
-            yield self._stretch(
-                (row, path.u_join[row], row, ends[row]),
-                entering[row],
-                SlowCause.RAMP if opens[row] else SlowCause.BLEND,
-                f'it is still slow because of the blend at point {begin + row - 1}',
-                begin + row - 1,
-            )
-        for row in rows_where((tails | np.append(heads[1:], False)) & ~blended):
-            tail, head = bool(tails[row]), row + 1 < len(heads) and bool(heads[row + 1])
-            cause, reason = SlowCause.STOP, f'the arm comes to rest at point {begin + row}'
-            if tail and head and self._reverses(row):
-                cause, reason = SlowCause.REVERSAL, f'the path reverses at point {begin + row}'
-            if (not tail or closes[row]) and (not head or opens[row + 1]):
-                cause = SlowCause.RAMP
-            start = (row, begins[row]) if tail else (row + 1, 0.0)
-            end = (row + 1, ends[row + 1]) if head else (row, 1.0)
-            yield self._stretch((*start, *end), 0.0, cause, reason, begin + row)
+        rows = np.flatnonzero(heads[:1])
+        yield self._stretches(
+            (rows, path.u_join[rows], rows, ends[rows]),
+            entering[rows],
+            SlowCause.RAMP,
+            'the arm starts from rest',
+        )
+        rows = np.flatnonzero(tails & blended)
+        yield self._stretches(
+            (rows, begins[rows], rows, path.u_leave[rows]),
+            leaving[rows],
+            _choose(closes[rows], SlowCause.RAMP, SlowCause.BLEND),
+            'it brakes because of the blend at point {point}',
+        )
+        rows = np.flatnonzero(heads & path.has_blend_before)
+        yield self._stretches(
+            (rows, path.u_join[rows], rows, ends[rows]),
+            entering[rows],
+            _choose(opens[rows], SlowCause.RAMP, SlowCause.BLEND),
+            'it is still slow because of the blend at point {point}',
+            rows - 1,
+        )
+        # Stops: the tool brakes before the point, or speeds up behind it, or both.
+        heads, opens, ends = (
+            np.append(heads[1:], False), np.append(opens[1:], False), np.append(ends[1:], 0.0)
+        )  # fmt: skip
+        rows = np.flatnonzero((tails | heads) & ~blended)
+        tail, head = tails[rows], heads[rows]
+        reverses = tail & head
+        reverses[reverses] = self._reverses(rows[reverses])
+        is_ramp = (~tail | closes[rows]) & (~head | opens[rows])
+        yield self._stretches(
+            (
+                np.where(tail, rows, rows + 1),
+                np.where(tail, begins[rows], 0.0),
+                np.where(head, rows + 1, rows),
+                np.where(head, ends[rows], 1.0),
+            ),
+            np.zeros(len(rows)),
+            np.where(
+                is_ramp,
+                _shared(SlowCause.RAMP),
+                _choose(reverses, SlowCause.REVERSAL, SlowCause.STOP),
+            ),
+            _choose(
+                reverses,
+                'the path reverses at point {point}',
+                'the arm comes to rest at point {point}',
+            ),
+            rows,
+        )
 
     def _runs(self) -> tuple[Flags, Flags]:
         """Return whether each segment (n,) is the first, and the last, between joint moves."""
@@ -187,50 +251,60 @@ class _SlowMoves:
         closes[rows[np.diff(run[rows], append=len(run) + 1) > 0]] = True
         return opens, closes
 
-    def _reverses(self, row: int) -> bool:
-        """Return whether the path reverses at the end of a segment."""
+    def _reverses(self, rows: Indices) -> Flags:
+        """Return whether the path reverses at the ends of segments (n,)."""
         curves = self._geometries.path.curves
-        at = np.array([row, row, row + 1, row + 1]), np.array([0.999, 1.0, 0.0, 0.001])
-        before, here, _, after = curves.rows(*at)[:, :3]
+        before, here, after = (
+            curves.rows(rows + beyond, np.full(len(rows), u))[:, :3]
+            for beyond, u in ((0, 0.999), (0, 1.0), (1, 0.001))
+        )
         a, b = here - before, after - here
-        return bool(a @ b <= _REVERSAL * np.linalg.norm(a) * np.linalg.norm(b))
+        along = np.einsum('ij,ij->i', a, b)
+        reverses: Flags = along <= _REVERSAL * (
+            np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
+        )
+        return reverses
 
     # -- whole segments --------------------------------------------------------------------------
 
-    def _cruises(self) -> Iterator[SlowStretch]:
+    def _cruises(self) -> SlowStretches:
         """Return the stretches of segments whose cruising speed is too low."""
-        geometries, timings, times = self._geometries, self._timings, self._timings.chain.times
+        times, limited = self._timings.chain.times, self._timings.requests.limited
         speeds_up, brakes = self._ramps()
         begins, ends = self._fractions(speeds_up), self._fractions(brakes)
-        for row in rows_where(self._too_slow & (ends > begins)):
-            point = geometries.begin + row
-            lowest, limit = times.cruise[row], timings.requests.limited.get(row)
-            if self._is_short[row] or self._turns[row]:
-                lowest = min(times.enter[row], times.leave[row], lowest)
-            if self._is_short[row]:
-                cause = SlowCause.SHORT
-                speed = times.cruise[row] * self._ratio[row]
-                reason = f'the segment is too short for more than {speed:.3g} m/s'
-            elif limit is not None:
-                cause, reason = limit.cause, f'of {limit.text}'
-            elif self._turns[row]:
-                cause, reason = SlowCause.TURN, 'the tool turns that far on the segment'
-            else:
-                cause, reason = SlowCause.TIMES, 'the times of its neighbours leave it more time'
-            where = (row, begins[row], row, ends[row])
-            yield self._stretch(where, lowest * self._ratio[row], cause, reason, point)
+        rows = np.flatnonzero(self._too_slow & (ends > begins))
+        is_short, turns = self._is_short[rows], self._turns[rows]
+        lowest = times.cruise[rows]
+        at_ends = np.minimum(times.enter[rows], times.leave[rows])
+        lowest = np.where(is_short | turns, np.minimum(lowest, at_ends), lowest)
+        causes = _choose(turns, SlowCause.TURN, SlowCause.TIMES)
+        reasons = _choose(
+            turns,
+            'the tool turns that far on the segment',
+            'the times of its neighbours leave it more time',
+        )
+        for i, row in enumerate(rows.tolist()):
+            if (limit := limited.get(row)) is not None:
+                causes[i], reasons[i] = limit.cause, f'of {_literal(limit.text)}'
+        causes[is_short] = SlowCause.SHORT
+        reasons[is_short] = 'the segment is too short for more than {speed:.3g} m/s'
+        return self._stretches(
+            (rows, begins[rows], rows, ends[rows]),
+            lowest * self._ratio[rows],
+            causes,
+            reasons,
+            speeds=times.cruise[rows] * self._ratio[rows],
+        )
 
     # -- in blends -------------------------------------------------------------------------------
 
-    def _blends(self) -> list[SlowStretch]:
+    def _blends(self) -> SlowStretches:
         """Return the blends in which the planned path is slower than requested."""
         path, times, reference = self._geometries.path, self._timings.chain.times, self._reference
         ratio = self._ratio
         rows = np.flatnonzero(path.has_blend_after)
         carries = np.append(self._carries, False)
         rows = rows[carries[rows] | carries[rows + 1]]
-        if not len(rows):
-            return []
         end = times.begins[rows + 1]
         begin = end - times.blend_time[rows + 1]
         steps = np.linalg.norm(np.diff(reference.poses[:, :3], axis=0), axis=1)
@@ -248,41 +322,58 @@ class _SlowMoves:
         lowest = np.where(path.fillet[rows], ends, lowest)
         part = np.where(path.fillet[rows], 1.0, _CHORD_PART)
         slow = lowest < (1.0 - part * self._slower_by) * asked
-        return [
-            self._stretch(
-                (row, path.u_leave[row], row + 1, path.u_join[row + 1]),
-                low,
-                SlowCause.IN_BLEND,
-                f'of the blend at point {self._geometries.begin + row} (as assumed for motion '
-                'version 1: how fast the robot passes blends is not published)',
-                self._geometries.begin + row,
-                asked=wish,
-            )
-            for row, low, wish in zip(
-                rows[slow].tolist(), lowest[slow].tolist(), asked[slow].tolist(), strict=True
-            )
-        ]
-
-    def _stretch(
-        self,
-        place: tuple[int, float, int, float],
-        lowest: float,
-        cause: SlowCause,
-        reason: str,
-        point: int,
-        asked: float | None = None,
-    ) -> SlowStretch:
-        """Return the stretch at a place: first row and fraction, last row and fraction."""
-        first, begin, last, end = place
-        base = self._geometries.begin
-        return SlowStretch(
-            first=base + first,
-            first_fraction=float(begin),
-            last=base + last,
-            last_fraction=float(end),
-            asked=asked or float(np.fmax(self._asked[first], self._asked[last])),
-            lowest=float(lowest),
-            cause=cause,
-            reason=reason,
-            point=point,
+        rows = rows[slow]
+        return self._stretches(
+            (rows, path.u_leave[rows], rows + 1, path.u_join[rows + 1]),
+            lowest[slow],
+            SlowCause.IN_BLEND,
+            'of the blend at point {point} (as assumed for motion version 1: how fast the robot '
+            'passes blends is not published)',
+            asked=asked[slow],
         )
+
+    def _stretches(
+        self,
+        place: tuple[Indices, Floats, Indices, Floats],
+        lowest: Floats,
+        causes: Shared | SlowCause,
+        reasons: Shared | str,
+        points: Indices | None = None,
+        asked: Floats | None = None,
+        speeds: Floats | None = None,
+    ) -> SlowStretches:
+        """
+        Return the stretches at places (n,): first row and fraction, last row and fraction.
+
+        :param points: rows of the segments to the points that are named; None = the first ones.
+        """
+        first, begin, last, end = place
+        base, shape = self._geometries.begin, first.shape
+        return SlowStretches(
+            first=base + first,
+            first_fraction=begin,
+            last=base + last,
+            last_fraction=end,
+            asked=np.fmax(self._asked[first], self._asked[last]) if asked is None else asked,
+            lowest=lowest,
+            causes=causes if isinstance(causes, np.ndarray) else np.full(shape, causes, object),
+            reasons=(
+                reasons if isinstance(reasons, np.ndarray) else np.full(shape, reasons, object)
+            ),
+            points=base + (first if points is None else points),
+            speeds=np.zeros(shape) if speeds is None else speeds,
+        )
+
+
+def _shared(value: object) -> Shared:
+    return np.array(value, dtype=object)
+
+
+def _choose(condition: Flags, this: object, other: object) -> Shared:
+    """Return a column that has one of two objects in each row."""
+    return np.where(condition, _shared(this), _shared(other))
+
+
+def _literal(text: str) -> str:
+    """Return a text that :meth:`str.format` leaves as it is."""
+    return text.replace('{', '{{').replace('}', '}}')

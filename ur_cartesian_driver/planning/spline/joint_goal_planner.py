@@ -402,5 +402,5 @@ def _segments(trajectory: _Trajectory, samples: _Samples, durations: Floats) -> 
             durations=durations,
             quintic=np.full(n, trajectory.quintic),
         ),
-        report_lines=LateLines(n, lines),
+        report_lines=LateLines.at_once(n, lines),
     )

@@ -115,7 +115,9 @@ def piece_rows(
             durations=durations,
             quintic=np.full(n, polynomials.quintic),
         ),
-        report_lines=LateLines(n, lambda: lines(np.stack([lengths, angles, durations], axis=1))),
+        report_lines=LateLines.at_once(
+            n, lambda: lines(np.stack([lengths, angles, durations], axis=1))
+        ),
     )
 
 

@@ -116,7 +116,7 @@ class SplinePieces:
     #: The path; row 0 is the start, and times are since the start of the motion.
     reference: ReferencePath
     remarks: tuple[str, ...]
-    find_slow_stretches: Callable[[], tuple[SlowStretch, ...]]
+    find_slow_stretches: Callable[[], Sequence[SlowStretch]]
     #: State at the last point.
     end: SplineState
     #: Factor by which all times were stretched.

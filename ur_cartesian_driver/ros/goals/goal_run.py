@@ -143,7 +143,9 @@ class GoalRun:
             plan = self._plan(goal)
             context.show(plan)
             return Outcome(
-                code=ErrorCode.SUCCESSFUL, text='The goal passed all checks.', report=plan.report
+                code=ErrorCode.SUCCESSFUL,
+                text='The goal passed all checks.',
+                report=plan.short_report(),
             )
         if self.is_scheduled:
             self._plan(goal)

@@ -127,7 +127,7 @@ class Stops:
             PlannedRows(
                 **columns,
                 primitives=tuple(primitives),
-                report_lines=LateLines(len(primitives), with_stops),
+                report_lines=LateLines.at_once(len(primitives), with_stops),
                 notes=notes,
             ),
             _resting_path(reference, np.array(waypoints), np.array(durations)),
