@@ -127,6 +127,12 @@ def test_a_twin_of_another_arm_is_named_and_not_used_unless_asked(cell):
     assert 'measured on another arm, 2026-11-27: blend_begin' in text
 
 
+def test_a_twin_of_another_model_is_noticed_without_a_robot(cell):
+    twin = replace(twin_of(**BLENDS), arm=ArmIdentity(model='ur10e'))
+    text = report(cell, PlanningOptions(twin=twin))
+    assert f'model ur10e, not {cell.arm.model.name}; the plan does not follow it' in text
+
+
 def test_twin_file_is_read_and_refused_with_its_line(tmp_path):
     file = tmp_path / 'twin.yaml'
     twin = twin_of(**BLENDS)
@@ -135,7 +141,9 @@ def test_twin_file_is_read_and_refused_with_its_line(tmp_path):
     assert options.twin == twin
     file.write_text(twin_text(twin).replace('blend_begin', 'blend_start'))
     assert replace(options, max_tool_speed=0.1).twin == twin
-    with pytest.raises(ValueError, match=r'twin\.yaml, line \d+: blend_start is no law'):
+    with pytest.raises(
+        ValueError, match=r'^twin_file: .*twin\.yaml, line \d+: blend_start is no law'
+    ):
         PlanningOptions(twin_file=str(file))
     with pytest.raises(ValueError, match='which cannot be read: No such file'):
         PlanningOptions(twin_file=str(tmp_path / 'none.yaml'))

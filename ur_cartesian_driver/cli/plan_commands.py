@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 import sys
 from tempfile import NamedTemporaryFile
@@ -32,7 +31,6 @@ from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.motion.plan.slow_stretch import speed_advice
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
-from ur_cartesian_driver.motion.twin.twin import ArmIdentity
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.robot.rtde.probe import read_state
 from ur_cartesian_driver.robot.rtde.state_stream import StateStream
@@ -204,10 +202,7 @@ class GoalPlanning:
         from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
 
         settings = self._settings
-        options = replace(
-            settings.planning.for_program(settings.driver),
-            robot=ArmIdentity(model=self.arm.model.name),
-        )
+        options = settings.planning.for_program(settings.driver)
         self.goal = goal_from_message(
             self._message,
             settings.frames,

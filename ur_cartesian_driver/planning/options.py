@@ -13,7 +13,7 @@ from ur_cartesian_driver.motion.goal.output_names import parse_safe_outputs
 from ur_cartesian_driver.motion.goal.parameter_fields import check_parameters, Detected
 from ur_cartesian_driver.motion.twin.laws import MotionLaws
 from ur_cartesian_driver.motion.twin.twin import ArmIdentity, laws_of, Twin, UNKNOWN_ARM
-from ur_cartesian_driver.motion.twin.twin_file import read_twin
+from ur_cartesian_driver.motion.twin.twin_file import read_twin, TwinFileError
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
@@ -275,3 +275,5 @@ def _read_twin(path: str) -> Twin:
     except OSError as error:
         reason = error.strerror or error
         raise ValueError(f'twin_file is {path!r}, which cannot be read: {reason}.') from None
+    except TwinFileError as error:
+        raise ValueError(f'twin_file: {error}') from None

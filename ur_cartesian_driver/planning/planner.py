@@ -16,6 +16,7 @@ reference path and report. The first stage that finds a fault in the goal raises
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from math import inf
@@ -24,7 +25,7 @@ from typing import TypeAlias
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.errors import GoalRefused, NearSingularity
+from ur_cartesian_driver.motion.errors import GoalRefused, NearSingularity, TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.pose_rows import transform_rows
@@ -127,11 +128,14 @@ def plan(
     :raises GoalRefused: the goal fails a check (a subclass is raised); the text names point,
         quantity, value and bound.
     """
+    if options.twin is not None and not options.robot.model:
+        options = replace(options, robot=replace(options.robot, model=arm.model.name))
     table = check_for_arm(goal, state.T_flange_tcp, arm, options)
     if options.laws.blend_begin < 1.0 and table.segments.blend_radii.any():
-        # A measured law must not let a goal pass that was refused: the limits have to hold on the
-        # path of the assumed blends, too.
-        _plan(table, state, arm, replace(options, twin=None, twin_file=''), running)
+        # A measured law must not let a goal pass that was refused: the path of the assumed blends
+        # has to be possible, too. How long it takes does not matter.
+        with suppress(TooFast):
+            _plan(table, state, arm, replace(options, twin=None, twin_file=''), running)
     return _plan(table, state, arm, options, running)
 
 
