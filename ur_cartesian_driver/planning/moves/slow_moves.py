@@ -25,6 +25,10 @@ from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SLOWER_BY, SlowStretch
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
+from ur_cartesian_driver.planning.request.blend_limits import (
+    blend_law,
+    blends_are_measured,
+)
 from ur_cartesian_driver.planning.request.goal_fields import OPTIMIZED_TYPES, type_table
 
 _IS_FREE = type_table((SegmentType.JOINT, *OPTIMIZED_TYPES))
@@ -301,7 +305,10 @@ class _SlowMoves:
     def _blends(self) -> SlowStretches:
         """Return the blends in which the planned path is slower than requested."""
         path, times, reference = self._geometries.path, self._timings.chain.times, self._reference
-        ratio = self._ratio
+        ratio, options = self._ratio, self._timings.options
+        law = f'as {blend_law(options)}'
+        if not blends_are_measured(options):
+            law += ': how fast the robot passes blends is not published'
         rows = np.flatnonzero(path.has_blend_after)
         carries = np.append(self._carries, False)
         rows = rows[carries[rows] | carries[rows + 1]]
@@ -327,8 +334,7 @@ class _SlowMoves:
             (rows, path.u_leave[rows], rows + 1, path.u_join[rows + 1]),
             lowest[slow],
             SlowCause.IN_BLEND,
-            'of the blend at point {point} (as assumed for motion version 1: how fast the robot '
-            'passes blends is not published)',
+            f'of the blend at point {{point}} ({_literal(law)})',
             asked=asked[slow],
         )
 

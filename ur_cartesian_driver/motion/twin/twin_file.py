@@ -1,0 +1,310 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Read and write ``twin.yaml``: the measured laws of one arm, one law a paragraph.
+
+::
+
+    twin: 1
+    arm: {model: ur5e, serial_number: '20235501234', software: 5.21.0, motion_version: 1}
+    date: 2026-11-27
+    files:
+    - moves.csv
+
+    # Time within which the first path of a program gets up to speed [s]; recorded on arms: 0.16.
+    start_time:
+      value: 0.158
+      unit: s
+      interval: [0.154, 0.162]
+      evidence: 12 starts of programs
+      left_over: 0.4 ms
+
+    # Share of its radius at which a blend begins and ends; assumed: 1.
+    blend_begin:
+      not_identified: no blends in the files; record some moves with r
+
+A law that is left out is assumed. Every error names the line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import date
+from difflib import get_close_matches
+from pathlib import Path
+import re
+from textwrap import indent
+from typing import Any, NoReturn
+
+import yaml
+
+from ur_cartesian_driver.motion.twin.laws import Law, LAWS
+from ur_cartesian_driver.motion.twin.twin import ArmIdentity, Estimate, Twin
+
+#: The version of the format, with which a file begins.
+FORMAT = 1
+#: No twin is longer [characters]; a recording that was given instead probably is.
+_MAX_LENGTH = 1_000_000
+
+_HEAD = ('twin', 'arm', 'date', 'files')
+_ARM = ('model', 'serial_number', 'software', 'motion_version')
+_ESTIMATE = ('value', 'unit', 'interval', 'evidence', 'left_over')
+_SOFTWARE = re.compile(r'\d+(\.\d+){1,3}')
+
+
+class TwinFileError(ValueError):
+    """A file is no twin; the text names the file, the line and the fault."""
+
+
+def read_twin(path: str | Path) -> Twin:
+    """
+    Return the twin in a file.
+
+    :raises OSError: the file cannot be read.
+    :raises TwinFileError: the file is no twin.
+    """
+    try:
+        text = Path(path).read_text(encoding='utf-8')
+    except UnicodeDecodeError:
+        raise TwinFileError(f'{path} is no text in UTF-8, so it is no twin.') from None
+    return twin_from_text(text, str(path))
+
+
+def twin_from_text(text: str, name: str) -> Twin:
+    """
+    Return the twin in the text of a file.
+
+    :param name: the name of the file, for error texts.
+    :raises TwinFileError: the text is no twin.
+    """
+    return _Reader(name).twin(text)
+
+
+def twin_text(twin: Twin) -> str:
+    """Return the text of a file; :func:`twin_from_text` returns the same twin."""
+    arm = {key: getattr(twin.arm, key) for key in _ARM if getattr(twin.arm, key)}
+    day = date.fromisoformat(twin.date)
+    head = {'twin': FORMAT, 'arm': arm, 'date': day, 'files': list(twin.files)}
+    paragraphs = [
+        f'# The laws of motion of one arm, as measured on {twin.date}. Laws that are left out are '
+        f'assumed.\n{_dumped(head)}'
+    ]
+    for name, law in LAWS.items():
+        if name in twin.estimates:
+            entry = _entry(law, twin.estimates[name])
+        elif name in twin.not_identified:
+            entry = {'not_identified': twin.not_identified[name]}
+        else:
+            continue
+        fields = ''.join(_dumped({key: value}) for key, value in entry.items())
+        paragraphs.append(f'{_comment(law)}\n{name}:\n{indent(fields, "  ")}')
+    return '\n'.join(paragraphs)
+
+
+def _comment(law: Law) -> str:
+    unit = f' [{law.unit}]' if law.unit else ''
+    assumed = (
+        '' if law.assumed is None else f': {law.assumed if law.choices else f"{law.assumed:.6g}"}'
+    )
+    return f'# {law.text[0].upper()}{law.text[1:]}{unit}; {law.grade}{assumed}.'
+
+
+def _entry(law: Law, estimate: Estimate) -> dict[str, Any]:
+    entry: dict[str, Any] = {'value': estimate.value}
+    if law.unit:
+        entry['unit'] = law.unit
+    if estimate.interval is not None:
+        entry['interval'] = list(estimate.interval)
+    for key in ('evidence', 'left_over'):
+        if getattr(estimate, key):
+            entry[key] = getattr(estimate, key)
+    return entry
+
+
+def _dumped(content: dict[str, Any]) -> str:
+    """Return fields as YAML; lists, and mappings in fields, take one line."""
+    is_nested = any(isinstance(value, list | dict) for value in content.values())
+    text: str = yaml.safe_dump(
+        content,
+        sort_keys=False,
+        default_flow_style=None if is_nested else False,
+        allow_unicode=True,
+        width=95,
+    )
+    return text
+
+
+class _Reader:
+    """Reads one file; ``name`` is its name in error texts."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def twin(self, text: str) -> Twin:
+        """Return the twin, see :func:`twin_from_text`."""
+        root = self._root(text)
+        entries = self._entries(root, 'the file', (*_HEAD, *LAWS))
+        version = entries.get('twin')
+        if version is None:
+            self._refuse(
+                root, f'this is no twin: it has no field twin; it begins with twin: {FORMAT}'
+            )
+        if version.value != str(FORMAT):
+            self._refuse(
+                version, f'twin is {version.value}, a format that is not known; use {FORMAT}'
+            )
+        for key in ('arm', 'date'):
+            if key not in entries:
+                self._refuse(root, f'{key} is missing, so the file may be cut off')
+        estimates, not_identified = {}, {}
+        for name, law in LAWS.items():
+            if name not in entries:
+                continue
+            found = self._law(law, entries[name])
+            if isinstance(found, Estimate):
+                estimates[name] = found
+            else:
+                not_identified[name] = found
+        return Twin(
+            arm=self._arm(entries['arm']),
+            date=self._date(entries['date']),
+            files=self._files(entries.get('files')),
+            estimates=estimates,
+            not_identified=not_identified,
+        )
+
+    def _root(self, text: str) -> yaml.Node:
+        if len(text) > _MAX_LENGTH:
+            raise TwinFileError(f'{self._name} is no twin: it is longer than 1 MB.')
+        try:
+            root = yaml.compose(text, Loader=yaml.SafeLoader)
+        except yaml.YAMLError as error:
+            mark = getattr(error, 'problem_mark', None)
+            line = f', line {mark.line + 1}' if mark else ''
+            what = getattr(error, 'problem', None) or 'it has a character that YAML does not allow'
+            raise TwinFileError(f'{self._name}{line}: this is not YAML: {what}.') from None
+        except RecursionError:
+            raise TwinFileError(f'{self._name} is no twin: it is nested too deeply.') from None
+        if root is None:
+            raise TwinFileError(f'{self._name} is empty, so it is no twin.')
+        return root
+
+    def _entries(
+        self, node: yaml.Node, where: str, known: tuple[str, ...]
+    ) -> dict[str, yaml.Node]:
+        """Return the values of a mapping by name; each name is known and occurs once."""
+        if not isinstance(node, yaml.MappingNode):
+            self._refuse(node, f'{where} must have fields, NAME: VALUE')
+        found: dict[str, yaml.Node] = {}
+        for key, value in self._pairs(node, where):
+            if key.value in found:
+                self._refuse(key, f'{key.value} stands twice; remove one of them')
+            if key.value not in known:
+                near = get_close_matches(key.value, known, n=1)
+                hint = f'{near[0]} is probably meant' if near else f'known are {", ".join(known)}'
+                kind = 'law of motion' if where == 'the file' else f'field of {where}'
+                self._refuse(key, f'{key.value} is no {kind}; {hint}')
+            found[key.value] = value
+        return found
+
+    def _pairs(
+        self, node: yaml.MappingNode, where: str
+    ) -> Iterator[tuple[yaml.ScalarNode, yaml.Node]]:
+        for key, value in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                self._refuse(key, f'a field of {where} has no name')
+            yield key, value
+
+    def _law(self, law: Law, node: yaml.Node) -> Estimate | str:
+        """Return the estimate of a law, or the reason why it was not identified."""
+        entries = self._entries(node, law.name, (*_ESTIMATE, 'not_identified'))
+        if 'not_identified' in entries:
+            if len(entries) > 1:
+                self._refuse(node, f'{law.name} is not identified, so it can have no other field')
+            return self._text(entries['not_identified'], f'not_identified of {law.name}')
+        if 'value' not in entries:
+            self._refuse(node, f'{law.name} has no value')
+        unit = self._text(entries['unit'], f'unit of {law.name}') if 'unit' in entries else ''
+        if unit != law.unit:
+            wanted = f'give it in {law.unit}' if law.unit else 'it has none; remove it'
+            said = f'has the unit {unit}' if unit else 'has no unit'
+            self._refuse(entries.get('unit', node), f'{law.name} {said}; {wanted}')
+        value = self._value(law, entries['value'])
+        interval = entries.get('interval')
+        try:
+            return Estimate(
+                value=value,
+                interval=None if interval is None else self._interval(law, interval),
+                evidence=self._optional_text(entries, 'evidence', law),
+                left_over=self._optional_text(entries, 'left_over', law),
+            )
+        except TwinFileError:
+            raise
+        except ValueError as error:
+            self._refuse(interval or node, f'{law.name} {error}')
+
+    def _value(self, law: Law, node: yaml.Node) -> float | str:
+        value: float | str
+        if law.choices:
+            value = self._text(node, f'value of {law.name}')
+        else:
+            value = self._number(node, f'value of {law.name}')
+        if problem := law.problem(value):
+            self._refuse(node, f'{law.name} is {value}; it {problem}')
+        return value
+
+    def _interval(self, law: Law, node: yaml.Node) -> tuple[float, float]:
+        if not isinstance(node, yaml.SequenceNode) or len(node.value) != 2:
+            self._refuse(node, f'the interval of {law.name} must be two numbers, [LOW, HIGH]')
+        low, high = (self._number(item, f'interval of {law.name}') for item in node.value)
+        return low, high
+
+    def _optional_text(self, entries: dict[str, yaml.Node], key: str, law: Law) -> str:
+        return self._text(entries[key], f'{key} of {law.name}') if key in entries else ''
+
+    def _arm(self, node: yaml.Node) -> ArmIdentity:
+        entries = self._entries(node, 'arm', _ARM)
+        if 'model' not in entries:
+            self._refuse(node, 'arm has no model, such as ur5e')
+        texts = {key: self._text(entries[key], f'{key} of arm') for key in entries}
+        software = texts.get('software', '')
+        if software and not _SOFTWARE.fullmatch(software):
+            self._refuse(
+                entries['software'], f'software of arm is {software}; write it like 5.21 or 5.21.0'
+            )
+        version = texts.pop('motion_version', '0')
+        if version not in ('0', '1', '2'):
+            self._refuse(
+                entries['motion_version'],
+                f'motion_version of arm is {version}; use 1 or 2, or 0 for unknown',
+            )
+        return ArmIdentity(**texts, motion_version=int(version))
+
+    def _date(self, node: yaml.Node) -> str:
+        text = self._text(node, 'date')
+        try:
+            return date.fromisoformat(text).isoformat()
+        except ValueError:
+            self._refuse(node, f'date is {text}; write it as YYYY-MM-DD')
+
+    def _files(self, node: yaml.Node | None) -> tuple[str, ...]:
+        if node is None:
+            return ()
+        if not isinstance(node, yaml.SequenceNode):
+            self._refuse(node, 'files must be a list of names')
+        return tuple(self._text(item, 'a name in files') for item in node.value)
+
+    def _number(self, node: yaml.Node, what: str) -> float:
+        text = self._text(node, what)
+        try:
+            return float(text)
+        except ValueError:
+            self._refuse(node, f'the {what} is {text[:60]}, which is no number')
+
+    def _text(self, node: yaml.Node, what: str) -> str:
+        if not isinstance(node, yaml.ScalarNode):
+            self._refuse(node, f'{what} must be one value')
+        return ' '.join(str(node.value).split())
+
+    def _refuse(self, node: yaml.Node, fault: str) -> NoReturn:
+        raise TwinFileError(f'{self._name}, line {node.start_mark.line + 1}: {fault}.')
