@@ -381,7 +381,7 @@ def path_of(curves, radius=0.0, fillet=False):
         if not isinstance(curve, Line):
             path.curves.put_joint_line(k, curve)
     if radius > 0.0:
-        path.make_blends(np.array([0]), np.array([radius]), np.array([fillet]))
+        path.make_blends(np.array([0]), np.array([radius]), np.array([radius]), np.array([fillet]))
     return path
 
 
