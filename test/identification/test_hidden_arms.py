@@ -1,0 +1,53 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The laws of hidden arms are within the intervals that their recordings lead to."""
+
+from dataclasses import asdict
+
+from hidden_arm import Laws, smooth_steps, standard_experiments
+import pytest
+from random_cases import cases, random_of
+
+from ur_cartesian_driver.identification.estimators import Unknown
+from ur_cartesian_driver.identification.identify import identify
+
+ARMS = 100
+
+
+@pytest.fixture(scope='module')
+def identified():
+    """Return laws and results of hidden arms."""
+    found = []
+    for i in range(cases(ARMS)):
+        random = random_of('hidden arm', i)
+        laws = Laws.drawn(random)
+        found.append((asdict(laws), identify(*standard_experiments(laws, random)).results))
+    return found
+
+
+@pytest.mark.random
+def test_intervals_contain_the_true_laws(identified):
+    inside, number = {}, {}
+    for laws, results in identified:
+        for name, true in laws.items():
+            result = results[name]
+            if not isinstance(result, Unknown):
+                low, high = result.interval
+                number[name] = number.get(name, 0) + 1
+                inside[name] = inside.get(name, 0) + (low <= true <= high)
+    print({name: f'{inside[name]}/{number[name]}' for name in number})
+    assert set(number) == set(identified[0][0])
+    for name, count in number.items():
+        assert count >= 0.9 * len(identified), name
+    assert sum(inside.values()) >= 0.92 * sum(number.values())
+
+
+@pytest.mark.random
+def test_an_unknown_shape_is_said_and_not_fitted():
+    for i in range(cases(20)):
+        random = random_of('unknown shape', i)
+        recordings = standard_experiments(Laws.drawn(random), random, smooth_steps)
+        results = identify(*recordings).results
+        for name in ('start_time', 'turn_ratio', 'timed_joint_speed', 'idle_between_moves'):
+            assert isinstance(results[name], Unknown), name
+        assert 'followed no' in results['start_time'].reason

@@ -1,0 +1,253 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The profile of a single move: a trapezoid of speed, with or without the ramp of a program's start.
+
+Way over time, from rest to rest: ``s(t) = w(p(t - t0))`` with the trapezoid ``w`` of acceleration
+a, speed v and length L, and the path time ``p`` of a start within T: ``t^2 / 2T`` up to T, then
+``t - T/2``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import exp, log, sqrt
+
+import numpy as np
+
+from ur_cartesian_driver.identification.least_squares import Fit, fit, Measured, NOWHERE
+from ur_cartesian_driver.identification.segmentation import noise_of
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
+
+#: Root mean square above which the residuals show another law [rad, m]; at most 0.5 urad and
+#: 0.5 um are left of recorded moves, for which the law holds.
+MISFIT = 2e-6
+#: Residuals that are as many times larger than the noise show another law, too, above MISFIT.
+_ROUGH = 3.0
+#: A start within less than this is none [s].
+SHORTEST_START = 0.01
+#: Starts from which the fit begins [s].
+_STARTS = (0.06, 0.15, 0.35)
+#: From this share of the speed that it could reach on its way, a move is taken not to cruise.
+_TRIANGLE = 0.98
+#: Logarithm of speeds and accelerations that no move has.
+_NO_BOUND = 20.0
+_OFFSET, _LENGTH, _ONSET, _ACCELERATION, _SPEED = range(5)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Profile:
+    """
+    A trapezoid that was found.
+
+    :param speed: None where the move never cruises.
+    :param start: time within which it sets out [s]; None where it does so at once.
+    :param begin: time at which it sets out, by the controller's clock [s].
+    :param end: time at which it arrives [s].
+    :param speed_squared_by_acceleration: v^2/a, which stays the same in a stretched move.
+    """
+
+    length: float
+    acceleration: Measured
+    speed: Measured | None
+    start: Measured | None
+    begin: Measured
+    end: Measured
+    speed_squared_by_acceleration: Measured | None
+    fit: Fit
+
+    @property
+    def duration(self) -> float:
+        """Time from rest to rest [s]."""
+        return self.end.value - self.begin.value
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Misfit:
+    """A move whose profile is none of those that are known; rms of what is left [rad or m]."""
+
+    rms: float
+
+
+def path_time(t: Floats, start: float) -> Floats:
+    """Return the time of a path (n,) at times since its beginning [s]; slow within ``start``."""
+    t = np.maximum(t, 0.0)
+    if start <= 0.0:
+        return t
+    slow: Floats = np.where(t < start, 0.5 * t * t / start, t - 0.5 * start)
+    return slow
+
+
+def trapezoid_way(t: Floats, length: float, acceleration: float, speed: float) -> Floats:
+    """Return the way (n,) of a trapezoid at times (n,) since its beginning [s]."""
+    a, v = acceleration, min(speed, sqrt(length * acceleration))
+    whole = length / v + v / a
+    up, left = np.clip(t, 0.0, whole), np.clip(whole - t, 0.0, whole)
+    way: Floats = np.where(
+        up < v / a,
+        0.5 * a * up * up,
+        np.where(left < v / a, length - 0.5 * a * left * left, v * (up - 0.5 * v / a)),
+    )
+    return way
+
+
+def trapezoid_time(length: float, acceleration: float, speed: float) -> float:
+    """Return the time of a trapezoid from rest to rest [s]."""
+    v = min(speed, sqrt(length * acceleration))
+    return length / v + v / acceleration
+
+
+def find_profile(
+    time: Floats, way: Floats, follows: Flags, *, may_start: bool
+) -> Profile | Misfit | None:
+    """
+    Find the trapezoid of a move.
+
+    :param time: (n,) the controller's clock [s].
+    :param way: (n,) way along the path [rad or m].
+    :param follows: mask (n,) of rows that come one cycle after the row before.
+    :param may_start: whether the ramp of a program's start is looked for, too.
+    :returns: None if there is too little data, a misfit if the law is another one.
+    """
+    origin, t = time[0], time - time[0]
+    guess = _Guess.of(t, way)
+    best = None if guess is None else _Found.without_start(t, way, follows, guess)
+    if best is None:
+        return None
+    if may_start:
+        starts = [best.with_start(t, way, follows, start) for start in _STARTS]
+        found = [each for each in starts if each is not None]
+        better = min(found, key=lambda each: each.fit.rms, default=best)
+        if better.has_start and better.start.value - better.start.half_width > SHORTEST_START:
+            best = better
+    rms, noise = best.fit.rms, noise_of(best.fit.residuals)
+    if rms > MISFIT and rms > _ROUGH * noise:
+        return Misfit(rms=rms)
+    return best.profile(origin)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Guess:
+    """A first guess of a trapezoid."""
+
+    offset: float
+    length: float
+    begin: float
+    duration: float
+    speed: float
+
+    @classmethod
+    def of(cls, t: Floats, way: Floats) -> _Guess | None:
+        low, high = float(way[:3].mean()), float(way[-3:].mean())
+        length = high - low
+        if length <= 0.0 or len(t) < 24:
+            return None
+        inside = np.flatnonzero((way > low + 1e-3 * length) & (way < high - 1e-3 * length))
+        if len(inside) < 12:
+            return None
+        width = max(3, len(inside) // 40)
+        speeds = (way[width:] - way[:-width]) / (t[width:] - t[:-width])
+        return cls(
+            offset=low,
+            length=length,
+            begin=float(t[inside[0]]),
+            duration=float(t[inside[-1]] - t[inside[0]]),
+            speed=float(speeds.max()),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Found:
+    """
+    A fit of a trapezoid.
+
+    Parameters are offset, length, onset, logarithm of the acceleration, that of the speed if it
+    cruises, and the time of the start if it has one.
+    """
+
+    fit: Fit
+    cruises: bool
+    has_start: bool
+
+    @classmethod
+    def without_start(cls, t: Floats, way: Floats, rows: Flags, guess: _Guess) -> _Found | None:
+        """Fit a trapezoid or, if it would hardly cruise, a triangle."""
+        duration = max(guess.duration, 1.02 * guess.length / guess.speed)
+        ramp = min(max(duration - guess.length / guess.speed, 0.02 * duration), 0.5 * duration)
+        first = [guess.offset, guess.length, guess.begin, log(guess.speed / ramp)]
+        for cruises in (True, False):
+            start = [*first, *([log(guess.speed)] if cruises else [])]
+            found = fit(_model(t, cruises, False), way, start, rows)
+            if found is None:
+                continue
+            length, a = found.parameters[_LENGTH], exp(found.parameters[_ACCELERATION])
+            if cruises and exp(found.parameters[_SPEED]) > _TRIANGLE * sqrt(length * a):
+                continue
+            return cls(fit=found, cruises=cruises, has_start=False)
+        return None
+
+    def with_start(self, t: Floats, way: Floats, rows: Flags, start: float) -> _Found | None:
+        """Fit again with the ramp of a start, from a first guess of it [s]."""
+        first = [*self.fit.parameters, start]
+        first[_ONSET] -= 0.5 * start
+        found = fit(_model(t, self.cruises, True), way, first, rows)
+        if found is None:
+            return None
+        return _Found(fit=found, cruises=self.cruises, has_start=True)
+
+    @property
+    def start(self) -> Measured:
+        return self.fit.measured(len(self.fit.parameters) - 1)
+
+    def profile(self, origin: float) -> Profile:
+        parameters = self.fit.parameters
+        length, ln_a = float(parameters[_LENGTH]), float(parameters[_ACCELERATION])
+        a = exp(ln_a)
+        v = exp(float(parameters[_SPEED])) if self.cruises else sqrt(length * a)
+        last = len(parameters) - 1
+        # The derivatives of the end: L/v + v/a, or 2 sqrt(L/a), and half of the start.
+        weights = {_ONSET: 1.0, _LENGTH: 1.0 / v, _ACCELERATION: -v / a}
+        if self.cruises:
+            weights[_SPEED] = v / a - length / v
+        weights |= {last: 0.5} if self.has_start else {}
+        begin = self.fit.measured(_ONSET)
+        whole = trapezoid_time(length, a, v) + (0.5 * self.start.value if self.has_start else 0.0)
+        error = self.fit.combination(weights).error
+        acceleration, freedom = self.fit.measured(_ACCELERATION), self.fit.freedom
+        squared = speed = None
+        if self.cruises:
+            speed = _scaled(self.fit.measured(_SPEED), v)
+            squared = _scaled(self.fit.combination({_SPEED: 2.0, _ACCELERATION: -1.0}), v * v / a)
+        return Profile(
+            length=length,
+            acceleration=_scaled(acceleration, a),
+            speed=speed,
+            start=self.start if self.has_start else None,
+            begin=_moved(begin, origin),
+            end=Measured(value=origin + begin.value + whole, error=error, freedom=freedom),
+            speed_squared_by_acceleration=squared,
+            fit=self.fit,
+        )
+
+
+def _scaled(logarithm: Measured, value: float) -> Measured:
+    return Measured(value=value, error=value * logarithm.error, freedom=logarithm.freedom)
+
+
+def _moved(measured: Measured, by: float) -> Measured:
+    return Measured(value=measured.value + by, error=measured.error, freedom=measured.freedom)
+
+
+def _model(t: Floats, cruises: bool, has_start: bool) -> Callable[[Floats], Floats]:
+    def model(parameters: Floats) -> Floats:
+        offset, length, onset, ln_a = parameters[:4]
+        ln_v = parameters[_SPEED] if cruises else _NO_BOUND
+        start = parameters[-1] if has_start else 0.0
+        if length <= 0.0 or start < 0.0 or max(abs(ln_a), abs(ln_v)) > _NO_BOUND:
+            return np.full(len(t), NOWHERE)
+        path = path_time(t - onset, start)
+        way: Floats = offset + trapezoid_way(path, length, exp(ln_a), exp(ln_v))
+        return way
+
+    return model
