@@ -19,6 +19,7 @@ from ur_cartesian_driver.motion.geometry.vectors import scale6, subtract6, ZERO6
 from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.plan.primitive import MoveC, MoveJ, MoveL, MoveP
 from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.twin.laws import MotionLaws
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
@@ -73,7 +74,7 @@ class Cell:
         """
         job = job_from_plan(made)
         machine = point_machine(job, **settings)
-        robot = MotionGenerator(self.arm, CYCLE, made.start)
+        robot = MotionGenerator(self.arm, CYCLE, made.start, MotionLaws(turn_ratio=1.0))
         robot.T_flange_tcp = self.T_flange_tcp
         time, begun, twists, answers = 0.0, 0, ZERO6, []
 

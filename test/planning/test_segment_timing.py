@@ -22,6 +22,7 @@ from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType
 from ur_cartesian_driver.motion.plan.primitive import MoveC, MoveJ, MoveL, MoveP, OptimoveJ
+from ur_cartesian_driver.motion.twin.laws import MotionLaws
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.moves.move_chain import MoveTimes
 from ur_cartesian_driver.planning.moves.segment_timing import shortest_duration
@@ -202,8 +203,8 @@ def test_a_speed_that_the_wire_would_round_to_nothing_is_refused(cell):
 
 def drive(made, cell, turn_ratio=4.0):
     """Return time, position, speed and angular speed of the tool in every cycle."""
-    robot = MotionGenerator(cell.arm, CYCLE, made.start)
-    robot.turn_ratio = turn_ratio
+    laws = MotionLaws(turn_ratio=turn_ratio)
+    robot = MotionGenerator(cell.arm, CYCLE, made.start, laws)
     robot.T_flange_tcp = cell.T_flange_tcp
     rows = []
     for segment in made.segments:

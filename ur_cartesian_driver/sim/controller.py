@@ -71,13 +71,6 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 #: The controller's clock at the start [s]: RTDE clients believe that a controller that has been
 #: up for less than 40 s is still booting.
 START_TIME = 60.0
-#: Time from full speed to zero by the slider or in a pause [s]. Not published.
-SLIDER_TIME = 0.25
-#: Time from full speed to zero in a protective stop [s]. Not published.
-PROTECTIVE_STOP_TIME = 0.1
-#: Time from full speed to zero if a program ends while the arm is on a path [s]: the speed scaling
-#: of a UR5e recorded in URSim falls by 6.25 per second.
-PROGRAM_STOP_TIME = 0.16
 #: States of a program in which the arm slows down to a standstill, or stands still.
 _HELD_STATES = (RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING)
 #: Number of past cycles whose joint positions programs can ask for.
@@ -125,8 +118,7 @@ class Controller:
         #: Time that the clock has skipped because this computer was too busy [s].
         self.skipped_time = 0.0
         self.arm = Arm(config.robot_model, config.geometry)
-        self.motion = MotionGenerator(self.arm, self.cycle, config.q)
-        self.motion.turn_ratio = config.turn_ratio
+        self.motion = MotionGenerator(self.arm, self.cycle, config.q, config.laws)
         self.motion.motion_version = config.motion_version
         self.motion.second_version = config.second_motion_version
         #: The bodies that the tool can touch, and the compliance of the arm.
@@ -320,9 +312,12 @@ class Controller:
         if was_at_rest or self.scale == target:
             self.scale = target
             return
-        time = PROGRAM_STOP_TIME if self._stopping_on_path else SLIDER_TIME
-        stopped = self.safety.mode not in OPERATIONAL
-        step = self.cycle / (PROTECTIVE_STOP_TIME if stopped else time)
+        laws = self.motion.laws
+        if self.safety.mode not in OPERATIONAL:
+            time = laws.protective_stop_time
+        else:
+            time = laws.stop_time if self._stopping_on_path else laws.pause_time
+        step = self.cycle / time
         self.scale = min(max(target, self.scale - step), self.scale + step)
 
     def _report_motion_events(self) -> None:

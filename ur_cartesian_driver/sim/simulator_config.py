@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import isfinite, pi
 from typing import Literal
 
@@ -17,9 +17,14 @@ from ur_cartesian_driver.kinematics.robot_models import (
 )
 from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.motion.goal.declared_types import declare_types
+from ur_cartesian_driver.motion.twin.laws import ASSUMED_LAWS, MotionLaws
+from ur_cartesian_driver.motion.twin.twin import ArmIdentity, laws_of, Twin
 from ur_cartesian_driver.sim.faults.fault_values import Fault
 from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
-from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
+from ur_cartesian_driver.sim.motion.imperfect_arm import (
+    Imperfections,
+    typical_imperfections,
+)
 from ur_cartesian_driver.sim.motion.paths.second_motion_version import SecondMotionVersion
 from ur_cartesian_driver.sim.pendant_programs.program_tree import BUILT_IN_PROGRAMS, SavedProgram
 from ur_cartesian_driver.sim.state.controller_io import DigitalPort
@@ -27,9 +32,6 @@ from ur_cartesian_driver.sim.state.controller_io import DigitalPort
 #: Joint positions with room to move in all directions, away from every singularity [rad].
 HOME: Vector6 = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
 
-#: Turn ratio of movel, from one recording of a UR3 in URSim and one forum thread; movec, movep and
-#: optimovel use 1.
-TURN_RATIO = 4.0
 #: Bound on ``rate``: more simulated seconds per second than any computer can achieve.
 MAX_RATE = 1e4
 _PRIMARY_PORT = 30001
@@ -37,6 +39,7 @@ _PRIMARY_PORT = 30001
 _ROBOT_API_PORT = 8000
 #: The first software with motion version 2.
 _SECOND_MOTION_VERSION = (5, 22)
+_SERIAL_NUMBER = '20000000000'
 _DEFAULT_VERSIONS = {'CB3': '3.15.8', 'e': '5.21.0'}
 
 
@@ -79,7 +82,12 @@ class SimulatorConfig:
     #: reports that the robot is not in remote control.
     has_remote_control: bool = True
     #: Rotation [rad] that takes as long in a movel as a metre; 4 was recorded, the manual has 1.
-    turn_ratio: float = TURN_RATIO
+    #: movec, movep and optimovel use 1.
+    turn_ratio: float = ASSUMED_LAWS.turn_ratio
+    #: Measured laws, by which this robot moves; laws that were not measured are assumed. They
+    #: take the place of ``turn_ratio``, of figures of ``imperfections`` and, in motion version 2,
+    #: of ``blend_fraction``. The twin must be of this model, software and motion version.
+    twin: Twin | None = None
     #: Motion version of movej and movel at the start, and of programs that are played: 1 or, from
     #: PolyScope 5.22 on, 2. Programs can set another one.
     motion_version: int = 1
@@ -191,6 +199,36 @@ class SimulatorConfig:
                 f'motion_version is 2, but polyscope is {".".join(map(str, self.version[:2]))}; '
                 'use 5.22 or newer.'
             )
+        if self.twin is not None:
+            self._take(self.twin)
+
+    def _take(self, twin: Twin) -> None:
+        """Give the robot what a twin has beside the laws of motion."""
+        software = '.'.join(map(str, self.version[:3]))
+        robot = ArmIdentity(
+            model=self.model, software=software, motion_version=self.motion_version
+        )
+        if differences := twin.arm.differences(robot):
+            raise ValueError(
+                f'twin is of another robot: {differences}; set model, polyscope and '
+                'motion_version to those of the twin.'
+            )
+        if figures := twin.arm_figures:
+            arm = self.imperfections or typical_imperfections(self.robot_model)
+            object.__setattr__(self, 'imperfections', replace(arm, **figures))
+        if self.motion_version == 2 and 'blend_begin' in twin.estimates:
+            version = replace(self.second_motion_version, blend_fraction=1.0)
+            object.__setattr__(self, 'second_motion_version', version)
+
+    @property
+    def serial_number(self) -> str:
+        """Return the serial number of the robot."""
+        return (self.twin.arm.serial_number if self.twin else '') or _SERIAL_NUMBER
+
+    @property
+    def laws(self) -> MotionLaws:
+        """Return the laws of motion of the controller."""
+        return laws_of(self.twin, self.turn_ratio)
 
     @property
     def robot_model(self) -> RobotModel:

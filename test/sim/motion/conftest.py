@@ -13,6 +13,7 @@ import pytest
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.twin.laws import MotionLaws
 from ur_cartesian_driver.sim.calibration import random_calibration
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
@@ -72,6 +73,10 @@ class Recorder:
         return np.diff(self.positions, axis=0) / self.generator.cycle
 
 
+#: The ratio of the manual.
+LAWS = MotionLaws(turn_ratio=1.0)
+
+
 @pytest.fixture(scope='session')
 def arm():
     return Arm(robot_model('ur5e'))
@@ -82,8 +87,8 @@ def recorder(arm):
     """A maker of recorders, usable from hypothesis tests too."""
     calibrated_arm = Arm(arm.model, random_calibration(arm.model, 1))
 
-    def make(q=HOME, cycle=0.002, calibrated=False):
-        return Recorder(MotionGenerator(calibrated_arm if calibrated else arm, cycle, q))
+    def make(q=HOME, cycle=0.002, calibrated=False, laws=LAWS):
+        return Recorder(MotionGenerator(calibrated_arm if calibrated else arm, cycle, q, laws))
 
     return make
 

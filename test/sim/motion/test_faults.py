@@ -9,6 +9,7 @@ import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.twin.laws import MotionLaws
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
 HOME = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
@@ -94,7 +95,7 @@ def test_exact_wrist_singularity_is_a_fault(recorder, shifted):
     ],
 )
 def test_a_line_beside_a_singularity_ends_the_same_whatever_the_cycle(cycle, begin, end):
-    generator = MotionGenerator(Arm(robot_model('ur20')), cycle, begin)
+    generator = MotionGenerator(Arm(robot_model('ur20')), cycle, begin, MotionLaws(turn_ratio=1.0))
     move = generator.movel(generator.arm.forward(end), a=1.0, v=1.0)
     while not move.returned and generator.fault is None:
         generator.step(1.0)

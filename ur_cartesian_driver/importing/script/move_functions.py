@@ -19,6 +19,7 @@ from ur_cartesian_driver.importing.script.collected_events import (
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
+from ur_cartesian_driver.motion.twin.laws import ASSUMED_LAWS
 from ur_cartesian_driver.sim.builtins.arguments import (
     is_pose,
     not_negative,
@@ -30,19 +31,16 @@ from ur_cartesian_driver.sim.builtins.arguments import (
 from ur_cartesian_driver.sim.builtins.arguments import (
     pose as pose_argument,
 )
-from ur_cartesian_driver.sim.motion.motion_generator import (
-    DEFAULT_JOINT_ACCELERATION as JOINT_A,
-)
-from ur_cartesian_driver.sim.motion.motion_generator import (
-    DEFAULT_JOINT_SPEED as JOINT_V,
-)
-from ur_cartesian_driver.sim.simulator_config import TURN_RATIO
 from ur_cartesian_driver.urscript import RuntimeException
 from ur_cartesian_driver.urscript.script_values import Value
 
 #: The manual's defaults: acceleration [m/s^2] and speed [m/s] of the tool; fraction of the arm's
 #: limits, for optimovej and optimovel.
 TOOL_A, TOOL_V, FRACTION = 1.2, 0.25, 0.3
+#: The same of joints [rad/s^2, rad/s].
+JOINT_A, JOINT_V = ASSUMED_LAWS.timed_joint_acceleration, ASSUMED_LAWS.timed_joint_speed
+#: The assumed turn ratio of movel.
+TURN_RATIO = ASSUMED_LAWS.turn_ratio
 #: A larger length [m] must be meant in millimetres, and a larger angle [rad] in degrees.
 FAR, MAX_ANGLE = 3.0, 12.6
 #: Joints that turn by less than this angle [rad] do not move.

@@ -12,11 +12,11 @@ The table of the laws of motion, with the values that are assumed of any arm.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from math import inf, radians
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Annotated
 
 from ur_cartesian_driver.motion.goal.declared_types import declare_types, declared_hints
 
@@ -100,7 +100,7 @@ class MotionLaws:
     ] = 0.1
     turn_ratio: Annotated[
         float,
-        Law('angular speed of a movel for each m/s of its v', 'rad/m', 0.5, 16.0, Grade.SIMULATOR),
+        Law('angular speed of a movel for each m/s of its v', 'rad/m', 1.0, 16.0, Grade.SIMULATOR),
     ] = 4.0
     timed_joint_acceleration: Annotated[
         float, Law('acceleration of a movej without a', 'rad/s^2', 0.01, 40.0, Grade.RECORDED)
@@ -217,16 +217,13 @@ class ArmFigures:
         _check(self)
 
 
-def _table(kind: type[Any]) -> dict[str, Law]:
+def _table(kind: type[MotionLaws] | type[ArmFigures]) -> dict[str, Law]:
     """Return the laws that the fields of a dataclass declare, by name."""
     hints = declared_hints(kind)
-    found = {}
-    for each in fields(kind):
-        (law,) = hints[each.name].__metadata__
-        found[each.name] = Law(
-            law.text, law.unit, law.low, law.high, law.grade, law.choices, each.name, each.default
-        )
-    return found
+    return {
+        each.name: replace(hints[each.name].__metadata__[0], name=each.name, assumed=each.default)
+        for each in fields(kind)
+    }
 
 
 #: The laws of controller and arm, by name, in the order of the file.

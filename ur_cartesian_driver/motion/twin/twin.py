@@ -5,10 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from math import isfinite
+from typing import Any
 
-from ur_cartesian_driver.motion.twin.laws import ArmFigures, LAWS, MotionLaws
+from ur_cartesian_driver.motion.twin.laws import (
+    ArmFigures,
+    ASSUMED_LAWS,
+    LAWS,
+    MotionLaws,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +75,8 @@ class ArmIdentity:
         return ' and '.join(different)
 
 
+UNKNOWN_ARM = ArmIdentity()
+
 #: Field of an identity -> its name in a sentence.
 _IDENTITY = {
     'model': 'model',
@@ -120,13 +128,21 @@ class Twin:
         return MotionLaws(**self._values(MotionLaws))
 
     @property
-    def arm_figures(self) -> Mapping[str, float]:
+    def arm_figures(self) -> dict[str, Any]:
         """Return the measured figures of the arm, by name."""
         return self._values(ArmFigures)
 
-    def _values(self, kind: type[MotionLaws] | type[ArmFigures]) -> dict[str, float]:
+    def _values(self, kind: type[MotionLaws] | type[ArmFigures]) -> dict[str, Any]:
         names = [each.name for each in fields(kind) if each.name in self.estimates]
-        return {name: self.estimates[name].value for name in names}  # type: ignore[misc]
+        return {name: self.estimates[name].value for name in names}
+
+    def half_width(self, name: str) -> float:
+        """Return the larger distance of an interval's end from the value; 0 if not measured."""
+        estimate = self.estimates.get(name)
+        if estimate is None or estimate.interval is None or isinstance(estimate.value, str):
+            return 0.0
+        low, high = estimate.interval
+        return max(high - estimate.value, estimate.value - low)
 
     def measured(self, *names: str) -> str:
         """Return the measured ones of some laws with their intervals, as a clause; '' if none."""
@@ -135,3 +151,15 @@ class Twin:
             for name in names
             if name in self.estimates
         )
+
+
+def laws_of(twin: Twin | None, turn_ratio: float) -> MotionLaws:
+    """
+    Return the laws of a controller: the measured ones, and the assumed for the rest.
+
+    :param turn_ratio: the assumed turn ratio.
+    """
+    laws = ASSUMED_LAWS if twin is None else twin.laws
+    if twin is not None and 'turn_ratio' in twin.estimates:
+        return laws
+    return replace(laws, turn_ratio=turn_ratio)

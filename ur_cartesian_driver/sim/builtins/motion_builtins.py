@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector6, ZERO6
+from ur_cartesian_driver.motion.twin.laws import ASSUMED_LAWS
 from ur_cartesian_driver.sim.builtins.arguments import (
     not_negative,
     number,
@@ -22,13 +23,14 @@ from ur_cartesian_driver.sim.builtins.kinematics_builtins import joints_of, pose
 from ur_cartesian_driver.sim.controller import MAX_HISTORY
 from ur_cartesian_driver.sim.motion import MotionGenerator, Move
 from ur_cartesian_driver.sim.motion.contact.contact_motion import ForceMode
-from ur_cartesian_driver.sim.motion.motion_generator import (
-    DEFAULT_JOINT_ACCELERATION,
-    DEFAULT_JOINT_SPEED,
-)
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState, Steps
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import Struct, Value
+
+# The defaults that a signature shows. A program that leaves `a` or `v` out passes these very
+# objects, and gets the values of the robot's own laws.
+_JOINT_A, _JOINT_V = ASSUMED_LAWS.timed_joint_acceleration, ASSUMED_LAWS.timed_joint_speed
+_LINEAR_A, _LINEAR_V = ASSUMED_LAWS.timed_linear_acceleration, ASSUMED_LAWS.timed_linear_speed
 
 
 class MotionBuiltins(BuiltinGroup):
@@ -67,13 +69,18 @@ class MotionBuiltins(BuiltinGroup):
     def movej(
         self,
         q: Value,
-        a: Value = DEFAULT_JOINT_ACCELERATION,
-        v: Value = DEFAULT_JOINT_SPEED,
+        a: Value = _JOINT_A,
+        v: Value = _JOINT_V,
         t: Value = 0,
         r: Value = 0,
     ) -> Steps:
         """Move straight in joint space; a pose is converted to its nearest joint solution."""
-        limits = _limits(a, v, t)
+        laws = self._motion.laws
+        limits = _limits(
+            laws.timed_joint_acceleration if a is _JOINT_A else a,
+            laws.timed_joint_speed if v is _JOINT_V else v,
+            t,
+        )
         radius = not_negative(r, 'r')
         target = self._joints(q, 'movej')
         yield from self._run(
@@ -83,10 +90,15 @@ class MotionBuiltins(BuiltinGroup):
         )
 
     def movel(
-        self, pose: Value, a: Value = 1.2, v: Value = 0.25, t: Value = 0, r: Value = 0
+        self, pose: Value, a: Value = _LINEAR_A, v: Value = _LINEAR_V, t: Value = 0, r: Value = 0
     ) -> Steps:
         """Move the tool straight; joint positions are converted to the TCP pose."""
-        limits = _limits(a, v, t)
+        laws = self._motion.laws
+        limits = _limits(
+            laws.timed_linear_acceleration if a is _LINEAR_A else a,
+            laws.timed_linear_speed if v is _LINEAR_V else v,
+            t,
+        )
         radius = not_negative(r, 'r')
         target = self._pose(pose)
         yield from self._run(

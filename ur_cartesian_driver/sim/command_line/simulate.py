@@ -12,6 +12,8 @@ import sys
 from types import MappingProxyType
 
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model, RobotModel
+from ur_cartesian_driver.motion.twin.twin import UNKNOWN_ARM
+from ur_cartesian_driver.motion.twin.twin_file import read_twin
 from ur_cartesian_driver.sim.calibration import random_calibration, read_calibration
 from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections, typical_imperfections
 from ur_cartesian_driver.sim.pendant_programs.program_tree import (
@@ -28,6 +30,9 @@ from ur_cartesian_driver.sim.programs.stored_programs import (
 from ur_cartesian_driver.sim.simulated_robot import SimulatedRobot
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 
+#: The model of a robot for which neither an option nor a twin names one.
+_MODEL = 'ur5e'
+
 
 def simulate(arguments: argparse.Namespace) -> int:
     """Run a simulated controller until it is interrupted."""
@@ -40,11 +45,14 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
     """
     Return the configuration of the simulated robot.
 
-    :raises ValueError: an option has an impossible value, or the calibration or the program to
-        load has a mistake.
-    :raises OSError: the calibration, the program to load or the directory of programs cannot be
-        read.
+    :raises ValueError: an option has an impossible value, or the calibration, the twin or the
+        program to load has a mistake.
+    :raises OSError: the calibration, the twin, the program to load or the directory of programs
+        cannot be read.
     """
+    twin = read_twin(arguments.twin) if arguments.twin else None
+    arm = UNKNOWN_ARM if twin is None else twin.arm
+    model = robot_model(arguments.model or arm.model or _MODEL)
     programs, loaded = {}, ''
     if arguments.programs:
         found = [file for file in arguments.programs.iterdir() if file.suffix in _READERS]
@@ -55,9 +63,9 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
     elif arguments.program:
         loaded, programs[loaded] = _read_program(arguments.program)
     return SimulatorConfig(
-        model=arguments.model,
+        model=model.name,
         host=arguments.host,
-        polyscope=arguments.polyscope,
+        polyscope=arguments.polyscope or arm.software,
         rtde_port=arguments.rtde_port,
         primary_port=arguments.primary_port,
         dashboard_port=arguments.dashboard_port,
@@ -73,9 +81,10 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
         contacts=arguments.contacts,
         inputs=arguments.inputs,
         answers=arguments.answers,
-        motion_version=arguments.motion_version,
-        imperfections=imperfections(arguments),
-        geometry=calibration(arguments, robot_model(arguments.model)),
+        motion_version=arguments.motion_version or arm.motion_version or 1,
+        twin=twin,
+        imperfections=imperfections(arguments, model),
+        geometry=calibration(arguments, model),
         programs=programs,
         program=loaded,
         external_control_host=arguments.external_control_host,
@@ -134,11 +143,11 @@ _READERS: Mapping[str, Callable[[Path], tuple[str, SavedProgram]]] = MappingProx
 )
 
 
-def imperfections(arguments: argparse.Namespace) -> Imperfections | None:
+def imperfections(arguments: argparse.Namespace, model: RobotModel) -> Imperfections | None:
     """Return the imperfections of the robot from the arguments; None = a perfect robot."""
     if arguments.imperfect is None:
         return None
-    return typical_imperfections(robot_model(arguments.model), arguments.imperfect)
+    return typical_imperfections(model, arguments.imperfect)
 
 
 def calibration(arguments: argparse.Namespace, model: RobotModel) -> DhTable | None:

@@ -24,6 +24,7 @@ def add_simulator_options(command: argparse.ArgumentParser) -> None:
     """Add all options of the simulator."""
     take_negative_numbers(command)
     add_model(command, '--model')
+    command.set_defaults(model='')  # that of the twin, else ur5e
     _add_network(command)
     _add_arm(command)
     _add_surroundings(command)
@@ -36,7 +37,8 @@ def _add_network(command: argparse.ArgumentParser) -> None:
         '--polyscope',
         default='',
         metavar='VERSION',
-        help='software version, such as 5.21; empty = the newest for the model',
+        help='software version, such as 5.21; empty = that of the twin, else the newest for the '
+        'model',
     )
     add_ports(command, '0 = any free port', rtde=30004, primary=30001, dashboard=29999)
     ports = {'secondary': 30002, 'realtime': 30003, 'interpreter': 30020, 'robot_api': 8000}
@@ -46,6 +48,12 @@ def _add_network(command: argparse.ArgumentParser) -> None:
 
 
 def _add_arm(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        '--twin',
+        metavar='FILE',
+        help='measured laws of motion of an arm (twin.yaml), by which this robot moves; model, '
+        'software and motion version are those of that arm unless options give others',
+    )
     command.add_argument(
         '--joints', type=joints, metavar='Q1,...,Q6', help='initial joint positions [rad]'
     )
@@ -62,7 +70,6 @@ def _add_arm(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         '--motion-version',
         type=int,
-        default=1,
         choices=(1, 2),
         help='how movej and movel run, as the installation sets it; 2 needs --polyscope 5.22',
     )

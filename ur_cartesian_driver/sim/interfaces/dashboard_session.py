@@ -79,6 +79,7 @@ class DashboardHandlers:
         self.version = '.'.join(map(str, config.version))
         #: The model without the letter of its generation, as the robot writes it.
         self.robot_model = config.model.upper().removesuffix('E')
+        self.serial_number = config.serial_number
 
     # Values in replies
 
@@ -213,11 +214,11 @@ _VALUES: Mapping[str, str] = MappingProxyType(
         # The words of URSim, with a full stop.
         'clear operational mode': "Current operational mode: 'NONE'.",
         'is in remote control': '{0.remote_control}',
-        'get serial number': '20000000000',
+        'get serial number': '{0.serial_number}',
         'get robot model': '{0.robot_model}',
         # The next two commands only reply; no file is written.
         'generate flight report': '0',
-        'generate support file': '{1}/ur_20000000000_2026-01-01_00-00-00.zip',
+        'generate support file': '{1}/ur_{0.serial_number}_2026-01-01_00-00-00.zip',
     }
 )
 

@@ -194,8 +194,9 @@ def _safety_mode(controller: Controller, _: Body) -> Fields:
 
 
 def _information(controller: Controller, _: Body) -> Fields:
-    model = controller.config.model.upper().removesuffix('E')
-    return {'robotType': model, 'serialNumber': '20000000000'}
+    config = controller.config
+    model = config.model.upper().removesuffix('E')
+    return {'robotType': model, 'serialNumber': config.serial_number}
 
 
 def _versions(controller: Controller, _: Body) -> Fields:

@@ -15,11 +15,12 @@ leads to a point without a solution, the arm creeps up to this point and stops w
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf, radians
+from math import inf
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector6
+from ur_cartesian_driver.motion.twin.laws import ASSUMED_LAWS, MotionLaws
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
 from ur_cartesian_driver.sim.motion.controller_offset import ControllerPathOffset
 from ur_cartesian_driver.sim.motion.cycle_stepper import CycleStepper, Motion
@@ -36,6 +37,7 @@ from ur_cartesian_driver.sim.motion.motion_values import (
     Move,
 )
 from ur_cartesian_driver.sim.motion.paths.motion_calls import (
+    BLENDS_BY_LAWS,
     check_fractions,
     check_profile_parameters,
     constant_speed_parameters,
@@ -64,14 +66,6 @@ from ur_cartesian_driver.sim.motion.servo_motions import (
     ToolStopMotion,
 )
 
-#: The first path of a program starts slowly: within this time [s], the rate of the path's time
-#: grows evenly from 0 to 1, so the path takes longer by half of this time. Recorded on UR3, UR3e
-#: and UR10e.
-START_TIME = 0.16
-#: Acceleration [rad/s^2] of a movej without `a`; speed [rad/s] of a movej without `v`. Recorded on
-#: a UR3; the manual rounds the values to 1.4 and 1.05.
-DEFAULT_JOINT_ACCELERATION, DEFAULT_JOINT_SPEED = radians(80.0), radians(60.0)
-
 
 class MotionGenerator:
     """
@@ -84,13 +78,15 @@ class MotionGenerator:
     :param q: joint positions at the start [rad].
     """
 
-    def __init__(self, arm: Arm, cycle: float, q: Vector6) -> None:
+    def __init__(
+        self, arm: Arm, cycle: float, q: Vector6, laws: MotionLaws = ASSUMED_LAWS
+    ) -> None:
         """Begin at rest at ``q`` with the flange as TCP."""
         self.arm = arm
         self.cycle = cycle
+        #: The laws of motion.
+        self.laws = laws
         self.max_tool_speed = MAX_TOOL_SPEED
-        #: Speed at which movel turns the tool for each m/s of its ``v`` [rad/s].
-        self.turn_ratio = 1.0
         #: The motion version of movej and movel, 1 or 2; and what version 2 does.
         self.motion_version = 1
         self.second_version = SecondMotionVersion()
@@ -98,9 +94,9 @@ class MotionGenerator:
         self._target = ArmTarget(arm, cycle, q)
         #: The offset that a program adds to the target.
         self.path_offset = ControllerPathOffset(self._target)
-        self._active = RunningMotion(self._target)
+        self._active = RunningMotion(self._target, laws.set_point_deceleration)
         self._reports = MotionReports()
-        self._paths = PathQueue(self._target, self._active, self._reports)
+        self._paths = PathQueue(self._target, self._active, self._reports, laws)
         self._stepper = CycleStepper(self._target)
         #: The rate at which the time of a path runs before speed scaling; it is less than 1 only
         #: while the first path of a program starts.
@@ -189,8 +185,8 @@ class MotionGenerator:
     def movej(
         self,
         q: Vector6,
-        a: float = DEFAULT_JOINT_ACCELERATION,
-        v: float = DEFAULT_JOINT_SPEED,
+        a: float = ASSUMED_LAWS.timed_joint_acceleration,
+        v: float = ASSUMED_LAWS.timed_joint_speed,
         t: float = 0.0,
         r: float = 0.0,
     ) -> Move:
@@ -201,8 +197,9 @@ class MotionGenerator:
     def movel(
         self, T_base_tcp: Pose, a: float = 1.2, v: float = 0.25, t: float = 0.0, r: float = 0.0
     ) -> Move:
-        """Move the tool straight; a [m/s^2], v [m/s], times :attr:`turn_ratio` for rotations."""
-        parameters, ratio = ProfileParameters(acceleration=a, speed=v, time=t), self.turn_ratio
+        """Move the tool straight; a [m/s^2], v [m/s], times the turn ratio for rotations."""
+        parameters = ProfileParameters(acceleration=a, speed=v, time=t)
+        ratio = self.laws.turn_ratio
         return self._start_path(
             'movel', lambda start: LinearMovePath(start.pose, T_base_tcp, ratio), parameters, r
         )
@@ -255,6 +252,8 @@ class MotionGenerator:
             check_profile_parameters(name, parameters)
         if not 0.0 <= radius < inf:
             raise MotionError(f'{name}: the blend radius is {radius:g} m, it must be 0 or more.')
+        if name in BLENDS_BY_LAWS:
+            radius *= self.laws.blend_begin
         call = MotionCall(name, move_path, parameters, radius, Move())
         if self.motion_version == 2 and isinstance(parameters, ProfileParameters):
             call = self._by_second_version(call, parameters)
@@ -308,6 +307,8 @@ class MotionGenerator:
         """Move a set-point, which the arm follows, to ``q`` within ``t`` [s] of scaled time."""
         qd, before = self._active.nominal_joint_speed(), self._active.motion
         begin = before.setpoint(before.elapsed) if isinstance(before, ServoMotion) else self.q
+        lookahead_time *= self.laws.servo_lookahead_factor
+        gain *= self.laws.servo_gain_factor
         return self._replace(
             ServoMotion(self.q, qd, begin, q, t, lookahead_time, gain, MAX_JOINT_ACCELERATION)
         )
@@ -351,8 +352,13 @@ class MotionGenerator:
         return self._active.replace(motion)
 
     def begin_program(self) -> None:
-        """Make the next path start slowly."""
-        self._start_rate = 0.0
+        """
+        Make the next path start slowly.
+
+        Within the ``start_time`` of the laws, the rate of the path's time grows evenly from 0 to
+        1, so the path takes longer by half of this time.
+        """
+        self._start_rate = 0.0 if self.laws.start_time > 0.0 else 1.0
 
     def stop_at_once(self) -> None:
         """Stop at the present target, as if the power was cut; a running call returns."""
@@ -426,10 +432,10 @@ class MotionGenerator:
 
     def _next_start_rate(self) -> float:
         """Return the mean start rate in this cycle; the start rate does not grow in a pause."""
-        if self._active.scale <= 0.0:
+        if self._active.scale <= 0.0 or self._start_rate == 1.0:
             return 1.0
         before = self._start_rate
-        self._start_rate = min(1.0, before + self.cycle / START_TIME)
+        self._start_rate = min(1.0, before + self.cycle / self.laws.start_time)
         return 0.5 * (before + self._start_rate)
 
 

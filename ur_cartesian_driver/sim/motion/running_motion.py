@@ -19,8 +19,7 @@ from ur_cartesian_driver.sim.motion.servo_motions import (
     ToolStopMotion,
 )
 
-#: Deceleration [rad/s^2] if no further servoj set-point comes, or if a path move is called that
-#: cannot begin while the arm moves.
+#: Deceleration [rad/s^2] if a path move is called that cannot begin while the arm moves.
 UNATTENDED_DECELERATION = 15.0
 
 
@@ -29,11 +28,12 @@ class RunningMotion:
     The running motion and its call; also computes the speeds at which the next motion begins.
 
     :param target: the target of the arm.
+    :param set_point_deceleration: deceleration if no further servoj set-point comes [rad/s^2].
     """
 
-    def __init__(self, target: ArmTarget) -> None:
+    def __init__(self, target: ArmTarget, set_point_deceleration: float) -> None:
         """Begin at rest."""
-        self._target = target
+        self._target, self._set_point_deceleration = target, set_point_deceleration
         self.motion: Motion | None = None
         self.move: Move | None = None
         #: The speed scaling of the last cycle: ``scale`` was requested, ``rate`` was achieved.
@@ -76,7 +76,7 @@ class RunningMotion:
         elif isinstance(motion, JointSpeedMotion):
             self.motion = self.joint_stop(motion.acceleration)
         else:
-            self.motion = self.joint_stop(UNATTENDED_DECELERATION)
+            self.motion = self.joint_stop(self._set_point_deceleration)
 
     def joint_stop(self, a: float) -> JointStopMotion:
         """Return the motion that stops the joints from their present speed, in unscaled time."""

@@ -23,6 +23,9 @@ class PathStart(NamedTuple):
     pose: Pose
 
 
+#: Moves after which a blend follows the laws of blends; the arcs of movep do not.
+BLENDS_BY_LAWS = ('movej', 'movel', 'movec')
+
 ParameterFunction: TypeAlias = Callable[[MovePath, PathStart], ProfileParameters]
 
 

@@ -5,7 +5,7 @@ Path parameter over time: trapezoids, timed moves, ramps and S-curves.
 
 A profile is a chain of phases of constant jerk (zero except in the S-curve). The path parameter is
 in the unit of the path: metres, radians of the leading axis, or without unit. All profiles end at
-rest, except :func:`ramp`.
+rest, except :func:`ramp` and :func:`two_ramps`.
 """
 
 from __future__ import annotations
@@ -210,6 +210,21 @@ def ramp(length: float, start_speed: float, end_speed: float) -> MotionProfile:
     """Return the profile that changes the speed evenly over the length: T = 2 d / (v0 + v1)."""
     duration = 2.0 * length / (start_speed + end_speed)
     return _chain(length, start_speed, [(duration, (end_speed - start_speed) / duration, 0.0)])
+
+
+def two_ramps(start_speed: float, end_speed: float, ratio: float) -> MotionProfile:
+    """
+    Return a ramp over the length 1, bent half-way.
+
+    Half-way an even ramp has the speed sqrt((v0^2 + v1^2) / 2); here it is ``ratio`` times this,
+    and each half is an even ramp.
+    """
+    middle = ratio * sqrt(0.5 * (start_speed**2 + end_speed**2))
+    halves = [
+        (duration := 1.0 / (a + b), (b - a) / duration, 0.0)
+        for a, b in ((start_speed, middle), (middle, end_speed))
+    ]
+    return _chain(1.0, start_speed, halves)
 
 
 def s_curve(

@@ -23,6 +23,7 @@ from ur_cartesian_driver.sim.motion.paths.motion_profile import (
     timed,
     timed_ramp,
     trapezoid,
+    two_ramps,
 )
 from ur_cartesian_driver.sim.motion.paths.move_paths import (
     end_within_radius,
@@ -206,6 +207,7 @@ def append_move_path(
     radius: float,
     call: Move,
     circular: bool,
+    speed_ratio: float = 1.0,
 ) -> tuple[PathMotion, bool]:
     """
     Return the motion with one more path, and whether the path is blended.
@@ -214,6 +216,8 @@ def append_move_path(
     at the same distance after the waypoint. If the arm already stands still, or the new path does
     not leave the blend radius, there is no blend and the arm stops at the waypoint. (In a blend
     both moves have one common speed, so a short new move would run at the speed of the last move.)
+
+    :param speed_ratio: rate half-way through the blend, as a multiple of that of an even change.
     """
     last, last_move = path_motion.sections[-1], path_motion.last_move
     ahead = path_motion.sections[path_motion.index : -1]
@@ -234,6 +238,7 @@ def append_move_path(
         parameters,
         head,
         move_path.length - head,
+        speed_ratio,
     )
     end = PathSection(move_path, after, head, after.duration)
     blended = PathSection(blend, through, 0.0, through.duration)
@@ -277,6 +282,7 @@ def _blend_profiles(
     after: ProfileParameters,
     head: float,
     rest: float,
+    speed_ratio: float = 1.0,
 ) -> tuple[MotionProfile, MotionProfile]:
     """
     Return the profiles of the blend (0 to 1) and of the remainder of the new path.
@@ -298,6 +304,7 @@ def _blend_profiles(
     :param after: the parameters of the new move.
     :param head: length of the new path within the blend.
     :param rest: length of the new path after the blend.
+    :param speed_ratio: see :func:`append_move_path`.
     """
     (entry_rate, exit_rate), before = rates, last_move.parameters
     u0 = speed / entry_rate
@@ -315,7 +322,7 @@ def _blend_profiles(
         cruise = min(after.speed, stoppable)
     allowed = sqrt(min(strongest / entry_rate, acceleration / exit_rate))
     u1 = min(cruise / exit_rate, max(u0, allowed))
-    through = ramp(1.0, u0, u1)
+    through = ramp(1.0, u0, u1) if speed_ratio == 1.0 else two_ramps(u0, u1, speed_ratio)
     if after.time > 0.0:
         min_time = time * rest / (whole + head) / _MAX_CATCH_UP
         left = max(time - through.duration, min_time)

@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.twin.laws import MotionLaws
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
 from ur_cartesian_driver.sim.motion.cycle_stepper import ROUNDING
 from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import (
@@ -21,7 +22,11 @@ from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import (
 )
 from ur_cartesian_driver.sim.motion.motion_reports import MotionReports
 from ur_cartesian_driver.sim.motion.motion_values import MotionError, MotionFault
-from ur_cartesian_driver.sim.motion.paths.motion_calls import MotionCall, PathStart
+from ur_cartesian_driver.sim.motion.paths.motion_calls import (
+    BLENDS_BY_LAWS,
+    MotionCall,
+    PathStart,
+)
 from ur_cartesian_driver.sim.motion.paths.move_paths import FilletBlendPath, MovePath
 from ur_cartesian_driver.sim.motion.paths.path_motion import (
     append_move_path,
@@ -39,23 +44,27 @@ class _Overlap(NamedTuple):
     """The state before a waypoint that is skipped if another move follows at once."""
 
     before: PathMotion | None
-    after_movep: bool
+    last_name: str
     name: str
 
 
 class PathQueue:
     """The path moves of one arm: the running move, and the move that waits for standstill."""
 
-    def __init__(self, target: ArmTarget, active: RunningMotion, reports: MotionReports) -> None:
+    def __init__(
+        self, target: ArmTarget, active: RunningMotion, reports: MotionReports, laws: MotionLaws
+    ) -> None:
         """Begin without moves."""
         self._target, self._active, self._reports = target, active, reports
+        self._laws = laws
         #: The call that waits until the arm stands still.
         self._waiting: MotionCall | None = None
-        #: Whether the last path move is a movep.
-        self._after_movep = False
+        #: Name of the last path move; '' before the first.
+        self._last_name = ''
         self._overlap: _Overlap | None = None
-        #: Part of a cycle that the last move did not use [s]. A move that follows at once begins
-        #: this much earlier, so that the times of moves are not rounded to cycles.
+        #: Part of a cycle that the last move did not use, less the time that the laws lose between
+        #: moves [s]. A move that follows at once begins this much earlier, so that the times of
+        #: moves are not rounded to cycles; or later, if the number is negative.
         self._spare = 0.0
 
     def clear(self) -> None:
@@ -106,12 +115,12 @@ class PathQueue:
 
     def after_step(self, motion: PathMotion) -> None:
         """Make the call return as soon as it can; warn of a movep that is too fast."""
-        if self._after_movep:
+        if self._last_name == 'movep':
             self._check_movep_speed(motion)
         if motion.may_return(self._target.cycle):
             motion.last_move.call.returned = True
         if motion.finished:
-            self._spare = motion.spare
+            self._spare = motion.spare - self._laws.idle_between_moves
             self.finish_at_rest()
 
     def _wait(self, call: MotionCall) -> None:
@@ -152,7 +161,8 @@ class PathQueue:
             call.parameters_of(move_path, start),
             call.radius,
             call.move,
-            circular=call.name == 'movep' and self._after_movep,
+            circular=call.name == self._last_name == 'movep',
+            speed_ratio=self._laws.blend_speed_ratio if self._last_name in BLENDS_BY_LAWS else 1.0,
         )
         if not is_blended and call.radius <= 0.0 and travel <= last.radius:
             self._reports.waypoint_within_blend(call.name)
@@ -169,8 +179,8 @@ class PathQueue:
         skipped if another move follows at once; otherwise the arm goes to the waypoint.
         """
         overlaps = call.radius > 0.0 and margin < -_TOUCHING
-        self._overlap = _Overlap(before, self._after_movep, call.name) if overlaps else None
-        self._after_movep = call.name == 'movep'
+        self._overlap = _Overlap(before, self._last_name, call.name) if overlaps else None
+        self._last_name = call.name
         self._active.motion, self._active.move = path_motion, call.move
         call.move.returned = overlaps or path_motion.may_return(self._target.cycle)
         if before is None and path_motion.sections[0].profile.duration <= 0.0:
@@ -179,7 +189,7 @@ class PathQueue:
     def _skip_overlapping(self) -> None:
         """Discard an overlapping waypoint, now that another move follows at once."""
         if self._overlap is not None:
-            self._active.motion, self._after_movep, name = self._overlap
+            self._active.motion, self._last_name, name = self._overlap
             self._overlap = None
             self._reports.blend_skipped(name)
 
