@@ -3,8 +3,10 @@
 """
 The ramp by which a controller slows the time of a path down to zero.
 
-At constant speed v the way goes on by ``v (t - t^2 / 2T)`` within the ramp of T. A stop while the
-move accelerates or brakes shows both at once, and is not used.
+At constant speed v the way goes on by ``v (t - t^2 / 2T)`` within the ramp of T. A controller
+that changes the rate once a cycle is ahead of that inside the ramp, by v/8T times the square of a
+cycle; so a constant is fitted, too. A stop while the move accelerates or brakes shows both at
+once, and is not used.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ def find_ramp(time: Floats, way: Floats, follows: Flags) -> Measured | Misfit | 
     fastest = float(speed.max(initial=0.0))
     if fastest <= 0.0:
         return None
-    scatter = 4.0 * noise_of(way) / float(np.median(np.diff(time)))
+    cycle = float(np.median(np.diff(time)))
+    scatter = 4.0 * noise_of(way) / cycle
     slow = speed < (1.0 - _STEADY) * fastest - scatter
     cruising = np.flatnonzero(~slow)
     last = int(cruising[-1])
@@ -52,19 +55,20 @@ def find_ramp(time: Floats, way: Floats, follows: Flags) -> Measured | Misfit | 
     t, origin = time[rows] - time[last], float(way[first])
 
     def model(parameters: Floats) -> Floats:
-        offset, v, begin, whole = parameters
-        inside = np.clip(t - begin, 0.0, abs(whole))
-        ramp: Floats = offset + v * (
-            np.minimum(t, begin) + inside - 0.5 * inside * inside / max(abs(whole), 1e-6)
-        )
-        return ramp
+        offset, v, begin, whole, ahead = parameters
+        whole = max(abs(whole), cycle)
+        inside = np.clip(t - begin, 0.0, whole)
+        ramp = np.minimum(t, begin) + inside - 0.5 * inside * inside / whole
+        edge = np.minimum(2.0 * np.minimum(inside, whole - inside) / cycle, 1.0)
+        way: Floats = offset + v * ramp + ahead * edge
+        return way
 
-    guess = [origin - fastest * float(t[0]), fastest, 0.0, moving]
+    guess = [origin - fastest * float(t[0]), fastest, 0.0, moving, 0.0]
     follows = follows[rows].copy()
     follows[0] = False
     found = fit(model, way[rows], guess, follows)
     if found is None:
         return None
-    if found.rms > MISFIT and found.rms > 3.0 * noise_of(found.residuals):
+    if found.rms > max(MISFIT, 3.0 * noise_of(found.residuals)):
         return Misfit(rms=found.rms)
     return found.measured(3)
