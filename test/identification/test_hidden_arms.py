@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The laws of hidden arms are within the intervals that their recordings lead to."""
 
+from collections import Counter
 from dataclasses import asdict
 
 from hidden_arm import Laws, smooth_steps, standard_experiments
@@ -27,18 +28,21 @@ def identified():
 
 @pytest.mark.random
 def test_intervals_contain_the_true_laws(identified):
-    inside, number = {}, {}
+    inside, number = Counter(), Counter()
     for laws, results in identified:
         for name, true in laws.items():
-            result = results[name]
-            if not isinstance(result, Unknown):
-                low, high = result.interval
-                number[name] = number.get(name, 0) + 1
-                inside[name] = inside.get(name, 0) + (low <= true <= high)
-    print({name: f'{inside[name]}/{number[name]}' for name in number})
-    assert set(number) == set(identified[0][0])
-    for name, count in number.items():
-        assert count >= 0.9 * len(identified), name
+            if not isinstance(results[name], Unknown):
+                low, high = results[name].interval
+                number[name] += 1
+                inside[name] += low <= true <= high
+    print({name: f'{inside[name]} of {count}' for name, count in number.items()})
+    arms = len(identified)
+    for name in identified[0][0]:
+        # Ringing is not resolved at 125 Hz, which a third of the arms have.
+        is_ringing = name.startswith(('ringing', 'acceleration'))
+        assert number[name] >= (0.4 if is_ringing else 0.9) * arms, name
+        # 92 % inside, less four standard deviations of the count.
+        assert inside[name] > 0.92 * number[name] - 4.0 * (0.07 * number[name]) ** 0.5, name
     assert sum(inside.values()) >= 0.92 * sum(number.values())
 
 

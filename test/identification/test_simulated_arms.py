@@ -139,6 +139,9 @@ def test_the_laws_of_a_simulated_arm_are_found(case):
     wrong = []
     for name, estimate in twin.estimates.items():
         found, true = results[name], estimate.value
+        if model == 'ur3' and name.startswith('ringing'):
+            assert 'packets every 8 ms are too rare' in str(found)
+            continue
         if isinstance(found, Unknown):
             wrong.append(f'{name}: {found}')
             continue

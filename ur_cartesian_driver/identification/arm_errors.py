@@ -51,6 +51,7 @@ class ArmErrors:
     The errors of an arm that were found.
 
     :param settling: time constant between friction and static error [s].
+    :param cycle: time from packet to packet [s].
     :param joints: number of joints that moved.
     :param rms: root mean square of what is left [rad].
     :param noise: standard deviation of the white noise in it [rad].
@@ -63,6 +64,7 @@ class ArmErrors:
     ringing_frequency: Measured
     ringing_decay: Measured
     settling: Measured
+    cycle: float
     joints: int
     rms: float
     noise: float
@@ -115,6 +117,7 @@ def find_arm_errors(samples: ArmSamples) -> ArmErrors | None:
         ringing_frequency=_exponential(found, _FREQUENCY),
         ringing_decay=_exponential(found, _DECAY),
         settling=_exponential(found, _SETTLING),
+        cycle=grid.cycle,
         joints=len(grid.qd),
         rms=found.rms,
         noise=noise_of(found.residuals),
@@ -186,7 +189,10 @@ class _Model:
                 unmoved - 1.0,
             )
         ]
-        self._acceleration = self._spectrum(-grid.qdd)
+        # Differences of packets, and even changes between them, each take (w cycle)^2 / 12 of an
+        # acceleration that swings with w; its own differences give that back.
+        bends = np.diff(np.pad(grid.qdd, ((0, 0), (1, 1)), 'edge'), 2, axis=1)
+        self._acceleration = self._spectrum(bends / 6.0 - grid.qdd)
         self._joints = joints
 
     def __call__(self, parameters: Floats) -> Floats:
@@ -247,11 +253,14 @@ class _Model:
         return kernel
 
     def _ring_kernel(self, log_frequency: float, log_decay: float) -> Floats:
-        """Return the kernel of an oscillator that comes to rest at its input."""
+        """Return the kernel of an oscillator, for an input that changes evenly in a cycle."""
         omega, decay = 2.0 * pi * exp(log_frequency), exp(log_decay)
-        t = self._grid.cycle * np.arange(self._kernel_length + 1)
-        swing = np.cos(omega * t) + decay / omega * np.sin(omega * t)
-        kernel: Floats = np.diff(1.0 - np.exp(-decay * t) * swing)
+        cycle, square = self._grid.cycle, omega**2 + decay**2
+        t = cycle * np.arange(self._kernel_length + 1)
+        # The answer to an input that rises from 0 by 1 per second.
+        swing = (omega - decay**2 / omega) * np.sin(omega * t) - 2.0 * decay * np.cos(omega * t)
+        rise = t - (2.0 * decay + np.exp(-decay * t) * swing) / square
+        kernel: Floats = np.diff(rise, 2, prepend=0.0) / cycle
         return kernel
 
     @property

@@ -56,10 +56,12 @@ def start_time(moves: Sequence[FoundMove]) -> Result:
         if isinstance(move.profile, Profile) and move.profile.start and not move.piece.chained
     ]
     starts = [profile.start for profile in profiles if profile.start]
+    steps = sum(profile.step > 0.0 for profile in profiles)
     return _result(
         'start_time',
         starts,
-        f'{_plural(len(starts), "start")} of programs',
+        f'{_plural(len(starts), "start")} of programs'
+        + (f', {steps} with a rate that changes once a cycle' if steps else ''),
         _misfits(moves) or 'no move sets out as the first one of a program does',
         'record a program from its start, with a move of a second or more',
         left_over=_rms(profiles),
@@ -247,10 +249,12 @@ def arm_figures(recordings: Sequence[ArmSamples]) -> dict[str, Result]:
         reason = 'no recording has actual_q'
     results: dict[str, Result] = {}
     for name, most in _MOST_WIDTH.items():
-        parts: list[Measured] = [getattr(errors, name) for errors in found]
-        evidence = f'{_plural(sum(errors.joints for errors in found), "moving joint")}'
-        left = f'{1e6 * max((errors.rms for errors in found), default=0.0):.3g} urad rms'
-        result = _result(name, parts, evidence, reason, experiment, left_over=left)
+        used = [errors for errors in found if name not in _RINGING or errors.cycle < MOST_CYCLE]
+        parts: list[Measured] = [getattr(errors, name) for errors in used]
+        evidence = _plural(sum(errors.joints for errors in used), 'moving joint')
+        left = f'{1e6 * max((errors.rms for errors in used), default=0.0):.3g} urad rms'
+        seldom = f'packets every {1e3 * found[0].cycle:.3g} ms are too rare' if found else ''
+        result = _result(name, parts, evidence, seldom or reason, experiment, left_over=left)
         if parts and isinstance(result, Estimate):
             whole = combined(parts)
             if whole.half_width > most(whole.value):
@@ -270,6 +274,10 @@ def arm_figures(recordings: Sequence[ArmSamples]) -> dict[str, Result]:
     return results
 
 
+#: Packets that are further apart [s] do not show when the acceleration changes, nor how the arm
+#: rings then.
+MOST_CYCLE = 0.005
+_RINGING = ('acceleration_error', 'ringing_frequency', 'ringing_decay')
 #: Widest useful half of an interval, by value.
 _MOST_WIDTH: dict[str, Callable[[float], float]] = {
     'lag': lambda value: max(3e-4, 0.3 * value),
@@ -332,12 +340,12 @@ def _result(
     whole, law = combined(parts), LAWS[name]
     low, high = whole.value - whole.half_width, whole.value + whole.half_width
     value = min(max(whole.value, law.low), law.high)
-    low, high = max(low, law.low), min(high, law.high)
-    if not low <= value <= high:
+    if abs(value - whole.value) > 2.0 * whole.half_width:
         return Unknown(
             reason=f'it came out as {whole.value:.3g} {law.unit}; it {law.problem(whole.value)}',
             experiment=experiment,
         )
+    low, high = min(max(low, law.low), value), max(min(high, law.high), value)
     return Estimate(value=value, interval=(low, high), evidence=evidence, left_over=left_over)
 
 

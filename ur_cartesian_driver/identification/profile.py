@@ -5,14 +5,15 @@ The profile of a single move: a trapezoid of speed, with or without the ramp of 
 
 Way over time, from rest to rest: ``s(t) = w(p(t - t0))`` with the trapezoid ``w`` of acceleration
 a, speed v and length L, and the path time ``p`` of a start within T: ``t^2 / 2T`` up to T, then
-``t - T/2``.
+``t - T/2``. Recorded controllers change the rate of the path once a cycle c instead, by c/T:
+``t (t + c) / 2T``, then ``t - (T - c)/2``. Both are fitted.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from math import exp, log, sqrt
+from dataclasses import dataclass, replace
+from math import exp, hypot, log, sqrt
 
 import numpy as np
 
@@ -29,6 +30,8 @@ _ROUGH = 3.0
 SHORTEST_START = 0.01
 #: Starts from which the fit begins [s].
 _STARTS = (0.06, 0.15, 0.35)
+#: Twice the logarithm of a likelihood ratio from which one of two laws is ruled out.
+_CLEAR = 10.0
 #: From this share of the speed that it could reach on its way, a move is taken not to cruise.
 _TRIANGLE = 0.98
 #: Logarithm of speeds and accelerations that no move has.
@@ -43,6 +46,7 @@ class Profile:
 
     :param speed: None where the move never cruises.
     :param start: time within which it sets out [s]; None where it does so at once.
+    :param step: time from change to change of the rate in the start [s]; 0 = it changes evenly.
     :param begin: time at which it sets out, by the controller's clock [s].
     :param end: time at which it arrives [s].
     :param speed_squared_by_acceleration: v^2/a, which stays the same in a stretched move.
@@ -52,6 +56,7 @@ class Profile:
     acceleration: Measured
     speed: Measured | None
     start: Measured | None
+    step: float
     begin: Measured
     end: Measured
     speed_squared_by_acceleration: Measured | None
@@ -70,12 +75,18 @@ class Misfit:
     rms: float
 
 
-def path_time(t: Floats, start: float) -> Floats:
-    """Return the time of a path (n,) at times since its beginning [s]; slow within ``start``."""
+def path_time(t: Floats, start: float, step: float) -> Floats:
+    """
+    Return the time of a path (n,) at times since its beginning [s].
+
+    :param start: time within which its rate rises to 1 [s].
+    :param step: time after which the rate changes by one step [s]; 0 = evenly.
+    """
     t = np.maximum(t, 0.0)
     if start <= 0.0:
         return t
-    slow: Floats = np.where(t < start, 0.5 * t * t / start, t - 0.5 * start)
+    after = t - 0.5 * (start - step)
+    slow: Floats = np.where(t < start, 0.5 * t * (t + step) / start, after)
     return slow
 
 
@@ -116,15 +127,28 @@ def find_profile(
     if best is None:
         return None
     if may_start:
-        starts = [best.with_start(t, way, follows, start) for start in _STARTS]
-        found = [each for each in starts if each is not None]
-        better = min(found, key=lambda each: each.fit.rms, default=best)
-        if better.has_start and better.start.value - better.start.half_width > SHORTEST_START:
-            best = better
+        best = _with_start(best, t, way, follows)
     rms, noise = best.fit.rms, noise_of(best.fit.residuals)
     if rms > MISFIT and rms > _ROUGH * noise:
         return Misfit(rms=rms)
     return best.profile(origin)
+
+
+def _with_start(best: _Found, t: Floats, way: Floats, rows: Flags) -> _Found:
+    """Return the best fit with a start, if there is one."""
+    starts = [best.with_start(t, way, rows, start, 0.0) for start in _STARTS]
+    found = [each for each in starts if each is not None]
+    even = min(found, key=lambda each: each.fit.rms, default=best)
+    if not even.has_start or even.start.value - even.start.half_width < SHORTEST_START:
+        return best
+    cycle = float(np.median(np.diff(t)))
+    stepwise = best.with_start(t, way, rows, even.start.value, cycle)
+    if stepwise is None:
+        return even
+    gain = 2.0 * len(t) * log(max(even.fit.rms, 1e-12) / max(stepwise.fit.rms, 1e-12))
+    if abs(gain) > _CLEAR:
+        return stepwise if gain > 0.0 else even
+    return replace(even, doubt=abs(stepwise.start.value - even.start.value))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,11 +188,16 @@ class _Found:
 
     Parameters are offset, length, onset, logarithm of the acceleration, that of the speed if it
     cruises, and the time of the start if it has one.
+
+    :param step: time from change to change of the rate in the start [s]; 0 = even.
+    :param doubt: change of the start [s] by another step that fits as well.
     """
 
     fit: Fit
     cruises: bool
     has_start: bool
+    step: float = 0.0
+    doubt: float = 0.0
 
     @classmethod
     def without_start(cls, t: Floats, way: Floats, rows: Flags, guess: _Guess) -> _Found | None:
@@ -187,18 +216,21 @@ class _Found:
             return cls(fit=found, cruises=cruises, has_start=False)
         return None
 
-    def with_start(self, t: Floats, way: Floats, rows: Flags, start: float) -> _Found | None:
+    def with_start(
+        self, t: Floats, way: Floats, rows: Flags, start: float, step: float
+    ) -> _Found | None:
         """Fit again with the ramp of a start, from a first guess of it [s]."""
         first = [*self.fit.parameters, start]
         first[_ONSET] -= 0.5 * start
-        found = fit(_model(t, self.cruises, True), way, first, rows)
+        found = fit(_model(t, self.cruises, True, step), way, first, rows)
         if found is None:
             return None
-        return _Found(fit=found, cruises=self.cruises, has_start=True)
+        return _Found(fit=found, cruises=self.cruises, has_start=True, step=step)
 
     @property
     def start(self) -> Measured:
-        return self.fit.measured(len(self.fit.parameters) - 1)
+        found = self.fit.measured(len(self.fit.parameters) - 1)
+        return replace(found, error=hypot(found.error, 0.5 * self.doubt))
 
     def profile(self, origin: float) -> Profile:
         parameters = self.fit.parameters
@@ -212,7 +244,8 @@ class _Found:
             weights[_SPEED] = v / a - length / v
         weights |= {last: 0.5} if self.has_start else {}
         begin = self.fit.measured(_ONSET)
-        whole = trapezoid_time(length, a, v) + (0.5 * self.start.value if self.has_start else 0.0)
+        lost = 0.5 * (self.start.value - self.step) if self.has_start else 0.0
+        whole = trapezoid_time(length, a, v) + lost
         error = self.fit.combination(weights).error
         acceleration, freedom = self.fit.measured(_ACCELERATION), self.fit.freedom
         squared = speed = None
@@ -224,6 +257,7 @@ class _Found:
             acceleration=_scaled(acceleration, a),
             speed=speed,
             start=self.start if self.has_start else None,
+            step=self.step,
             begin=_moved(begin, origin),
             end=Measured(value=origin + begin.value + whole, error=error, freedom=freedom),
             speed_squared_by_acceleration=squared,
@@ -239,14 +273,16 @@ def _moved(measured: Measured, by: float) -> Measured:
     return Measured(value=measured.value + by, error=measured.error, freedom=measured.freedom)
 
 
-def _model(t: Floats, cruises: bool, has_start: bool) -> Callable[[Floats], Floats]:
+def _model(
+    t: Floats, cruises: bool, has_start: bool, step: float = 0.0
+) -> Callable[[Floats], Floats]:
     def model(parameters: Floats) -> Floats:
         offset, length, onset, ln_a = parameters[:4]
         ln_v = parameters[_SPEED] if cruises else _NO_BOUND
         start = parameters[-1] if has_start else 0.0
         if length <= 0.0 or start < 0.0 or max(abs(ln_a), abs(ln_v)) > _NO_BOUND:
             return np.full(len(t), NOWHERE)
-        path = path_time(t - onset, start)
+        path = path_time(t - onset, start, step)
         way: Floats = offset + trapezoid_way(path, length, exp(ln_a), exp(ln_v))
         return way
 
