@@ -12,6 +12,8 @@ from urp_text import script_line, urp_text, urpx
 
 from ur_cartesian_driver.cli import main, parser
 from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.twin.twin import ArmIdentity, Estimate, Twin
+from ur_cartesian_driver.motion.twin.twin_file import twin_text
 from ur_cartesian_driver.sim.calibration import random_calibration
 from ur_cartesian_driver.sim.command_line.simulate import simulator_config
 from ur_cartesian_driver.sim.controller_assembly import assemble
@@ -156,6 +158,25 @@ def test_every_simulated_robot_has_external_control():
 
 def config_of(*words):
     return simulator_config(parser().parse_args(['sim', *map(str, words)]))
+
+
+def test_a_twin_is_the_arm_that_is_simulated(tmp_path):
+    twin = Twin(
+        arm=ArmIdentity(model='ur10e', serial_number='20231', software='5.22.1', motion_version=2),
+        date='2026-11-27',
+        estimates={'start_time': Estimate(value=0.2, interval=(0.19, 0.21))},
+    )
+    file = tmp_path / 'twin.yaml'
+    file.write_text(twin_text(twin))
+    config = config_of('--twin', file)
+    assert config.twin == twin
+    assert (config.model, config.polyscope, config.motion_version) == ('ur10e', '5.22.1', 2)
+    assert (config.serial_number, config.laws.start_time) == ('20231', 0.2)
+    with pytest.raises(ValueError, match=r'^twin is of another robot: model ur10e, not ur5e;'):
+        config_of('--twin', file, '--model', 'ur5e')
+    file.write_text('start_time: 0.2')
+    with pytest.raises(ValueError, match=r'twin\.yaml, line 1: this is no twin'):
+        config_of('--twin', file)
 
 
 def test_a_program_of_polyscope_x_has_the_name_in_its_file(tmp_path):

@@ -165,6 +165,8 @@ def moves_of(chain):
                 tail,
                 leave,
                 entry,
+                0.0,
+                1.0,
             )
         )
     return Moves.of(rows), blends

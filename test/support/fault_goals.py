@@ -71,7 +71,7 @@ ARM = Arm(robot_model('ur5e'))
 OPTIONS = replace(example_goals.OPTIONS, max_tool_speed=1.0)
 
 
-def planned(state, offsets, velocity, acceleration, blend=BLEND, **goal):
+def planned(state, offsets, velocity, acceleration, blend=BLEND, options=OPTIONS, **goal):
     """Return a plan through points at offsets from the tool, with blends between them."""
     (x, y, z), turned = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
     points = tuple(Waypoint(pose=Pose((x + dx, y + dy, z + dz), turned)) for dx, dy, dz in offsets)
@@ -80,7 +80,7 @@ def planned(state, offsets, velocity, acceleration, blend=BLEND, **goal):
         Segment(velocity=velocity, acceleration=acceleration, blend_radius=radius)
         for radius in blends
     )
-    return plan(Goal(waypoints=points, segments=segments, **goal), state, ARM, OPTIONS)
+    return plan(Goal(waypoints=points, segments=segments, **goal), state, ARM, options)
 
 
 class StartState:

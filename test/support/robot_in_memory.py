@@ -57,21 +57,29 @@ class RobotInMemory:
     """One robot, on which trajectories are run one after the other from anywhere."""
 
     def __init__(
-        self, model, frequency=None, geometry=None, edit=wrap_in_program, interleaving_seed=None
+        self,
+        model,
+        frequency=None,
+        geometry=None,
+        edit=wrap_in_program,
+        interleaving_seed=None,
+        twin=None,
     ):
         """
         Start it.
 
         :param edit: makes a program of the text that the driver sends.
         :param interleaving_seed: of the random switches between its threads; None = no switches.
+        :param twin: the laws by which it moves; None = the assumed laws.
         """
-        self.model, self.geometry = model, geometry
+        self.model, self.geometry, self.twin = model, geometry, twin
         config = SimulatorConfig(
             model=model,
             frequency=frequency,
             geometry=geometry,
             unlock_delay=0.0,
             interleaving_seed=interleaving_seed,
+            twin=twin,
         )
         self._sockets = MemorySockets()
         self._accepted = {
@@ -93,7 +101,9 @@ class RobotInMemory:
     @cached_property
     def slow(self):
         """The same robot with a fifth of the cycles, for motions that take minutes."""
-        return RobotInMemory(self.model, 0.2 / self.controller.cycle, self.geometry)
+        return RobotInMemory(
+            self.model, 0.2 / self.controller.cycle, self.geometry, twin=self.twin
+        )
 
     def place(self, q, T_flange_tcp):
         """Put the arm and its tool somewhere at rest; return what RTDE would report."""

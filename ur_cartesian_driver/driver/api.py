@@ -63,6 +63,7 @@ from ur_cartesian_driver.motion.state.io_signals import Signals
 from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.servo_report import ServoReport
+from ur_cartesian_driver.motion.twin.twin import ArmIdentity
 from ur_cartesian_driver.path import Path
 from ur_cartesian_driver.planning import plan, plan_joint_goal, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_first_part
@@ -415,6 +416,12 @@ class Driver(RobotServices, InteractiveMotions):
             path_offset_known=has_feature('path_offset', status.software()),
             target_payload_known=has_feature('target_payload', status.software()),
             robot_motion_version=status.motion_version,
+            robot=ArmIdentity(
+                model=status.robot_model,
+                serial_number=status.serial_number,
+                software=status.polyscope_version,
+                motion_version=status.motion_version,
+            ),
             acceleration_known=state.actual_tcp_acceleration is not None
             and state.target_tcp_acceleration is not None,
         )

@@ -11,6 +11,9 @@ from ur_cartesian_driver.motion.geometry.workspace import parse_planes
 from ur_cartesian_driver.motion.goal.field_table import Range
 from ur_cartesian_driver.motion.goal.output_names import parse_safe_outputs
 from ur_cartesian_driver.motion.goal.parameter_fields import check_parameters, Detected
+from ur_cartesian_driver.motion.twin.laws import MotionLaws
+from ur_cartesian_driver.motion.twin.twin import ArmIdentity, laws_of, Twin, UNKNOWN_ARM
+from ur_cartesian_driver.motion.twin.twin_file import read_twin, TwinFileError
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
@@ -158,6 +161,16 @@ class PlanningOptions:
     #: [rad/s]: 4 was recorded once, 1 is the value in the manual.
     turn_ratio: Annotated[float, Range(1.0, 4.0)] = 4.0
 
+    #: Measured laws of motion of this arm, a twin.yaml, which times and blends of plans follow.
+    #: Empty: plans follow the assumed laws.
+    twin_file: str = ''
+    #: Whether to use a twin_file that was measured on another arm, software or motion version.
+    allow_other_twin: bool = False
+    #: The twin in twin_file.
+    twin: Detected[Twin | None] = None
+    #: The robot for which goals are planned, as far as it is known.
+    robot: Detected[ArmIdentity] = UNKNOWN_ARM
+
     #: Speed of the tool on lines and arcs [m/s].
     linear_velocity: Annotated[float, Range(0.0001, 10.0)] = 0.1
     #: Acceleration of the tool on lines and arcs [m/s^2].
@@ -217,6 +230,23 @@ class PlanningOptions:
         check_parameters(self)
         parse_planes(self.workspace_planes)
         parse_safe_outputs(self.safe_outputs)
+        if self.twin_file and self.twin is None:
+            object.__setattr__(self, 'twin', _read_twin(self.twin_file))
+
+    @property
+    def twin_problem(self) -> str:
+        """Return how the twin's arm differs from the robot, as a clause; '' if not, or no twin."""
+        return '' if self.twin is None else self.twin.arm.differences(self.robot)
+
+    @property
+    def used_twin(self) -> Twin | None:
+        """The twin that plans follow; None = the assumed laws."""
+        return self.twin if self.allow_other_twin or not self.twin_problem else None
+
+    @property
+    def laws(self) -> MotionLaws:
+        """The laws by which the robot moves: measured, or else assumed."""
+        return laws_of(self.used_twin, self.turn_ratio)
 
     def for_program(self, settings: ProgramTraits) -> PlanningOptions:
         """Return the options for the robot program of a driver."""
@@ -232,3 +262,18 @@ class PlanningOptions:
     def older_program(self) -> str:
         """The version of the robot program if it is not the driver's own, else ''."""
         return self.dialect.older_program
+
+
+def _read_twin(path: str) -> Twin:
+    """
+    Return the twin in a file.
+
+    :raises ValueError: the file cannot be read, or is no twin.
+    """
+    try:
+        return read_twin(path)
+    except OSError as error:
+        reason = error.strerror or error
+        raise ValueError(f'twin_file is {path!r}, which cannot be read: {reason}.') from None
+    except TwinFileError as error:
+        raise ValueError(f'twin_file: {error}') from None

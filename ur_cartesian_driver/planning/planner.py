@@ -16,6 +16,7 @@ reference path and report. The first stage that finds a fault in the goal raises
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from math import inf
@@ -24,7 +25,7 @@ from typing import TypeAlias
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.errors import GoalRefused, NearSingularity
+from ur_cartesian_driver.motion.errors import GoalRefused, NearSingularity, TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.pose_rows import transform_rows
@@ -47,6 +48,7 @@ from ur_cartesian_driver.planning.moves.plan_report import (
     motion_version_remarks,
     segment_lines,
     stop_remarks,
+    twin_remarks,
 )
 from ur_cartesian_driver.planning.moves.reference_path import reference_path
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
@@ -126,7 +128,25 @@ def plan(
     :raises GoalRefused: the goal fails a check (a subclass is raised); the text names point,
         quantity, value and bound.
     """
+    if options.twin is not None and not options.robot.model:
+        options = replace(options, robot=replace(options.robot, model=arm.model.name))
     table = check_for_arm(goal, state.T_flange_tcp, arm, options)
+    if options.laws.blend_begin < 1.0 and table.segments.blend_radii.any():
+        # A measured law must not let a goal pass that was refused: the path of the assumed blends
+        # has to be possible, too. How long it takes does not matter.
+        with suppress(TooFast):
+            _plan(table, state, arm, replace(options, twin=None, twin_file=''), running)
+    return _plan(table, state, arm, options, running)
+
+
+def _plan(
+    table: GoalTable,
+    state: RobotState,
+    arm: Arm,
+    options: PlanningOptions,
+    running: PlannedSegment | None,
+) -> Plan:
+    """Return the plan of a goal that :func:`check_for_arm` has passed."""
     if table.segments.free_axes.any():
         return _plan_free(table, state, arm, options)
     return _plan_fixed(table, state, arm, options, running)
@@ -197,7 +217,14 @@ def plan_moves(planner: GoalPlanner) -> Plan:
         samples.segment,
         samples.fraction,
     )
-    timings = SegmentTimings(geometries, options, arm.model, paths.blend_samples, planner.running)
+    timings = SegmentTimings(
+        geometries,
+        options,
+        arm.model,
+        paths.blend_samples,
+        planner.running,
+        planner.stops.waypoints,
+    )
     segments = _planned_rows(paths, geometries, timings)
     del paths, samples  # frees memory: samples and reference path of long goals are large
     motion = reference_path(
@@ -208,9 +235,10 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     )
     remarks = [
         *ignored_remarks(goal),
-        *motion_version_remarks(options.robot_motion_version),
+        *motion_version_remarks(options),
         *(remark for _, remark in sorted(timings.requests.remarks.items())),
-        *blend_remarks(goal, geometries, timings),
+        *twin_remarks(options, timings),
+        *blend_remarks(goal, geometries, timings, options),
         *lines,
         *stop_remarks(geometries),
         geometries.tightest_margins.remark,

@@ -217,7 +217,7 @@ class ArmFigures:
         _check(self)
 
 
-def _table(kind: type[MotionLaws] | type[ArmFigures]) -> dict[str, Law]:
+def _table(kind: type) -> dict[str, Law]:
     """Return the laws that the fields of a dataclass declare, by name."""
     hints = declared_hints(kind)
     return {

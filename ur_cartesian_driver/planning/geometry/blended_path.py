@@ -202,9 +202,12 @@ class BlendedPath:
         #: The ``u`` at which the previous blend joins each curve; the ``u`` at which the next
         #: blend leaves it.
         self.u_join, self.u_leave = np.zeros(n), np.ones(n)
-        #: The distance from the waypoint at which the blend after each curve begins and ends [m],
-        #: 0 = no blend; whether this blend is a circular arc between lines (``movep``).
+        #: The radius of the blend after each curve [m], 0 = no blend; whether this blend is a
+        #: circular arc between lines (``movep``).
         self.radius, self.fillet = np.zeros(n), np.zeros(n, dtype=np.bool_)
+        #: The distance from the waypoint at which the blend begins and ends [m]: the radius, or by
+        #: a measured law less.
+        self.reach = np.zeros(n)
         #: Radius of the blend after each curve [m]; inf if the blend is no arc.
         self.arc_radius = np.full(n, np.inf)
         #: Length of the blend after each curve [m]; turn of the tool in the blend [rad].
@@ -235,14 +238,14 @@ class BlendedPath:
         """End curves where blends will begin, while the next curves are not known yet."""
         self.u_leave[row] = self.curves.trim(row, radius, at_end=True)
 
-    def make_blends(self, row: Indices, radius: Floats, fillet: Flags) -> None:
+    def make_blends(self, row: Indices, radius: Floats, reach: Floats, fillet: Flags) -> None:
         """Make the blends after the curves of some rows."""
         if not len(row):
             return
         curves, after = self.curves, row + 1
-        self.leave(row, radius)
-        self.u_join[after] = curves.trim(after, radius)
-        self.radius[row], self.fillet[row] = radius, fillet
+        self.leave(row, reach)
+        self.u_join[after] = curves.trim(after, reach)
+        self.radius[row], self.reach[row], self.fillet[row] = radius, reach, fillet
         shapes = BlendShapes(
             curves.rows(row, self.u_leave[row]),
             curves.start[after],

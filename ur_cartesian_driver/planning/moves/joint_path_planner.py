@@ -54,8 +54,12 @@ from ur_cartesian_driver.planning.preflight.tightest_margins import (
     singularity_distance_rows,
     tightest_margins,
 )
-from ur_cartesian_driver.planning.request.blend_limits import check_blend_parameters
+from ur_cartesian_driver.planning.request.blend_limits import (
+    blend_uncertainty,
+    check_blend_parameters,
+)
 from ur_cartesian_driver.planning.request.goal_fields import (
+    FOLLOWS_BLEND_LAWS,
     point_field,
     segment_field,
 )
@@ -72,7 +76,7 @@ _MAX_LINE_OFFSET = 0.05
 #: doubles after each solved run, and is reset after a replacement.
 _FIRST_RUN = 8
 
-_JOINT, _PROCESS = SegmentType.JOINT, SegmentType.PROCESS
+_JOINT, _LINEAR, _PROCESS = SegmentType.JOINT, SegmentType.LINEAR, SegmentType.PROCESS
 #: Refusals after which a line or an arc can be replaced by a joint move.
 _NO_STRAIGHT_PATH = (InvalidPosture, NearSingularity, JointLimitExceeded, Unreachable)
 
@@ -104,6 +108,8 @@ class JointPathPlanner:
         self.remarks, self.reasons = remarks, reasons
         self._max_path_length = max_path_length(kinematics)
         self._replaces = options.on_posture_change == 'movej'
+        self._laws = options.laws
+        self._blend_uncertainty = blend_uncertainty(options)
 
     def geometries(self, begin: int, T_base_tcp: Pose, q: Joints) -> SegmentGeometries:
         """
@@ -180,10 +186,15 @@ class JointPathPlanner:
         drafts, path, first = self._drafts, self._path, max(k - 1, 0)
         path.remove_blends(first, stop)
         rows = first + np.flatnonzero(drafts.is_blended[first:stop])
-        path.leave(rows, drafts.radii[rows])
+        by_laws = FOLLOWS_BLEND_LAWS[drafts.kinds]
+        reach = drafts.radii * np.where(by_laws, self._laws.blend_begin, 1.0)
+        path.leave(rows, reach[rows])
         made = rows[rows < stop - 1]
         fillet = (drafts.kinds[made] == _PROCESS) & (drafts.kinds[made + 1] == _PROCESS)
-        path.make_blends(made, drafts.radii[made], fillet)
+        path.make_blends(made, drafts.radii[made], reach[made], fillet)
+        is_line = drafts.kinds == _LINEAR
+        measured = made[is_line[made] & is_line[made + 1]]
+        path.blend_tolerance[measured] *= self._blend_uncertainty
         for row in rows_where(path.u_join[first:stop] > path.u_leave[first:stop]):
             u_join, u_leave = path.u_join[first + row], path.u_leave[first + row]
             check_blend_parameters(drafts.begin + first + row, float(u_join), float(u_leave))

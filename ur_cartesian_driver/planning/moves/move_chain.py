@@ -87,6 +87,10 @@ class Moves(_Columns):
     exit_rate: Floats
     #: Length per unit of the parameter ``s`` at the beginning of the blend after the move.
     entry_rate: Floats
+    #: Time that the controller loses before the move [s].
+    idle: Floats
+    #: Rate half-way through the blend before the move, as a multiple of that of an even change.
+    bend: Floats
 
     @property
     def accelerations(self) -> Floats:
@@ -145,29 +149,33 @@ class MoveTimes(_Columns):
     between: Floats
     #: Speed at the cut.
     leave: Floats
+    #: Time lost before the move [s].
+    idle: Floats
+    #: Rate half-way through the blend before the move, as a multiple of that of an even change.
+    bend: Floats
 
     @property
     def blend_time(self) -> Floats:
         """Time in the blend before each move [s]."""
-        return ramp_time(self.begin_rate, self.end_rate, 1.0)
+        return ramp_time(self.begin_rate, self.end_rate, 1.0, self.bend)
 
     @property
     def blend_half(self) -> Floats:
         """Time in the first half of the blend before each move, up to its waypoint [s]."""
-        return ramp_time(self.begin_rate, self.end_rate, 0.5)
+        return ramp_time(self.begin_rate, self.end_rate, 0.5, self.bend)
 
     @property
     def durations(self) -> Floats:
         """Times from point to point [s]; a blended point is passed in the middle of its blend."""
         half = self.blend_half
         durations: Floats = self.blend_time - half + self.between + np.append(half[1:], 0.0)
-        return durations
+        return self.idle + durations
 
     @property
     def begins(self) -> Floats:
-        """Time at which each move leaves the blend before it [s]."""
-        blend = self.blend_time
-        return np.cumsum(blend + self.between) - self.between
+        """Time at which each move leaves the blend before it, or rest [s]."""
+        before = self.blend_time + self.idle
+        return np.cumsum(before + self.between) - self.between
 
     def time_at(self, distance: Floats) -> Floats:
         """Return the time [s] from the beginning of each profile to a distance on it."""
@@ -205,8 +213,43 @@ class MoveTimes(_Columns):
         return np.stack((0.25 * a, a, self.length - b, self.length - 0.25 * b), axis=1)
 
 
-def ramp_time(begin: Floats, end: Floats, s: Floats | float) -> Floats:
-    """Return the times (n,) [s] to reach ``s`` in blends whose rates change linearly over time."""
+def ramp_time(begin: Floats, end: Floats, s: Floats | float, bend: Floats) -> Floats:
+    """
+    Return the times (n,) [s] to reach ``s`` in blends.
+
+    Their rates change linearly over time, or in two halves: see :attr:`Moves.bend`.
+    """
+    even = _even_ramp_time(begin, end, s)
+    if (bend == 1.0).all():
+        return even
+    middle = _middle_rate(begin, end, bend)
+    first = _even_ramp_time(begin, middle, np.minimum(2.0 * s, 1.0))
+    second = _even_ramp_time(middle, end, np.maximum(2.0 * s - 1.0, 0.0))
+    return np.where(bend == 1.0, even, 0.5 * (first + second))
+
+
+def ramp_rate(begin: Floats, end: Floats, s: Floats, bend: Floats) -> Floats:
+    """Return the rates (n,) [1/s] at ``s`` in blends, see :func:`ramp_time`."""
+    even = _even_ramp_rate(begin, end, s)
+    if (bend == 1.0).all():
+        return even
+    middle = _middle_rate(begin, end, bend)
+    first = _even_ramp_rate(begin, middle, np.minimum(2.0 * s, 1.0))
+    second = _even_ramp_rate(middle, end, np.maximum(2.0 * s - 1.0, 0.0))
+    return np.where(bend == 1.0, even, np.where(s < 0.5, first, second))
+
+
+def _middle_rate(begin: Floats, end: Floats, bend: Floats) -> Floats:
+    rate: Floats = bend * np.sqrt(0.5 * (begin**2 + end**2))
+    return rate
+
+
+def _even_ramp_rate(begin: Floats, end: Floats, s: Floats) -> Floats:
+    rate: Floats = np.sqrt(np.maximum(begin**2 + (end**2 - begin**2) * s, 0.0))
+    return rate
+
+
+def _even_ramp_time(begin: Floats, end: Floats, s: Floats | float) -> Floats:
     there = np.sqrt(np.maximum(begin**2 + (end**2 - begin**2) * s, 0.0))
     time: Floats = np.where(end > 0.0, 2.0 * s / np.maximum(begin + there, _TINY), 0.0)
     return time
@@ -263,8 +306,9 @@ class MoveChain:
         after = np.minimum(rows + 1, len(self.moves.length) - 1)
         handed = _hand_over(moves, times)
         begin, end = _blend_rates(self.moves.take(after), handed)
-        half = np.where(moves.tail > 0.0, ramp_time(begin, end, 0.5), 0.0)
-        return times.blend_time - times.blend_half + times.between + half
+        bend = self.moves.bend[after]
+        half = np.where(moves.tail > 0.0, ramp_time(begin, end, 0.5, bend), 0.0)
+        return times.idle + (times.blend_time - times.blend_half + times.between + half)
 
     def meet(
         self,
@@ -320,7 +364,7 @@ def _carry_out(moves: Moves, handed: Handover) -> MoveTimes:
     # previous move.
     timed, time = moves.time > 0.0, moves.time + handed.remaining
     left = np.maximum(
-        time - ramp_time(begin, end, 1.0),
+        time - ramp_time(begin, end, 1.0, moves.bend),
         time * rest / (moves.length + moves.head) / _MAX_CATCH_UP,
     )
     last = np.where(timed, moves.ramp_part * left, 1.0)
@@ -331,7 +375,18 @@ def _carry_out(moves: Moves, handed: Handover) -> MoveTimes:
     acceleration = np.where(timed, change / first, a)
     braking = np.where(timed, cruise / last, braking)
     times = MoveTimes(
-        begin, end, rest, enter, cruise, acceleration, braking, moves.tail, rest, rest
+        begin,
+        end,
+        rest,
+        enter,
+        cruise,
+        acceleration,
+        braking,
+        moves.tail,
+        rest,
+        rest,
+        moves.idle,
+        moves.bend,
     )
     times.between = times.time_at(rest - moves.tail)
     times.leave = times.speed_at(rest - moves.tail)

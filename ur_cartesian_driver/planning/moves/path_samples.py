@@ -43,6 +43,8 @@ class BlendSamples:
     index: Int32s
     #: Parameter ``s`` of the blend half-way between the previous sample and this one.
     s: Floats
+    #: Half of the difference between the two in ``s``.
+    half_step: Floats
     #: Time per unit of ``s`` at the joint speed limits [s].
     joint_time: Floats
     #: Joint that needs ``joint_time``.
@@ -114,6 +116,7 @@ def speed_bounds(
     blend_samples = BlendSamples(
         index=of.waypoint[on_blend],
         s=(of.t - 0.5 * of.step)[on_blend],
+        half_step=0.5 * of.step[on_blend],
         joint_time=rate[on_blend],
         joint=joint[on_blend],
         tool_distance=(np.append(0.0, distance) / step)[on_blend],

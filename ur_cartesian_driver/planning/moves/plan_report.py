@@ -14,6 +14,14 @@ from ur_cartesian_driver.motion.plan.primitive import MoveC, MoveJ, OptimoveJ, P
 from ur_cartesian_driver.planning.geometry.blended_path import CurveRows
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.blend_limits import (
+    blend_law,
+    BLEND_LAWS,
+    blend_time_uncertainty,
+    blends_are_measured,
+    measured_on,
+)
 from ur_cartesian_driver.planning.request.goal_fields import is_optimized
 from ur_cartesian_driver.planning.request.ignored_fields import add_remark
 
@@ -67,30 +75,62 @@ def stop_remarks(geometries: SegmentGeometries) -> list[str]:
     return lines
 
 
-def blend_remarks(goal: Goal, geometries: SegmentGeometries, timings: SegmentTimings) -> list[str]:
+def twin_remarks(options: PlanningOptions, timings: SegmentTimings) -> list[str]:
+    """Return the remarks on the measured laws that the plan follows, or does not follow."""
+    twin, used = options.twin, options.used_twin
+    if twin is None:
+        return []
+    lines = []
+    if options.twin_problem:
+        other = f'the twin of {twin.date} was measured on another robot: {options.twin_problem}'
+        lines.append(
+            f'{other}; the plan follows it, because allow_other_twin is true'
+            if used
+            else f'{other}; the plan does not follow it (allow_other_twin: true makes it follow)'
+        )
+    times = timings.chain.times
+    laws = [
+        *['turn_ratio'] * bool(timings.requests.turn_leads_line.any()),
+        *['idle_between_moves'] * bool(timings.requests.rests_between.any()),
+        *BLEND_LAWS[: 3 * bool((times.begin_rate > 0.0).any())],
+    ]
+    if used and (measured := used.measured(*laws)):
+        lines.append(f'planned as {measured_on(options)}: {measured}')
+    return lines
+
+
+def blend_remarks(
+    goal: Goal, geometries: SegmentGeometries, timings: SegmentTimings, options: PlanningOptions
+) -> list[str]:
     """Return the remark on the possible error of the planned end time; [] without blends."""
     if not geometries.path.has_blend_after.any() or geometries.is_optimized.any():
         return []
     planned, (least, greatest) = timings.durations.sum(), timings.bounds()
     off = max(planned - least.sum(), greatest.sum() - planned)
+    law = blend_law(options)
+    why = f'because how the robot passes them is not published; planned as {law}'
+    if blends_are_measured(options):
+        off = min(
+            off, blend_time_uncertainty(options) * float(timings.chain.times.blend_time.sum())
+        )
+        why = f'by the intervals of the laws {law}'
     clause = ''
     tolerance = goal.goal_time_tolerance or DEFAULT_GOAL_TIME_TOLERANCE
     if 0.0 <= tolerance < off and geometries.times[-1] > 0.0:
         clause = f', more than goal_time_tolerance ({tolerance:g} s)'
-    return [
-        f'blends: the end may be up to {off:.3f} s off{clause}, because how the robot passes them '
-        'is not published; planned as assumed for motion version 1'
-    ]
+    return [f'blends: the end may be up to {off:.3f} s off{clause}, {why}']
 
 
-def motion_version_remarks(motion_version: int) -> list[str]:
+def motion_version_remarks(options: PlanningOptions) -> list[str]:
     """Return the remark on a robot whose moves follow other laws than plans do; 0 = unknown."""
+    motion_version = options.robot_motion_version
     if motion_version <= 1:
         return []
+    but = ' but for those of the twin' if options.used_twin else ''
     return [
         f'the robot moves by motion version {motion_version}, but the plan follows the laws of '
-        'version 1: times will differ a little, and blends may be smaller (motion_version: 1 sets '
-        'version 1)'
+        f'version 1{but}: times will differ a little, and blends may be smaller (motion_version: '
+        '1 sets version 1)'
     ]
 
 

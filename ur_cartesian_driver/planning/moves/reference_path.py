@@ -66,6 +66,9 @@ def _places(path: BlendedPath, times: MoveTimes) -> tuple[Indices, Floats]:
     inside[:, 1:] &= knots[:, 1:] > knots[:, :-1]
     own = np.repeat(rows, inside.sum(axis=1))
     at_knots = (begin[:, None] + span[:, None] * knots)[inside]
+    # The arm stands still before these lines: they begin later than the segments before them end.
+    late = np.flatnonzero((times.idle > 0.0) & ~curves.is_joint_line)
+    own, at_knots = np.append(own, late), np.append(at_knots, begin[late])
     if len(row):
         own, at_knots = np.concatenate([row, own]), np.concatenate([between, at_knots])
         order = np.lexsort((at_knots, own))
@@ -100,6 +103,7 @@ def _times(
         part = (at[rows] - path.u_join[own]) / span[own]
         found[rows] += times.take(own).time_at(part * (times.length - times.tail)[own])
     rows = np.flatnonzero(on_blend)
-    begin, end = times.begin_rate[number[rows]], times.end_rate[number[rows]]
-    found[rows] += ramp_time(begin, end, at[rows]) - ramp_time(begin, end, 1.0)
+    blend = times.take(number[rows])
+    passed = ramp_time(blend.begin_rate, blend.end_rate, at[rows], blend.bend)
+    found[rows] += passed - blend.blend_time
     return found

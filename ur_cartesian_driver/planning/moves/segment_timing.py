@@ -10,6 +10,7 @@ sequence; :mod:`~.speed_requests` finds the speeds and times that the goal reque
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from math import ceil, inf, pi
 
 import numpy as np
@@ -21,7 +22,7 @@ from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
 from ur_cartesian_driver.motion.plan.plan import PlannedSegment
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
-from ur_cartesian_driver.planning.moves.move_chain import MoveChain, Moves
+from ur_cartesian_driver.planning.moves.move_chain import MoveChain, Moves, ramp_rate
 from ur_cartesian_driver.planning.moves.path_samples import BlendSamples
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.speed_requests import RAMP_SHARE, SpeedRequests
@@ -67,6 +68,7 @@ class SegmentTimings:
     The speeds with which segments meet their times within the limits; columns (n,).
 
     :param running: the first segment as it was planned before, if it has already been sent.
+    :param stops: the waypoints at which the robot program does something else.
     :raises TooFast: a time needs more speed or acceleration than the limits allow.
     :raises InvalidGoal: a speed is too low for the wire, or a blend is too small.
     """
@@ -87,9 +89,10 @@ class SegmentTimings:
         model: RobotModel,
         blend_samples: BlendSamples,
         running: PlannedSegment | None = None,
+        stops: Collection[int] = (),
     ) -> None:
         """Begin with the requested speeds and times, and change them until all limits are kept."""
-        self._geometries, self._options, self._model = geometries, options, model
+        self._geometries, self.options, self._model = geometries, options, model
         self._samples = blend_samples
         # Times per unit of the blend's parameter [s]: at the tool's speed limit (_tool_time), and
         # at the speed at which the blend's arc needs the maximum linear acceleration (_arc_time).
@@ -98,9 +101,11 @@ class SegmentTimings:
         radius = geometries.path.arc_radius[blend_samples.index - geometries.begin]
         self._arc_time = distance / np.sqrt(options.max_linear_acceleration * radius)
         self._arc_leads = self._arc_time > np.maximum(blend_samples.joint_time, self._tool_time)
-        #: The requested speeds and times, with remarks on changes due to the limits.
-        self.requests = requests = SpeedRequests(geometries, options, model, running)
         n = len(geometries)
+        does_else = np.isin(geometries.begin + np.arange(n), list(stops))
+        does_else[0] |= geometries.waits
+        #: The requested speeds and times, with remarks on changes due to the limits.
+        self.requests = requests = SpeedRequests(geometries, options, model, does_else, running)
         self._time, self._timed, self._rate = requests.time, requests.has_wire_time, requests.rate
         self._speed = requests.speed
         self._least, self._most = requests.acceleration, requests.max_acceleration
@@ -231,7 +236,12 @@ class SegmentTimings:
         samples, times = self._samples, self.chain.times
         after = samples.index - self._geometries.begin + 1
         begin, end = times.begin_rate[after], times.end_rate[after]
-        at_sample = np.sqrt(np.maximum(begin**2 + (end**2 - begin**2) * samples.s, 0.0))
+        # A measured law may make a blend slower, but never the arm faster than by the assumed law.
+        bend = np.maximum(times.bend[after], 1.0)
+        # Where it makes the blend faster, the rate has a peak half-way: take the end of the sample
+        # that is nearer to it.
+        nearer = np.clip(0.5, samples.s - samples.half_step, samples.s + samples.half_step)
+        at_sample = ramp_rate(begin, end, np.where(bend > 1.0, nearer, samples.s), bend)
         over = at_sample * np.maximum(
             np.maximum(samples.joint_time, self._tool_time), self._arc_time
         )
@@ -262,11 +272,11 @@ class SegmentTimings:
             radius = self._geometries.path.arc_radius[point - self._geometries.begin]
             return SpeedLimit(
                 SlowCause.ACCELERATION_LIMIT,
-                f'max_linear_acceleration = {self._options.max_linear_acceleration:g} m/s^2 (in '
+                f'max_linear_acceleration = {self.options.max_linear_acceleration:g} m/s^2 (in '
                 f'the blend at point {point}, an arc with a radius of {1e3 * radius:.3g} mm)',
             )
         if samples.joint_time[sample] < self._tool_time[sample]:
-            text = f'max_tool_speed = {self._options.max_tool_speed:g} m/s'
+            text = f'max_tool_speed = {self.options.max_tool_speed:g} m/s'
             return SpeedLimit(SlowCause.TOOL_LIMIT, text)
         joint = int(samples.joint[sample])
         return SpeedLimit(
@@ -295,7 +305,7 @@ class SegmentTimings:
         greatest = shortest_duration(moves.length, speed, acceleration, 2.0)
         tool_speed = speed * np.maximum(path.curves.length, 1e-9) / moves.length
         # A blend with legs of length r and a chord c is at most r + c / 2 long, which bounds c.
-        across = np.where(after, 2.0 * np.maximum(path.blend_length - path.radius, 0.0), 0.0)
+        across = np.where(after, 2.0 * np.maximum(path.blend_length - path.reach, 0.0), 0.0)
         least[:-1] += across[:-1] / np.maximum(tool_speed[:-1], tool_speed[1:])
         return (
             np.where(blended, least, times.durations),
@@ -316,7 +326,7 @@ class SegmentTimings:
         by_speed = self.wire_times <= 0.0
         is_slower = ~timed & by_speed & (self._moves.speed * _NEARLY < requests.speed)
         is_ahead = self._ahead > _EARLY
-        takes_too_long = self.wire_times > self._options.max_segment_time
+        takes_too_long = self.wire_times > self.options.max_segment_time
         slowest = np.minimum(self.velocities, self.accelerations)
         too_slow = by_speed & (slowest < MIN_SPEED)
         needs_a_cycle = _NEEDS_A_CYCLE[self._geometries.kinds] & path.has_blend_after
@@ -326,7 +336,7 @@ class SegmentTimings:
         # On a smaller arc, half a turn at the acceleration limit takes less than a control cycle.
         turns_back = path.has_blend_after & (
             path.arc_radius
-            < self._options.max_linear_acceleration * (self._model.control_cycle / pi) ** 2
+            < self.options.max_linear_acceleration * (self._model.control_cycle / pi) ** 2
         )
         refused = takes_too_long | too_slow | too_small | turns_back
         remarks = requests.remarks
@@ -366,7 +376,7 @@ class SegmentTimings:
         return InvalidGoal(
             point_field(self._geometries.begin + row),
             f'would be approached in {self.wire_times[row]:.4g} s, more than '
-            f'max_segment_time = {self._options.max_segment_time:.0f} s',
+            f'max_segment_time = {self.options.max_segment_time:.0f} s',
             'raise velocity or acceleration',
         )
 
@@ -412,7 +422,7 @@ class SegmentTimings:
 
         :raises TooFast: the options do not allow the planner to extend the time that far.
         """
-        requests, limits, options = self.requests, self.requests.limits, self._options
+        requests, limits, options = self.requests, self.requests.limits, self.options
         point, min_time = self._geometries.begin + row, float(self._wanted[row])
         time, length = self._geometries.times[row], requests.length[row]
         unit, name = limits.unit(row), self._limit(row).text

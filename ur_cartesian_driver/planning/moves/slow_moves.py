@@ -22,6 +22,10 @@ from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SLOWER_BY, SlowStretch
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
+from ur_cartesian_driver.planning.request.blend_limits import (
+    blend_law,
+    blends_are_measured,
+)
 from ur_cartesian_driver.planning.request.goal_fields import OPTIMIZED_TYPES, type_table
 
 _IS_FREE = type_table((SegmentType.JOINT, *OPTIMIZED_TYPES))
@@ -225,7 +229,10 @@ class _SlowMoves:
     def _blends(self) -> list[SlowStretch]:
         """Return the blends in which the planned path is slower than requested."""
         path, times, reference = self._geometries.path, self._timings.chain.times, self._reference
-        ratio = self._ratio
+        ratio, options = self._ratio, self._timings.options
+        law = f'as {blend_law(options)}'
+        if not blends_are_measured(options):
+            law += ': how fast the robot passes blends is not published'
         rows = np.flatnonzero(path.has_blend_after)
         carries = np.append(self._carries, False)
         rows = rows[carries[rows] | carries[rows + 1]]
@@ -253,8 +260,7 @@ class _SlowMoves:
                 (row, path.u_leave[row], row + 1, path.u_join[row + 1]),
                 low,
                 SlowCause.IN_BLEND,
-                f'of the blend at point {self._geometries.begin + row} (as assumed for motion '
-                'version 1: how fast the robot passes blends is not published)',
+                f'of the blend at point {self._geometries.begin + row} ({law})',
                 self._geometries.begin + row,
                 asked=wish,
             )

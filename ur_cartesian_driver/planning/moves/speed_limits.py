@@ -66,9 +66,10 @@ class SpeedLimits:
         #: Maximum acceleration of the leading quantity.
         self.acceleration = self._acceleration(curves)
         # Lower the limits, so that they hold even if the robot turns the tool at up to
-        # ``turn_ratio`` rad/s for each m/s.
+        # ``turn_ratio`` rad/s for each m/s, or faster if that was measured.
         turn = np.minimum(curves.angle, self.length)  # a FIXED arc turns the tool by the arc angle
-        counted = np.maximum(curves.length, turn / options.turn_ratio) / self.length
+        ratio = max(options.turn_ratio, options.laws.turn_ratio)
+        counted = np.maximum(curves.length, turn / ratio) / self.length
         ahead = (kinds == SegmentType.CIRCULAR) | (kinds == SegmentType.PROCESS)
         faster = np.where(ahead, np.minimum(1.0, counted), 1.0)
         self.speed *= faster

@@ -14,7 +14,7 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
 from ur_cartesian_driver.motion.plan.plan import PlannedSegment
@@ -24,7 +24,11 @@ from ur_cartesian_driver.planning.moves.move_chain import Moves
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.speed_limits import SpeedLimits
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.goal_fields import point_field, type_table
+from ur_cartesian_driver.planning.request.goal_fields import (
+    FOLLOWS_BLEND_LAWS,
+    point_field,
+    type_table,
+)
 from ur_cartesian_driver.planning.request.program_features import takes_times
 
 #: If a move has a time T, the robot stretches the trapezoid of its speed and acceleration to T
@@ -78,6 +82,7 @@ class SpeedRequests:
     """
     The requested speeds and times of moves, in the lengths that the robot uses; columns (n,).
 
+    :param stops: (n,) whether the program does something else at the end of each segment.
     :param running: the first segment as it was planned before, if it has already been sent.
     :raises InvalidGoal: a CIRCULAR or PROCESS segment on which the turn leads has a time, but the
         robot's speed on such segments is not known.
@@ -104,17 +109,23 @@ class SpeedRequests:
         geometries: SegmentGeometries,
         options: PlanningOptions,
         model: RobotModel,
+        stops: Flags,
         running: PlannedSegment | None = None,
     ) -> None:
         self.geometries, self._options = geometries, options
         self.limits = limits = SpeedLimits(geometries, options, model)
         self._kinds, self._curves = geometries.kinds, geometries.path.curves
         self.length: Floats = limits.length
-        self._turn_leads_line = limits.is_turn & (self._kinds == SegmentType.LINEAR)
-        self.peak = np.where(self._turn_leads_line, _PEAK_OF_TURN, _PEAK)
+        #: Whether each segment is a line on which the turn leads.
+        self.turn_leads_line = limits.is_turn & (self._kinds == SegmentType.LINEAR)
+        self.peak = np.where(self.turn_leads_line, _PEAK_OF_TURN, _PEAK)
         # The length that the robot uses, by the turn ratio, as a fraction of the leading length.
-        counted = np.maximum(self._curves.length, self.length / options.turn_ratio) / self.length
-        self._counted = np.where(self._turn_leads_line, counted, 1.0)
+        ratio = options.laws.turn_ratio
+        if not takes_times(options):
+            # Without a time on the wire the tool turns as fast as its ratio lets it.
+            ratio = max(ratio, options.turn_ratio)
+        counted = np.maximum(self._curves.length, self.length / ratio) / self.length
+        self._counted = np.where(self.turn_leads_line, counted, 1.0)
         #: Acceleration of the leading quantity per unit of the acceleration that is sent.
         self.acceleration_unit = np.where(
             limits.is_optimized, _OPTIMIZED_JOINT_ACCELERATION / min(model.max_joint_speed), 1.0
@@ -133,6 +144,8 @@ class SpeedRequests:
             self._by_time()
         else:
             self._by_speed()
+        #: Whether the arm rests after each segment but the last only because there is no blend.
+        self.rests_between = ~geometries.path.has_blend_after[:-1] & ~stops[:-1]
         self._is_running = running is not None
         if running is not None:
             self._request_again(running)
@@ -144,7 +157,7 @@ class SpeedRequests:
             return ''
         if self.is_timed:
             return f'time from points[{point}].time_from_start'
-        within = self._turn_leads_line[row] and self.limits.translates[row]
+        within = self.turn_leads_line[row] and self.limits.translates[row]
         source = _SOURCES[self._source[row]].format(point)
         return source + (', turn within angular_velocity' if within else '')
 
@@ -168,7 +181,7 @@ class SpeedRequests:
         # Fraction of T in each ramp, if 1.5 d/T and 4.5 d/T^2 apply to the length that the robot
         # uses.
         ramp = np.where(
-            self._turn_leads_line, 1.0 / (1.0 + np.maximum(1.0, 2.0 * self._counted)), RAMP_SHARE
+            self.turn_leads_line, 1.0 / (1.0 + np.maximum(1.0, 2.0 * self._counted)), RAMP_SHARE
         )
         fillet, arc = path.fillet & after, path.blend_length
         at_radius = after & (self._kinds == SegmentType.PROCESS)
@@ -178,7 +191,9 @@ class SpeedRequests:
         per_metre = self.length / np.maximum(self._curves.length, 1e-300)
         joining[1:] = np.where(fillet[:-1], arc[:-1] * per_metre[1:], joining[1:])
         leaving = np.where(fillet, arc * per_metre, leaving)
-        one = np.ones(len(counted))
+        one, laws = np.ones(len(counted)), self._options.laws
+        chained = np.append(False, self.rests_between)
+        by_laws = np.append(False, before[1:] & FOLLOWS_BLEND_LAWS[self._kinds[:-1]])
         return Moves(
             length=counted,
             speed=one,
@@ -190,6 +205,8 @@ class SpeedRequests:
             tail=tail,
             exit_rate=joining,
             entry_rate=leaving,
+            idle=np.where(chained, laws.idle_between_moves, 0.0),
+            bend=np.where(by_laws, laws.blend_speed_ratio, 1.0),
         )
 
     def _request_again(self, running: PlannedSegment) -> None:
@@ -210,7 +227,7 @@ class SpeedRequests:
     def _by_speed(self) -> None:
         """Request speeds."""
         options, limits = self._options, self.limits
-        at_speed_of_tool = self._turn_leads_line & limits.translates
+        at_speed_of_tool = self.turn_leads_line & limits.translates
         bound = np.where(at_speed_of_tool, options.max_tool_speed or inf, limits.speed)
         wanted = self._wanted_speeds()
         velocity = np.minimum(wanted, bound)
@@ -232,7 +249,7 @@ class SpeedRequests:
         )
         self.speed, self.rate = velocity, velocity / self.length
         self.acceleration = acceleration * self.acceleration_unit
-        self.has_wire_time &= self._turn_leads_line
+        self.has_wire_time &= self.turn_leads_line
         self._turning_lines(velocity, acceleration)
         self.max_acceleration = self.acceleration.copy()
 
@@ -282,7 +299,7 @@ class SpeedRequests:
         time is sent instead. With this time, the tool exceeds neither its speed [m/s] nor the
         default turn rate (for a turn on the spot: the requested one), however the robot turns it.
         """
-        rows = np.flatnonzero(self._turn_leads_line)
+        rows = np.flatnonzero(self.turn_leads_line)
         if not len(rows):
             return
         options, translates, peak = self._options, self.limits.translates[rows], self.peak[rows]

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The bounds on blend radii: both blends of a segment must fit into the segment.
+The bounds on blend radii (both blends of a segment must fit into it), and the law of blends.
 
 Negative radii are refused by :mod:`~.field_rules`, radii in splines by :mod:`~.spline_rules`.
 """
@@ -14,6 +14,9 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import is_spline, segment_field
+
+#: The laws that together determine path and time of a blend.
+BLEND_LAWS = ('blend_begin', 'blend_shape', 'blend_speed_ratio')
 
 
 def check_blends(goal: GoalTable, options: PlanningOptions) -> None:
@@ -67,3 +70,51 @@ def check_blend_parameters(index: int, u_join: float, u_leave: float) -> None:
             f'is too large: the blends at both ends of the segment to point {index} overlap',
             'reduce one of them',
         )
+
+
+def blends_are_measured(options: PlanningOptions) -> bool:
+    """Return whether the law of blends was measured in all of its parts."""
+    twin = options.used_twin
+    if twin is None or options.laws.blend_shape == 'unknown':
+        return False
+    return all(name in twin.estimates for name in BLEND_LAWS)
+
+
+def blend_law(options: PlanningOptions) -> str:
+    """Return the origin of the law of blends, for a text that goes on after ``as``."""
+    if blends_are_measured(options):
+        return measured_on(options)
+    return 'assumed for motion version 1'
+
+
+def measured_on(options: PlanningOptions) -> str:
+    """Return where and when the laws of the twin were measured."""
+    twin = options.used_twin
+    assert twin is not None
+    return f'measured on {"another" if options.twin_problem else "this"} arm, {twin.date}'
+
+
+def blend_time_uncertainty(options: PlanningOptions) -> float:
+    """
+    Return the uncertainty of the time in blends by measured laws, as a fraction of that time.
+
+    The time grows in proportion to the begin of a blend, and falls with the speed in it.
+    """
+    twin, laws = options.used_twin, options.laws
+    assert twin is not None
+    return (
+        twin.half_width('blend_begin') / laws.blend_begin
+        + twin.half_width('blend_speed_ratio') / laws.blend_speed_ratio
+    )
+
+
+def blend_uncertainty(options: PlanningOptions) -> float:
+    """
+    Return the distance of the robot's blends from the modelled ones, as a fraction of the assumed.
+
+    Where the law was measured, only the interval of the begin is left: a blend grows with its
+    begin in proportion, and the assumed distance is half the height of the parabola.
+    """
+    if not blends_are_measured(options) or (twin := options.used_twin) is None:
+        return 1.0
+    return min(1.0, 2.0 * twin.half_width('blend_begin') / options.laws.blend_begin)

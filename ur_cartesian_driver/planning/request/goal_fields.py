@@ -29,6 +29,11 @@ def type_table(types: Collection[SegmentType]) -> Flags:
     return np.array([kind in types for kind in SegmentType])
 
 
+#: By segment type: whether the blend behind it follows the measured laws of blends. Those of
+#: PROCESS are documented, those of OPTIMIZED types are not measured.
+FOLLOWS_BLEND_LAWS = type_table((SegmentType.LINEAR, SegmentType.JOINT, SegmentType.CIRCULAR))
+
+
 def point_field(index: int, field: str = '') -> str:
     """Return the name of a point's field as in the message."""
     return f'trajectory.points[{index}]' + (f'.{field}' if field else '')
