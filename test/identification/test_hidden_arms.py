@@ -27,6 +27,7 @@ def identified():
 
 
 @pytest.mark.random
+@pytest.mark.timeout(3600)
 def test_intervals_contain_the_true_laws(identified):
     inside, number = Counter(), Counter()
     for laws, results in identified:
@@ -43,10 +44,12 @@ def test_intervals_contain_the_true_laws(identified):
         assert number[name] >= (0.4 if is_ringing else 0.9) * arms, name
         # 92 % inside, less four standard deviations of the count.
         assert inside[name] > 0.92 * number[name] - 4.0 * (0.07 * number[name]) ** 0.5, name
-    assert sum(inside.values()) >= 0.92 * sum(number.values())
+    whole = sum(number.values())
+    assert sum(inside.values()) > 0.92 * whole - 4.0 * (0.07 * whole) ** 0.5
 
 
 @pytest.mark.random
+@pytest.mark.timeout(1200)
 def test_an_unknown_shape_is_said_and_not_fitted():
     for i in range(cases(20)):
         random = random_of('unknown shape', i)

@@ -273,7 +273,9 @@ class _Model:
     def _drag(self, parameters: Floats) -> Spectrum:
         friction, static, unmoved = self._inputs
         own = parameters[_BEND_LATER + 1 :, None]
-        return parameters[_FRICTION] * friction + parameters[_STATIC] * static + own * unmoved
+        moving, resting = parameters[_FRICTION] * friction, parameters[_STATIC] * static
+        drag: Spectrum = moving + resting + own * unmoved
+        return drag
 
     def _bend(self, parameters: Floats) -> Spectrum:
         # When the acceleration of two packets acts within the cycles around them is not known; a

@@ -116,9 +116,10 @@ def fit(
         freedom = len(white) - len(found) - _ORDER
         variance = max(float(white @ white) / freedom, floor**2)
         try:
-            covariance: Floats = variance * np.linalg.inv(jacobian.T @ jacobian)
+            inverse = np.linalg.inv(jacobian.T @ jacobian)
         except np.linalg.LinAlgError:
             return None
+        covariance: Floats = np.asarray(variance * inverse, dtype=np.float64)
         if not (np.isfinite(covariance).all() and (np.diag(covariance) > 0.0).all()):
             return None
         if variance <= floor**2:
