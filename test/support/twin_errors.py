@@ -7,7 +7,8 @@ Plan goals with and without the twin of a simulated arm, and measure both errors
 
 prints the table of doc/twin.md. The laws of each arm are drawn at random; its twin has the values
 with small errors, as an identification would find them. The judge is the controller: the time
-between the first and the last cycle in which the target joints of RTDE move.
+between the first and the last cycle in which the target joints of RTDE move, and how far the
+target of the tool is off the planned path.
 """
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ def goals(home, seed):
     """Return goals of each kind from a pose, by name."""
     rng = np.random.default_rng(seed)
 
-    def goal(types, radius, *, turn=0.0, time=0.0, velocity=0.15):
+    def goal(types, radius, *, turn=0.0, time=0.0, dwell=0.0, velocity=0.15):
         places, d = [np.array(home.position)], np.array((0.0, 1.0, 0.0))
         for _ in types:
             side = np.cross(d, rng.normal(size=3))
@@ -91,6 +92,7 @@ def goals(home, seed):
                 Segment(
                     type=kind,
                     blend_radius=radius,
+                    dwell=dwell * (i % 2),
                     velocity=velocity if kind != TYPE.JOINT and not turn and not time else 0.0,
                     via=Pose(tuple(middle.tolist()), home.quaternion)
                     if kind == TYPE.CIRCULAR
@@ -105,6 +107,7 @@ def goals(home, seed):
         'lines with blends': goal([line] * 6, 0.02),
         'lines with blends and times': goal([line] * 6, 0.02, time=1.5),
         'lines with stops and times': goal([line] * 6, 0.0, time=1.5),
+        'lines with stops, some dwells': goal([line] * 6, 0.0, dwell=0.2),
         'joint moves with blends': goal([joint] * 6, 0.02),
         'arcs with blends': goal([arc] * 4, 0.01),
         'lines that turn the tool, with blends': goal([line] * 4, 0.01, turn=0.6),
@@ -137,8 +140,25 @@ def plan_of(robot, goal, twin=None, options=OPTIONS):
     return plan(goal, robot.place(HOME, TOOL), robot.controller.arm, options)
 
 
+def off_path(made, ran):
+    """Return how far the tool gets from the planned path [m]."""
+    path = made.reference.poses[:, :3]
+    begin, step = path[:-1], np.diff(path, axis=0)
+    square = np.maximum((step**2).sum(axis=1), 1e-18)
+    worst = 0.0
+    for pose in ran.poses[::3]:
+        way = np.array(pose.position) - begin
+        u = np.clip((way * step).sum(axis=1) / square, 0.0, 1.0)
+        worst = max(worst, float(np.linalg.norm(way - u[:, None] * step, axis=1).min()))
+    return worst
+
+
 def errors(seed):
-    """Return for each kind of goal the errors of the planned time [s]: without twin, and with."""
+    """
+    Return the errors of plans for each kind of goal (2, 2): without twin, and with.
+
+    Each row has the error of the planned time [s] and that of the path [m].
+    """
     true = true_twin(seed)
     robot, twin = warm_robot(true, 500.0), measured_twin(true, seed)
     found = {}
@@ -146,9 +166,9 @@ def errors(seed):
         pair = []
         for used in (None, twin):
             made = plan_of(robot, goal, used)
-            took, _ = moving_time(robot, made)
-            pair.append(took - made.duration)
-        found[name] = pair
+            took, ran = moving_time(robot, made)
+            pair.append((took - made.duration, off_path(made, ran)))
+        found[name] = np.array(pair)
     return found
 
 
@@ -158,12 +178,15 @@ def main():
     parser.add_argument('-n', type=int, default=20, metavar='ARMS')
     arms = parser.parse_args().n
     found = [errors(seed) for seed in range(arms)]
-    print('| goal | without twin: rms, worst [ms] | with twin: rms, worst [ms] |')
-    print('| --- | --- | --- |')
+    print('| goal | time without: rms, worst [ms] | with | path without: worst [mm] | with |')
+    print('| --- | --- | --- | --- | --- |')
     for name in found[0]:
         pairs = 1e3 * np.array([each[name] for each in found])
         rms, worst = np.sqrt((pairs**2).mean(axis=0)), np.abs(pairs).max(axis=0)
-        print(f'| {name} | {rms[0]:.0f}, {worst[0]:.0f} | {rms[1]:.1f}, {worst[1]:.1f} |')
+        print(
+            f'| {name} | {rms[0, 0]:.0f}, {worst[0, 0]:.0f} | {rms[1, 0]:.1f}, {worst[1, 0]:.1f} '
+            f'| {worst[0, 1]:.2f} | {worst[1, 1]:.2f} |'
+        )
 
 
 if __name__ == '__main__':

@@ -246,3 +246,13 @@ def test_a_twin_of_another_robot_is_refused():
 
 def test_a_twin_without_laws_changes_nothing():
     assert SimulatorConfig(twin=twin_of()).laws == SimulatorConfig().laws == MotionLaws()
+
+
+def test_a_measured_begin_of_blends_takes_the_place_of_the_assumed_one_of_version_2():
+    arm = ArmIdentity(model='ur5e', motion_version=2)
+    version = {'polyscope': '5.22', 'motion_version': 2}
+    plain = SimulatorConfig(**version, twin=replace(twin_of(start_time=0.1), arm=arm))
+    measured = SimulatorConfig(**version, twin=replace(twin_of(blend_begin=0.7), arm=arm))
+    assert plain.second_motion_version.blend_fraction == 0.9
+    assert measured.second_motion_version.blend_fraction == 1.0
+    assert measured.laws.blend_begin == 0.7
