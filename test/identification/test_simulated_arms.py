@@ -152,3 +152,12 @@ def test_the_laws_of_a_simulated_arm_are_found(case):
         if not low - margin <= true <= high + margin:
             wrong.append(f'{name} is {true}, found {found.value} in {found.interval}')
     assert not wrong
+
+
+def test_a_blend_is_named_and_not_used():
+    twin = Twin(arm=ArmIdentity(model='ur5e', software='5.21.0'), date='2026-11-27')
+    blended = 'movel(pose_add(get_target_tcp_pose(), p[{}, 0.1, 0, 0, 0, 0]), a=1, v=0.1{})'
+    body = blended.format(0.0, ', r=0.03') + '\n' + blended.format(0.1, '')
+    found = identify([Recorder('ur5e', twin).run('blend', body)])
+    assert found.summary() == '1 move: 1 of another shape (not used).'
+    assert isinstance(found.results['start_time'], Unknown)

@@ -45,8 +45,6 @@ class Unknown:
 #: What one estimator found of a law.
 Result = Estimate | Unknown
 
-_UNIT_TEXTS = {'rad': (1e6, 'urad'), 'm': (1e6, 'um')}
-
 
 def start_time(moves: Sequence[FoundMove]) -> Result:
     """Find the time within which the first motion of a program sets out."""

@@ -49,9 +49,10 @@ class Identification:
         names = {Kind.LINE: 'lines', Kind.JOINT: 'joint moves', Kind.EITHER: 'turns of one joint'}
         parts = [f'{kinds[kind]} {name}' for kind, name in names.items() if kinds[kind]]
         if kinds[Kind.OTHER]:
-            parts.append(f'{kinds[Kind.OTHER]} of another shape, which are not used')
+            parts.append(f'{kinds[Kind.OTHER]} of another shape (not used)')
+        count = len(self.moves)
         odd = [move for move in self.moves if isinstance(move.profile, Misfit)]
-        text = f'{len(self.moves)} moves: {", ".join(parts)}.' if parts else 'No moves.'
+        text = f'{count} move{"s" * (count != 1)}: {", ".join(parts)}.' if parts else 'No moves.'
         for move in odd:
             rms = 1e6 * move.profile.rms  # type: ignore[union-attr]  # only misfits
             text += (

@@ -64,25 +64,11 @@ def find_moves(samples: ArmSamples) -> list[FoundMove]:
     for piece in pieces(samples):
         found = FoundMove(samples=samples, piece=piece, way=way_of(samples, piece), profile=None)
         if found.leading is not None and not (piece.ending or piece.resumed or piece.slowed):
-            profile = find_profile(
-                *_timed(found, found.leading),
-                may_start=(piece.from_rest and piece.first is not False) or not piece.chained,
-            )
+            time, rows = found.rows
+            profile = find_profile(time, found.leading, rows, may_start=not piece.chained)
             found = replace(found, profile=profile)
         moves.append(found)
     return moves
-
-
-def _timed(move: FoundMove, way: Floats) -> tuple[Floats, Floats, Flags]:
-    time, rows = move.rows
-    return time, way, rows
-
-
-def turn_profile(move: FoundMove, ratio_from: MotionCommand) -> Profile | Misfit | None:
-    """Return the profile of the turn of a line that was asked for by a call."""
-    if move.way.turn is None or ratio_from.t is not None:
-        return None
-    return find_profile(*_timed(move, move.way.turn), may_start=not move.piece.chained)
 
 
 def join_commands(

@@ -62,11 +62,6 @@ class Profile:
     speed_squared_by_acceleration: Measured | None
     fit: Fit
 
-    @property
-    def duration(self) -> float:
-        """Time from rest to rest [s]."""
-        return self.end.value - self.begin.value
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misfit:

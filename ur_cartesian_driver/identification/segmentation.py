@@ -46,9 +46,7 @@ class Piece:
     :param begin: first row; rest before it, if any, is included.
     :param end: row after the last one; rest behind it, if any, is included.
     :param moving: first and last row in which the target moves.
-    :param from_rest: whether it begins at rest, and not right behind another move.
     :param chained: whether another piece precedes it within :data:`CHAIN_TIME`.
-    :param first: whether it is the first motion of a program; None = the recording does not tell.
     :param ending: None = it came to its end, or the recording does not tell.
     :param resumed: whether it is the rest of a move that was paused or stopped.
     :param slowed: whether the speed slider was below 100 %.
@@ -57,9 +55,7 @@ class Piece:
     begin: int
     end: int
     moving: tuple[int, int]
-    from_rest: bool
     chained: bool
-    first: bool | None
     ending: Ending | None
     resumed: bool
     slowed: bool
@@ -160,23 +156,11 @@ def _piece(
         begin=low,
         end=max(high, low),
         moving=(begin, end),
-        from_rest=not cut[0],
         chained=bool(pause < CHAIN_TIME),
-        first=_is_first(samples, begin, beside[0]),
         ending=ending,
         resumed=_is_resumed(samples, begin),
         slowed=slider is not None and bool((slider[begin:end] < 0.999).any()),
     )
-
-
-def _is_first(samples: ArmSamples, begin: int, before: int) -> bool | None:
-    """Return whether a program started between the move before and this one."""
-    states = samples.runtime_state
-    if states is None:
-        return None if before < 0 else False
-    since = states[max(before, 0) : begin + 1]
-    started = bool((since == RuntimeState.STOPPED).any())
-    return True if started else (None if before < 0 else False)
 
 
 def _is_resumed(samples: ArmSamples, begin: int) -> bool:
