@@ -7,8 +7,11 @@ from random import Random
 from hidden_arm import Laws, Program
 import numpy as np
 import pytest
+from synthetic_recording import only_file, record
 
 from ur_cartesian_driver.cli import main
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.twin.twin_file import read_twin
 
 
@@ -48,6 +51,32 @@ def test_the_laws_are_printed_and_written(folder, laws, capsys):
     assert low == pytest.approx(laws.timed_joint_speed, rel=1e-4)
     assert high == pytest.approx(laws.timed_joint_speed, rel=1e-4)
     assert 'with t' not in found.not_identified['turn_ratio']
+
+
+def test_our_own_recordings_name_their_arm(laws, tmp_path, capsys):
+    program = Program(laws=laws, random=Random(8), cycle=0.008)
+    program.movej([0.9, 0.2, 0.0, 0.0, 0.0, 0.1], a=1.0, v=0.5)
+    samples = program.record('moves')
+    rows = zip(samples.time.tolist(), samples.target_q.tolist(), samples.actual_q.tolist(), strict=True)
+    packets = [
+        RobotState(
+            timestamp=time,
+            target_q=tuple(target),
+            actual_q=tuple(actual),
+            actual_tcp_pose=Pose(),
+            target_tcp_pose=Pose(),
+        )
+        for time, target, actual in rows
+    ]
+    record(tmp_path / 'recordings', packets)
+    recording, twin = str(only_file(tmp_path / 'recordings')), tmp_path / 'twin.yaml'
+    assert main(['identify', recording, '-o', str(twin)]) == 0
+    found = read_twin(twin)
+    assert found.arm.model == 'ur5e'
+    assert found.estimates['start_time'].value == pytest.approx(laws.start_time, abs=1e-3)
+    capsys.readouterr()
+    assert main(['identify', recording, '--model', 'ur10e']) == 1
+    assert 'is of another arm: model ur10e, not ur5e' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
