@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.identification.arm_samples import read_samples
-from ur_cartesian_driver.identification.commands import MotionCommand, read_commands
+from ur_cartesian_driver.identification.recorded_calls import MotionCommand, read_commands
 
 NAMES = ['timestamp', *(f'target_q_{i}' for i in range(6)), *(f'actual_q_{i}' for i in range(6))]
 ROWS = np.column_stack([0.002 * np.arange(60), np.tile(0.1 * np.arange(12), (60, 1))])

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.identification.arm_samples import read_samples
-from ur_cartesian_driver.identification.commands import MotionCommand
 from ur_cartesian_driver.identification.identify import identify
 from ur_cartesian_driver.identification.moves import find_moves
+from ur_cartesian_driver.identification.recorded_calls import MotionCommand
 from ur_cartesian_driver.motion.twin.twin import Estimate
 
 RECORDINGS = next(

@@ -12,9 +12,9 @@ import pytest
 from random_cases import cases, random_of
 
 from ur_cartesian_driver.identification.arm_samples import ArmSamples
-from ur_cartesian_driver.identification.commands import read_commands
 from ur_cartesian_driver.identification.estimators import Unknown
 from ur_cartesian_driver.identification.identify import identify
+from ur_cartesian_driver.identification.recorded_calls import read_commands
 from ur_cartesian_driver.motion.twin.laws import LAWS
 from ur_cartesian_driver.motion.twin.twin import ArmIdentity, Estimate, Twin
 from ur_cartesian_driver.sim import SimulatorConfig

@@ -18,7 +18,7 @@ from random import Random
 import numpy as np
 
 from ur_cartesian_driver.identification.arm_samples import ArmSamples
-from ur_cartesian_driver.identification.commands import MotionCommand
+from ur_cartesian_driver.identification.recorded_calls import MotionCommand
 
 STOPPING, STOPPED, PLAYING, PAUSING, PAUSED = range(5)
 NORMAL, PROTECTIVE_STOP = 1, 3

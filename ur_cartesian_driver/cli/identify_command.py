@@ -10,9 +10,9 @@ from pathlib import Path
 
 from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.identification.arm_samples import read_samples
-from ur_cartesian_driver.identification.commands import MotionCommand, read_commands
 from ur_cartesian_driver.identification.estimators import Result, Unknown
 from ur_cartesian_driver.identification.identify import identify as identify_laws
+from ur_cartesian_driver.identification.recorded_calls import MotionCommand, read_commands
 from ur_cartesian_driver.motion.twin.laws import LAWS
 from ur_cartesian_driver.motion.twin.twin import ArmIdentity, Estimate, Twin
 from ur_cartesian_driver.motion.twin.twin_file import twin_text

@@ -27,9 +27,9 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 Spectrum: TypeAlias = NDArray[np.complex128]
 
 #: Joints that turn less show nothing [rad].
-_LEAST_TURN = 0.02
+_MIN_TURN = 0.02
 #: Cycles of a recording that are used at most.
-_MOST_CYCLES = 10_000
+_MAX_CYCLES = 10_000
 #: More than this [rad], and as many times the noise, is left where the arm has other laws.
 _MISFIT, _ROUGH = 2e-5, 1.5
 #: A measured position scatters at least as much [rad].
@@ -140,10 +140,10 @@ def _grid(samples: ArmSamples) -> _Grid | None:
     part = slice(bounds[longest], bounds[longest + 1])
     time = time[part]
     rows = np.round((time - time[0]) / cycle).astype(np.intp)
-    kept = rows < _MOST_CYCLES
+    kept = rows < _MAX_CYCLES
     time, rows = time[kept], rows[kept]
     target, actual = samples.target_q[part][kept], samples.actual_q[part][kept]
-    moves = np.flatnonzero(np.ptp(target, axis=0) > _LEAST_TURN)
+    moves = np.flatnonzero(np.ptp(target, axis=0) > _MIN_TURN)
     if not len(moves):
         return None
     cycles = np.arange(rows[-1] + 1)
@@ -178,7 +178,7 @@ class _Model:
         joints, count = grid.qd.shape
         self._kernel_length = min(count, round(_LONGEST_KERNEL / grid.cycle))
         self._size = -(-(count + self._kernel_length) // _SIZE_STEP) * _SIZE_STEP
-        # A drag that has rested at 1 for long differs from it by the way since.
+        # A drag that has rested at 1 for long differs from it by the travel since.
         unmoved = (grid.direction == 0.0).astype(np.float64)
         self._speed = self._spectrum(-grid.qd)
         self._inputs = [
@@ -356,11 +356,12 @@ def find_noise(samples: ArmSamples) -> Measured | None:
     even = np.abs(step - samples.cycle) < 0.2 * samples.cycle
     whole = even[:-2] & even[1:-1] & even[2:]
     error = samples.actual_q - samples.target_q
-    ways = np.abs(np.diff(samples.target_q, axis=0))
+    travels = np.abs(np.diff(samples.target_q, axis=0))
     squares = [
-        (np.diff(error[:, joint], 3)[whole & (ways[1:-1, joint] > 0.5 * resolution)]) ** 2 / 20.0
+        (np.diff(error[:, joint], 3)[whole & (travels[1:-1, joint] > 0.5 * resolution)]) ** 2
+        / 20.0
         for joint in range(6)
-        if np.ptp(samples.target_q[:, joint]) > _LEAST_TURN
+        if np.ptp(samples.target_q[:, joint]) > _MIN_TURN
     ]
     squares = [part for part in squares if len(part) > 100]
     if not squares:

@@ -78,10 +78,10 @@ def turn_ratio(moves: Sequence[FoundMove]) -> Result:
         command = move.command
         if move.kind is not Kind.LINE or command is None or None in (command.a, command.v):
             continue
-        if command.t is not None or move.way.turn is None or _translation_leads(move):
+        if command.t is not None or move.travel.turn is None or _translation_leads(move):
             continue
         time, rows = move.rows
-        turn = find_profile(time, move.way.turn, rows, may_start=not move.piece.chained)
+        turn = find_profile(time, move.travel.turn, rows, may_start=not move.piece.chained)
         if not isinstance(turn, Profile):
             odd += isinstance(turn, Misfit)
             continue
@@ -106,9 +106,9 @@ def turn_ratio(moves: Sequence[FoundMove]) -> Result:
 
 
 def _translation_leads(move: FoundMove) -> bool:
-    """Return whether the way of the tool has the acceleration of its call."""
+    """Return whether the travel of the tool has the acceleration of its call."""
     profile, command = move.profile, move.command
-    if move.way.line is None or not isinstance(profile, Profile) or command is None:
+    if move.travel.line is None or not isinstance(profile, Profile) or command is None:
         return False
     asked = command.a or 1.0
     tolerance = _LEADS + 3.0 * profile.acceleration.error / asked
@@ -128,7 +128,7 @@ def left_out(moves: Sequence[FoundMove], kind: Kind) -> tuple[Result, Result]:
             continue
         if not isinstance(move.profile, Profile):
             odd += isinstance(move.profile, Misfit)
-        elif kind is Kind.LINE and move.way.line is None:
+        elif kind is Kind.LINE and move.travel.line is None:
             continue
         elif command.t is not None:
             quotients += [move.profile.speed_squared_by_acceleration]
@@ -246,8 +246,8 @@ def arm_figures(recordings: Sequence[ArmSamples]) -> dict[str, Result]:
     if not any(samples.actual_q is not None for samples in recordings):
         reason = 'no recording has actual_q'
     results: dict[str, Result] = {}
-    for name, most in _MOST_WIDTH.items():
-        used = [errors for errors in found if name not in _RINGING or errors.cycle < MOST_CYCLE]
+    for name, most in _MAX_WIDTH.items():
+        used = [errors for errors in found if name not in _RINGING or errors.cycle < MAX_CYCLE]
         parts: list[Measured] = [getattr(errors, name) for errors in used]
         evidence = _plural(sum(errors.joints for errors in used), 'moving joint')
         left = f'{1e6 * max((errors.rms for errors in used), default=0.0):.3g} urad rms'
@@ -274,10 +274,10 @@ def arm_figures(recordings: Sequence[ArmSamples]) -> dict[str, Result]:
 
 #: Packets that are further apart [s] do not show when the acceleration changes, nor how the arm
 #: rings then.
-MOST_CYCLE = 0.005
+MAX_CYCLE = 0.005
 _RINGING = ('acceleration_error', 'ringing_frequency', 'ringing_decay')
 #: Widest useful half of an interval, by value.
-_MOST_WIDTH: dict[str, Callable[[float], float]] = {
+_MAX_WIDTH: dict[str, Callable[[float], float]] = {
     'lag': lambda value: max(3e-4, 0.3 * value),
     'friction': lambda value: max(3e-5, 0.3 * value),
     'static_error': lambda value: max(3e-5, 0.3 * value),

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 from ur_cartesian_driver.identification import estimators
 from ur_cartesian_driver.identification.arm_samples import ArmSamples
-from ur_cartesian_driver.identification.commands import MotionCommand
 from ur_cartesian_driver.identification.estimators import Result, Unknown
 from ur_cartesian_driver.identification.geometry import Kind
 from ur_cartesian_driver.identification.moves import find_moves, FoundMove, join_commands
 from ur_cartesian_driver.identification.profile import Misfit
+from ur_cartesian_driver.identification.recorded_calls import MotionCommand
 from ur_cartesian_driver.identification.segmentation import Ending
 from ur_cartesian_driver.motion.twin.laws import LAWS
 

@@ -25,7 +25,7 @@ TARGET_FLOOR = 1e-8
 #: What a model returns for parameters that it cannot have; finite, so that it can be filtered.
 NOWHERE = 1e6
 _ORDER = 2
-_ITERATIONS, _SMALLEST_GAIN, _MOST_DAMPING = 60, 1e-4, 1e12
+_ITERATIONS, _MIN_GAIN, _MAX_DAMPING = 60, 1e-4, 1e12
 #: Quantiles of Student's t for 95 % with 1, 2, 3 degrees of freedom; of the normal distribution.
 _FEW, _NORMAL = (12.7062, 4.3027, 3.1824), 1.959964
 
@@ -153,10 +153,10 @@ class _Problem:
             new_cost = float(tried @ tried)
             if not new_cost < cost:
                 damping *= 8.0
-                if damping > _MOST_DAMPING:
+                if damping > _MAX_DAMPING:
                     break
                 continue
-            is_small = cost - new_cost <= _SMALLEST_GAIN * cost / len(tried)
+            is_small = cost - new_cost <= _MIN_GAIN * cost / len(tried)
             found, white, cost, damping = found + step, tried, new_cost, 0.2 * damping
             jacobian = self._jacobian(found, phi)
             if is_small:

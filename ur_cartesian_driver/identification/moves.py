@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ur_cartesian_driver.identification.arm_samples import ArmSamples
-from ur_cartesian_driver.identification.commands import MotionCommand
-from ur_cartesian_driver.identification.geometry import Kind, Way, way_of
+from ur_cartesian_driver.identification.geometry import Kind, Travel, travel_of
 from ur_cartesian_driver.identification.profile import find_profile, Misfit, Profile
+from ur_cartesian_driver.identification.recorded_calls import MotionCommand
 from ur_cartesian_driver.identification.segmentation import follows, Piece, pieces
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 
@@ -23,23 +23,23 @@ class FoundMove:
     """
     One move in a recording.
 
-    :param profile: of the joints, of the tool's way or else of its turn; None = not looked for, or
-        too little data.
+    :param profile: of the joints, of the tool's travel or else of its turn; None = not looked
+        for, or too little data.
     :param command: the call that made it; None = not known.
     """
 
     samples: ArmSamples
     piece: Piece
-    way: Way
+    travel: Travel
     profile: Profile | Misfit | None
     command: MotionCommand | None = None
 
     @property
     def kind(self) -> Kind:
         """The kind of the move, of which the call says more than the shape."""
-        if self.command is not None and self.way.kind is Kind.EITHER:
+        if self.command is not None and self.travel.kind is Kind.EITHER:
             return Kind.JOINT if self.command.name == 'movej' else Kind.LINE
-        return self.way.kind
+        return self.travel.kind
 
     @property
     def rows(self) -> tuple[Floats, Flags]:
@@ -49,9 +49,11 @@ class FoundMove:
 
     @property
     def leading(self) -> Floats | None:
-        """Way (n,) of what is timed: the joints, the tool, or its turn."""
-        way = self.way
-        return next((part for part in (way.joint, way.line, way.turn) if part is not None), None)
+        """Travel (n,) of what is timed: the joints, the tool, or its turn."""
+        travel = self.travel
+        return next(
+            (part for part in (travel.joint, travel.line, travel.turn) if part is not None), None
+        )
 
     def with_command(self, command: MotionCommand) -> FoundMove:
         """Return the move with the call that made it."""
@@ -62,7 +64,9 @@ def find_moves(samples: ArmSamples) -> list[FoundMove]:
     """Return the moves of a recording in the order of time."""
     moves = []
     for piece in pieces(samples):
-        found = FoundMove(samples=samples, piece=piece, way=way_of(samples, piece), profile=None)
+        found = FoundMove(
+            samples=samples, piece=piece, travel=travel_of(samples, piece), profile=None
+        )
         if found.leading is not None and not (piece.ending or piece.resumed or piece.slowed):
             time, rows = found.rows
             profile = find_profile(time, found.leading, rows, may_start=not piece.chained)
@@ -93,10 +97,10 @@ def join_commands(
             found.append(move)
             continue
         command = next(joined)
-        if move.way.kind is not Kind.OTHER and move.way.kind not in _KINDS[command.name]:
+        if move.travel.kind is not Kind.OTHER and move.travel.kind not in _KINDS[command.name]:
             raise ValueError(
                 f'{name} says {command.name} for move {i}, but the recording '
-                f'{move.samples.name} shows a {move.way.kind.value} at '
+                f'{move.samples.name} shows a {move.travel.kind.value} at '
                 f'{move.samples.time[move.piece.moving[0]]:.2f} s'
             )
         found.append(move.with_command(command))

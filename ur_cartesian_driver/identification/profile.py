@@ -3,9 +3,9 @@
 """
 The profile of a single move: a trapezoid of speed, with or without the ramp of a program's start.
 
-Way over time, from rest to rest: ``s(t) = w(p(t - t0))`` with the trapezoid ``w`` of acceleration
-a, speed v and length L, and the path time ``p`` of a start within T: ``t^2 / 2T`` up to T, then
-``t - T/2``. Recorded controllers change the rate of the path once a cycle c instead, by c/T:
+Travel over time, from rest to rest: ``s(t) = w(p(t - t0))`` with the trapezoid ``w`` of
+acceleration a, speed v and length L, and the path time ``p`` of a start within T: ``t^2 / 2T`` up
+to T, then ``t - T/2``. Recorded controllers change the rate of the path once a cycle c instead, by c/T:
 ``t (t + c) / 2T``, then ``t - (T - c)/2``. Both are fitted.
 """
 
@@ -32,7 +32,7 @@ SHORTEST_START = 0.01
 _STARTS = (0.06, 0.15, 0.35)
 #: Twice the logarithm of a likelihood ratio from which one of two laws is ruled out.
 _CLEAR = 10.0
-#: From this share of the speed that it could reach on its way, a move is taken not to cruise.
+#: From this share of the speed that it could reach on its travel, a move is taken not to cruise.
 _TRIANGLE = 0.98
 #: Logarithm of speeds and accelerations that no move has.
 _NO_BOUND = 20.0
@@ -85,17 +85,17 @@ def path_time(t: Floats, start: float, step: float) -> Floats:
     return slow
 
 
-def trapezoid_way(t: Floats, length: float, acceleration: float, speed: float) -> Floats:
-    """Return the way (n,) of a trapezoid at times (n,) since its beginning [s]."""
+def trapezoid_travel(t: Floats, length: float, acceleration: float, speed: float) -> Floats:
+    """Return the travel (n,) of a trapezoid at times (n,) since its beginning [s]."""
     a, v = acceleration, min(speed, sqrt(length * acceleration))
     whole = length / v + v / a
     up, left = np.clip(t, 0.0, whole), np.clip(whole - t, 0.0, whole)
-    way: Floats = np.where(
+    travel: Floats = np.where(
         up < v / a,
         0.5 * a * up * up,
         np.where(left < v / a, length - 0.5 * a * left * left, v * (up - 0.5 * v / a)),
     )
-    return way
+    return travel
 
 
 def trapezoid_time(length: float, acceleration: float, speed: float) -> float:
@@ -105,39 +105,39 @@ def trapezoid_time(length: float, acceleration: float, speed: float) -> float:
 
 
 def find_profile(
-    time: Floats, way: Floats, follows: Flags, *, may_start: bool
+    time: Floats, travel: Floats, follows: Flags, *, may_start: bool
 ) -> Profile | Misfit | None:
     """
     Find the trapezoid of a move.
 
     :param time: (n,) the controller's clock [s].
-    :param way: (n,) way along the path [rad or m].
+    :param travel: (n,) travel along the path [rad or m].
     :param follows: mask (n,) of rows that come one cycle after the row before.
     :param may_start: whether the ramp of a program's start is looked for, too.
     :returns: None if there is too little data, a misfit if the law is another one.
     """
     origin, t = time[0], time - time[0]
-    guess = _Guess.of(t, way)
-    best = None if guess is None else _Found.without_start(t, way, follows, guess)
+    guess = _Guess.of(t, travel)
+    best = None if guess is None else _Found.without_start(t, travel, follows, guess)
     if best is None:
         return None
     if may_start:
-        best = _with_start(best, t, way, follows)
+        best = _with_start(best, t, travel, follows)
     rms, noise = best.fit.rms, noise_of(best.fit.residuals)
     if rms > MISFIT and rms > _ROUGH * noise:
         return Misfit(rms=rms)
     return best.profile(origin)
 
 
-def _with_start(best: _Found, t: Floats, way: Floats, rows: Flags) -> _Found:
+def _with_start(best: _Found, t: Floats, travel: Floats, rows: Flags) -> _Found:
     """Return the best fit with a start, if there is one."""
-    starts = [best.with_start(t, way, rows, start, 0.0) for start in _STARTS]
+    starts = [best.with_start(t, travel, rows, start, 0.0) for start in _STARTS]
     found = [each for each in starts if each is not None]
     even = min(found, key=lambda each: each.fit.rms, default=best)
     if not even.has_start or even.start.value - even.start.half_width < SHORTEST_START:
         return best
     cycle = float(np.median(np.diff(t)))
-    stepwise = best.with_start(t, way, rows, even.start.value, cycle)
+    stepwise = best.with_start(t, travel, rows, even.start.value, cycle)
     if stepwise is None:
         return even
     gain = 2.0 * len(t) * log(max(even.fit.rms, 1e-12) / max(stepwise.fit.rms, 1e-12))
@@ -157,16 +157,16 @@ class _Guess:
     speed: float
 
     @classmethod
-    def of(cls, t: Floats, way: Floats) -> _Guess | None:
-        low, high = float(way[:3].mean()), float(way[-3:].mean())
+    def of(cls, t: Floats, travel: Floats) -> _Guess | None:
+        low, high = float(travel[:3].mean()), float(travel[-3:].mean())
         length = high - low
         if length <= 0.0 or len(t) < 24:
             return None
-        inside = np.flatnonzero((way > low + 1e-3 * length) & (way < high - 1e-3 * length))
+        inside = np.flatnonzero((travel > low + 1e-3 * length) & (travel < high - 1e-3 * length))
         if len(inside) < 12:
             return None
         width = max(3, len(inside) // 40)
-        speeds = (way[width:] - way[:-width]) / (t[width:] - t[:-width])
+        speeds = (travel[width:] - travel[:-width]) / (t[width:] - t[:-width])
         return cls(
             offset=low,
             length=length,
@@ -195,14 +195,14 @@ class _Found:
     doubt: float = 0.0
 
     @classmethod
-    def without_start(cls, t: Floats, way: Floats, rows: Flags, guess: _Guess) -> _Found | None:
+    def without_start(cls, t: Floats, travel: Floats, rows: Flags, guess: _Guess) -> _Found | None:
         """Fit a trapezoid or, if it would hardly cruise, a triangle."""
         duration = max(guess.duration, 1.02 * guess.length / guess.speed)
         ramp = min(max(duration - guess.length / guess.speed, 0.02 * duration), 0.5 * duration)
         first = [guess.offset, guess.length, guess.begin, log(guess.speed / ramp)]
         for cruises in (True, False):
             start = [*first, *([log(guess.speed)] if cruises else [])]
-            found = fit(_model(t, cruises, False), way, start, rows)
+            found = fit(_model(t, cruises, False), travel, start, rows)
             if found is None:
                 continue
             length, a = found.parameters[_LENGTH], exp(found.parameters[_ACCELERATION])
@@ -212,12 +212,12 @@ class _Found:
         return None
 
     def with_start(
-        self, t: Floats, way: Floats, rows: Flags, start: float, step: float
+        self, t: Floats, travel: Floats, rows: Flags, start: float, step: float
     ) -> _Found | None:
         """Fit again with the ramp of a start, from a first guess of it [s]."""
         first = [*self.fit.parameters, start]
         first[_ONSET] -= 0.5 * start
-        found = fit(_model(t, self.cruises, True, step), way, first, rows)
+        found = fit(_model(t, self.cruises, True, step), travel, first, rows)
         if found is None:
             return None
         return _Found(fit=found, cruises=self.cruises, has_start=True, step=step)
@@ -278,7 +278,7 @@ def _model(
         if length <= 0.0 or start < 0.0 or max(abs(ln_a), abs(ln_v)) > _NO_BOUND:
             return np.full(len(t), NOWHERE)
         path = path_time(t - onset, start, step)
-        way: Floats = offset + trapezoid_way(path, length, exp(ln_a), exp(ln_v))
-        return way
+        travel: Floats = offset + trapezoid_travel(path, length, exp(ln_a), exp(ln_v))
+        return travel
 
     return model
