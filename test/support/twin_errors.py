@@ -76,7 +76,7 @@ def goals(home, seed):
     """Return goals of each kind from a pose, by name."""
     rng = np.random.default_rng(seed)
 
-    def goal(types, radius, *, turn=0.0, time=0.0, dwell=0.0, velocity=0.15):
+    def goal(types, radius, *, turn=0.0, time=0.0, velocity=0.15):
         places, d = [np.array(home.position)], np.array((0.0, 1.0, 0.0))
         for _ in types:
             side = np.cross(d, rng.normal(size=3))
@@ -92,7 +92,6 @@ def goals(home, seed):
                 Segment(
                     type=kind,
                     blend_radius=radius,
-                    dwell=dwell * (i % 2),
                     velocity=velocity if kind != TYPE.JOINT and not turn and not time else 0.0,
                     via=Pose(tuple(middle.tolist()), home.quaternion)
                     if kind == TYPE.CIRCULAR
@@ -102,12 +101,16 @@ def goals(home, seed):
         return Goal(waypoints=tuple(points), segments=tuple(segments))
 
     line, joint, arc, process = TYPE.LINEAR, TYPE.JOINT, TYPE.CIRCULAR, TYPE.PROCESS
+    stops = goal([line] * 6, 0.0)
+    dwells = tuple(
+        replace(each, dwell=0.2 * (i in (1, 3))) for i, each in enumerate(stops.segments)
+    )
     return {
-        'lines with stops': goal([line] * 6, 0.0),
+        'lines with stops': stops,
+        'lines with stops, some dwells': replace(stops, segments=dwells),
         'lines with blends': goal([line] * 6, 0.02),
         'lines with blends and times': goal([line] * 6, 0.02, time=1.5),
         'lines with stops and times': goal([line] * 6, 0.0, time=1.5),
-        'lines with stops, some dwells': goal([line] * 6, 0.0, dwell=0.2),
         'joint moves with blends': goal([joint] * 6, 0.02),
         'arcs with blends': goal([arc] * 4, 0.01),
         'lines that turn the tool, with blends': goal([line] * 4, 0.01, turn=0.6),
