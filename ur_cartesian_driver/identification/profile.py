@@ -5,8 +5,8 @@ The profile of a single move: a trapezoid of speed, with or without the ramp of 
 
 Travel over time, from rest to rest: ``s(t) = w(p(t - t0))`` with the trapezoid ``w`` of
 acceleration a, speed v and length L, and the path time ``p`` of a start within T: ``t^2 / 2T`` up
-to T, then ``t - T/2``. Recorded controllers change the rate of the path once a cycle c instead, by c/T:
-``t (t + c) / 2T``, then ``t - (T - c)/2``. Both are fitted.
+to T, then ``t - T/2``. Recorded controllers change the rate of the path once a cycle c instead, by
+c/T: ``t (t + c) / 2T``, then ``t - (T - c)/2``. Both are fitted.
 """
 
 from __future__ import annotations
