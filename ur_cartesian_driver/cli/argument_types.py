@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import argparse
+from datetime import date
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,6 +38,21 @@ def code_output(text: str) -> tuple[str, CodeOutput]:
     from ur_cartesian_driver.importing import parse_code_output
 
     return parsed(parse_code_output, text)
+
+
+def day(text: str) -> str:
+    """Return a date, YYYY-MM-DD."""
+    try:
+        return date.fromisoformat(text).isoformat()
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{text} is no date; write it as YYYY-MM-DD') from None
+
+
+def software(text: str) -> str:
+    """Return a version of the controller's software."""
+    if re.fullmatch(r'\d+(\.\d+){1,3}', text) is None:
+        raise argparse.ArgumentTypeError(f'{text} is no version; write it like 5.21 or 5.21.0')
+    return text
 
 
 def tcp(text: str) -> tuple[float, ...]:

@@ -542,6 +542,45 @@ def _add_export(command: CommandParser) -> None:
     )
 
 
+def _add_identify(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import identify_command
+
+    command.set_defaults(run=identify_command.identify)
+    command.add_argument(
+        'recordings',
+        nargs='+',
+        metavar='RECORDING',
+        help='recordings of one arm: .npz or .part of the driver, or text with titles of RTDE',
+    )
+    command.add_argument(
+        '--commands',
+        default='',
+        metavar='FILE',
+        help='the calls of movej and movel behind the moves of all recordings, one a line',
+    )
+    command.add_argument(
+        '-o', '--output', default='', metavar='FILE', help='twin to write, such as twin.yaml'
+    )
+    arm = command.add_argument_group('the arm', 'where the recordings do not name it')
+    arm.add_argument('--model', default='', help='such as ur5e')
+    arm.add_argument('--serial-number', default='', metavar='NUMBER', help='of the arm')
+    arm.add_argument(
+        '--software',
+        type=argument_types.software,
+        metavar='VERSION',
+        help='such as 5.21.0',
+    )
+    arm.add_argument(
+        '--motion-version', type=int, choices=(0, 1, 2), default=0, help='0 = not known'
+    )
+    arm.add_argument(
+        '--date',
+        type=argument_types.day,
+        metavar='YYYY-MM-DD',
+        help='day of the recordings; today if left out',
+    )
+
+
 #: Description and arguments of each command, by name.
 COMMANDS: dict[str, tuple[str, Callable[[CommandParser], None]]] = {
     'demo': ('run simulator, driver and client, a process each, with one goal', _add_demo),
@@ -578,6 +617,10 @@ COMMANDS: dict[str, tuple[str, Callable[[CommandParser], None]]] = {
         'tell what works with a robot and how it differs from what is assumed; moves nothing '
         'without being asked',
         _add_check_robot,
+    ),
+    'identify': (
+        'estimate the laws of motion of the arm that made recordings, each with an interval',
+        _add_identify,
     ),
     'plot': ('draw a recorded motion: path, deviation, speed, lag, outputs and events', _add_plot),
     'export': (

@@ -1,0 +1,115 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings are read whoever wrote them, and refused with a sentence."""
+
+import gzip
+
+import numpy as np
+import pytest
+
+from ur_cartesian_driver.identification.arm_samples import read_samples
+from ur_cartesian_driver.identification.recorded_calls import MotionCommand, read_commands
+
+NAMES = ['timestamp', *(f'target_q_{i}' for i in range(6)), *(f'actual_q_{i}' for i in range(6))]
+ROWS = np.column_stack([0.002 * np.arange(60), np.tile(0.1 * np.arange(12), (60, 1))])
+
+
+def text(delimiter=' ', names=NAMES, rows=ROWS):
+    return '\n'.join(delimiter.join(map(str, row)) for row in [names, *rows]) + '\n'
+
+
+@pytest.mark.parametrize('delimiter', [' ', ',', ';', '\t'])
+def test_text_is_read_with_any_delimiter(tmp_path, delimiter):
+    path = tmp_path / 'moves.csv'
+    path.write_text(text(delimiter))
+    samples = read_samples(path)
+    assert (samples.time == ROWS[:, 0]).all()
+    assert (samples.target_q == ROWS[:, 1:7]).all()
+    assert (samples.actual_q == ROWS[:, 7:]).all()
+    assert samples.target_pose is samples.runtime_state is None
+    assert samples.cycle == pytest.approx(0.002)
+
+
+def test_packed_text_and_titles_with_units_are_read(tmp_path):
+    names = ['time [s]', *(f'target_q_{i} [rad]' for i in range(6))]
+    names += [f'target_TCP_pose_{i}' for i in range(6)]
+    rows = ROWS.copy()
+    rows[:, 7:] = 0.1, 0.2, 0.3, 0.0, 0.0, np.pi
+    path = tmp_path / 'moves.csv.gz'
+    path.write_bytes(gzip.compress(text(',', names, rows).encode()))
+    samples = read_samples(path)
+    assert samples.actual_q is None
+    assert samples.target_pose[7] == pytest.approx([0.1, 0.2, 0.3, 0, 0, 1, 0])
+
+
+def test_a_packet_that_was_written_twice_counts_once(tmp_path):
+    path = tmp_path / 'moves.csv'
+    path.write_text(text(rows=np.repeat(ROWS, 2, axis=0)))
+    assert len(read_samples(path).time) == len(ROWS)
+
+
+def mixed():
+    rows = ROWS.copy()
+    rows[30:, 0] -= 1.0
+    return text(rows=rows)
+
+
+@pytest.mark.parametrize(
+    ('content', 'words'),
+    [
+        ('', 'is empty'),
+        ('\n', 'is empty'),
+        ('a b\n1 2\n', 'has no column timestamp: record the RTDE outputs'),
+        (text(names=['time', 'x', *NAMES[2:]]), 'has no column target_q_0'),
+        (text(rows=ROWS[:9]), 'is too short: it has 9 packets, not 50'),
+        (text()[:-100] + '\n', 'is damaged below its titles: '),
+        (text().replace('0.1', 'x', 1), 'is damaged below its titles: could not convert'),
+        (text().replace('0.1 ', 'nan ', 1), 'packet 1 has no number in target_q'),
+        (mixed(), 'is mixed up: time goes back from 0.058 s to -0.940 s at packet 31'),
+        (text(rows=np.repeat(ROWS[:1], 99, axis=0)), 'is damaged: its time stands still'),
+    ],
+)
+def test_what_is_no_recording_is_refused(tmp_path, content, words):
+    path = tmp_path / 'moves.csv'
+    path.write_text(content)
+    with pytest.raises(ValueError, match=r'moves\.csv') as error:
+        read_samples(path)
+    assert words in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ('name', 'content', 'words'),
+    [
+        ('a.csv.gz', gzip.compress(text().encode())[:-200], 'unpacking it fails'),
+        ('b.csv.gz', text().encode(), 'unpacking it fails'),
+        ('c.csv', b'\xff\xfe\x00', 'neither ours nor text'),
+        ('d.npz', b'PK', 'no recording'),
+    ],
+)
+def test_what_is_no_text_is_refused(tmp_path, name, content, words):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(ValueError, match=words):
+        read_samples(tmp_path / name)
+
+
+def test_the_calls_of_a_program_are_read():
+    found = read_commands(
+        'def program():\n  movej([0, 1], a=1.4, v=1.05)\n  movel(p[1, 2], t = 4) # slow\nend', 'x'
+    )
+    assert found == [
+        MotionCommand(name='movej', a=1.4, v=1.05),
+        MotionCommand(name='movel', t=4.0),
+    ]
+
+
+@pytest.mark.parametrize(
+    ('content', 'words'),
+    [
+        ('sleep(1)', 'moves.script has no call of movej or movel'),
+        ('movel(there, a=fast)', 'moves.script, line 1: a of movel is fast; write a number'),
+        ('\nmovej(q, v=-1)', 'moves.script, line 2: v of movej is -1'),
+    ],
+)
+def test_what_is_no_call_is_refused(content, words):
+    with pytest.raises(ValueError, match=words):
+        read_commands(content, 'moves.script')

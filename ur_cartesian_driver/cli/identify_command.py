@@ -1,0 +1,88 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""``ur-cartesian identify``: estimate the laws of motion of the arm that made recordings."""
+
+from __future__ import annotations
+
+import argparse
+from datetime import date
+from pathlib import Path
+
+from ur_cartesian_driver.driver.recordings.recording import Recording
+from ur_cartesian_driver.identification.arm_samples import read_samples
+from ur_cartesian_driver.identification.estimators import Result, Unknown
+from ur_cartesian_driver.identification.identify import identify as identify_laws
+from ur_cartesian_driver.identification.recorded_calls import MotionCommand, read_commands
+from ur_cartesian_driver.motion.twin.laws import LAWS
+from ur_cartesian_driver.motion.twin.twin import ArmIdentity, Estimate, Twin
+from ur_cartesian_driver.motion.twin.twin_file import twin_text
+
+
+def identify(arguments: argparse.Namespace) -> int:
+    """Print each law with its interval, or why it was not identified; write the twin."""
+    paths = [Path(name) for name in arguments.recordings]
+    arm = _arm(paths, arguments)
+    if arguments.output and not arm.model:
+        raise ValueError('the recordings do not name their arm: add --model, such as --model ur5e')
+    recordings = [read_samples(path) for path in paths]
+    calls: list[MotionCommand] = []
+    if arguments.commands:
+        text = Path(arguments.commands).read_text(encoding='utf-8', errors='replace')
+        calls = read_commands(text, arguments.commands)
+    found = identify_laws(recordings, calls, arguments.commands)
+    print(found.summary())
+    for name, result in found.results.items():
+        print(f'{name:<26} {_described(name, result)}')
+    if arguments.output:
+        twin = Twin(
+            arm=arm,
+            date=arguments.date or date.today().isoformat(),
+            files=tuple(path.name for path in paths),
+            estimates={k: r for k, r in found.results.items() if isinstance(r, Estimate)},
+            not_identified={k: str(r) for k, r in found.results.items() if isinstance(r, Unknown)},
+        )
+        Path(arguments.output).write_text(twin_text(twin), encoding='utf-8')
+        print(f'twin: {arguments.output}')
+    return 0
+
+
+def _described(name: str, result: Result) -> str:
+    if isinstance(result, Unknown):
+        return f'not identified: {result}'
+    parts = (result.evidence, f'{result.left_over} left' if result.left_over else '')
+    return f'{result.text(LAWS[name].unit)}; ' + ', '.join(part for part in parts if part)
+
+
+def _arm(paths: list[Path], arguments: argparse.Namespace) -> ArmIdentity:
+    """
+    Return the arm that our own recordings name, or else the options.
+
+    :raises ValueError: the recordings, or an option, name different arms.
+    """
+    arm = ArmIdentity(
+        model=arguments.model,
+        serial_number=arguments.serial_number,
+        software=arguments.software or '',
+        motion_version=arguments.motion_version,
+    )
+    for path in paths:
+        if not (path.is_dir() or path.suffix == '.npz'):
+            continue
+        robot = Recording.load(path, max_rows=1).metadata.get('robot') or {}
+        own = ArmIdentity(
+            model=str(robot.get('model') or ''),
+            serial_number=str(robot.get('serial_number') or ''),
+            software=str(robot.get('polyscope_version') or ''),
+            motion_version=int(robot.get('motion_version') or 0),
+        )
+        if differences := arm.differences(own):
+            raise ValueError(
+                f'{path} is of another arm: {differences}; identify one arm at a time'
+            )
+        arm = ArmIdentity(
+            model=arm.model or own.model,
+            serial_number=arm.serial_number or own.serial_number,
+            software=arm.software or own.software,
+            motion_version=arm.motion_version or own.motion_version,
+        )
+    return arm

@@ -1,0 +1,382 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The errors of an arm against its targets: lag, friction, ringing and noise.
+
+The measured joint less its target is modelled as the sum of three linear filters: a first-order
+lag of the target's speed, an error that follows the direction of motion within a time constant,
+and a damped oscillator that the acceleration excites. They are computed by convolution on the
+cycles of the controller, whatever packets are missing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import exp, log, pi, sqrt
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.identification.arm_samples import ArmSamples
+from ur_cartesian_driver.identification.least_squares import Fit, fit, Measured, NOWHERE
+from ur_cartesian_driver.identification.segmentation import LONGEST_GAP, noise_of, REST_SPEED
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
+
+Spectrum: TypeAlias = NDArray[np.complex128]
+
+#: Joints that turn less show nothing [rad].
+_MIN_TURN = 0.02
+#: Cycles of a recording that are used at most.
+_MAX_CYCLES = 10_000
+#: More than this [rad], and as many times the noise, is left where the arm has other laws.
+_MISFIT, _ROUGH = 2e-5, 1.5
+#: A measured position scatters at least as much [rad].
+_FLOOR = 1e-7
+_LAG, _SETTLING, _FREQUENCY, _DECAY, _FRICTION, _STATIC, _BEND, _BEND_LATER = range(8)
+#: Where the fit begins, and the frequencies that it begins from [Hz].
+_LAG_START, _SETTLING_START, _DECAY_START, _FREQUENCIES = 7e-4, 0.02, 6.0, (5.0, 8.0, 12.0, 18.0)
+#: Longest answer of a filter [s]; transforms have a multiple of this size.
+_LONGEST_KERNEL, _SIZE_STEP = 2.5, 512
+#: Logarithm that no time or frequency has.
+_NO_BOUND = 9.0
+#: Lags for autocovariances of squared third differences.
+_LAGS = 6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArmErrors:
+    """
+    The errors of an arm that were found.
+
+    :param settling: time constant between friction and static error [s].
+    :param cycle: time from packet to packet [s].
+    :param joints: number of joints that moved.
+    :param rms: root mean square of what is left [rad].
+    :param noise: standard deviation of the white noise in it [rad].
+    """
+
+    lag: Measured
+    friction: Measured
+    static_error: Measured
+    acceleration_error: Measured
+    ringing_frequency: Measured
+    ringing_decay: Measured
+    settling: Measured
+    cycle: float
+    joints: int
+    rms: float
+    noise: float
+
+    @property
+    def is_known_law(self) -> bool:
+        """Whether hardly more than noise is left."""
+        return self.rms < max(_MISFIT, _ROUGH * self.noise)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Grid:
+    """
+    Joints that move, on the cycles of the controller.
+
+    :param qd: (j, m) target speed [rad/s]; ``qdd``: (j, m) target acceleration [rad/s^2],
+        of the cycles before and after each packet.
+    :param direction: (j, m) direction of the present or last motion; 0 before the first one.
+    :param moving: (j, m) mask.
+    :param rows: (n,) cycle of each packet.
+    :param error: (j, n) measured less target [rad].
+    """
+
+    cycle: float
+    qd: Floats
+    qdd: Floats
+    direction: Floats
+    moving: Flags
+    rows: Indices
+    error: Floats
+
+
+def find_arm_errors(samples: ArmSamples) -> ArmErrors | None:
+    """
+    Find the errors of all joints that move, by the same laws for all of them.
+
+    :returns: None if no measured joints were recorded, none move, or there is too little data.
+    """
+    grid = _grid(samples)
+    if grid is None:
+        return None
+    found = _best(grid)
+    if found is None:
+        return None
+    return ArmErrors(
+        lag=found.measured(_LAG),
+        friction=found.measured(_FRICTION),
+        static_error=found.measured(_STATIC),
+        acceleration_error=found.combination({_BEND: 1.0, _BEND_LATER: 1.0}),
+        ringing_frequency=_exponential(found, _FREQUENCY),
+        ringing_decay=_exponential(found, _DECAY),
+        settling=_exponential(found, _SETTLING),
+        cycle=grid.cycle,
+        joints=len(grid.qd),
+        rms=found.rms,
+        noise=noise_of(found.residuals),
+    )
+
+
+def _exponential(found: Fit, parameter: int) -> Measured:
+    part = found.measured(parameter)
+    value = exp(part.value)
+    return Measured(value=value, error=value * part.error, freedom=part.freedom)
+
+
+def _grid(samples: ArmSamples) -> _Grid | None:
+    """Return the moving joints of the longest stretch without a long gap."""
+    if samples.actual_q is None:
+        return None
+    time, cycle = samples.time, samples.cycle
+    bounds = np.concatenate([[0], np.flatnonzero(np.diff(time) > LONGEST_GAP) + 1, [len(time)]])
+    longest = int(np.argmax(np.diff(bounds)))
+    part = slice(bounds[longest], bounds[longest + 1])
+    time = time[part]
+    rows = np.round((time - time[0]) / cycle).astype(np.intp)
+    kept = rows < _MAX_CYCLES
+    time, rows = time[kept], rows[kept]
+    target, actual = samples.target_q[part][kept], samples.actual_q[part][kept]
+    moves = np.flatnonzero(np.ptp(target, axis=0) > _MIN_TURN)
+    if not len(moves):
+        return None
+    cycles = np.arange(rows[-1] + 1)
+    q = np.stack([np.interp(cycles, rows, target[:, joint]) for joint in moves])
+    step = np.diff(q, axis=1, prepend=q[:, :1], append=q[:, -1:]) / cycle
+    qd = 0.5 * (step[:, 1:] + step[:, :-1])
+    moving = np.abs(qd) > REST_SPEED
+    last = np.maximum.accumulate(np.where(moving, cycles, -1), axis=1)
+    direction = np.where(last < 0, 0.0, np.take_along_axis(np.sign(qd), np.maximum(last, 0), 1))
+    return _Grid(
+        cycle=cycle,
+        qd=qd,
+        qdd=np.diff(step, axis=1) / cycle,
+        direction=direction,
+        moving=moving,
+        rows=rows,
+        error=(actual - target)[:, moves].T,
+    )
+
+
+class _Model:
+    """
+    The errors of all joints as a function of the parameters.
+
+    Parameters are lag [s], logarithms of settling time [s], frequency [Hz] and decay [1/s], then
+    those in which the model is linear: friction, static error, two of bending, and the error of
+    each joint before its first motion [rad].
+    """
+
+    def __init__(self, grid: _Grid) -> None:
+        self._grid = grid
+        joints, count = grid.qd.shape
+        self._kernel_length = min(count, round(_LONGEST_KERNEL / grid.cycle))
+        self._size = -(-(count + self._kernel_length) // _SIZE_STEP) * _SIZE_STEP
+        # A drag that has rested at 1 for long differs from it by the travel since.
+        unmoved = (grid.direction == 0.0).astype(np.float64)
+        self._speed = self._spectrum(-grid.qd)
+        self._inputs = [
+            self._spectrum(each)
+            for each in (
+                -grid.direction * grid.moving,
+                -grid.direction * ~grid.moving,
+                unmoved - 1.0,
+            )
+        ]
+        # Differences of packets, and even changes between them, each take (w cycle)^2 / 12 of an
+        # acceleration that swings with w; its own differences give that back.
+        bends = np.diff(np.pad(grid.qdd, ((0, 0), (1, 1)), 'edge'), 2, axis=1)
+        self._acceleration = self._spectrum(bends / 6.0 - grid.qdd)
+        self._joints = joints
+
+    def __call__(self, parameters: Floats) -> Floats:
+        lag, *logarithms = parameters[:4]
+        if not 0.0 <= lag < 0.1 or max(map(abs, logarithms)) > _NO_BOUND:
+            return np.full(self._grid.error.size, NOWHERE)
+        settling, frequency, decay = logarithms
+        whole = self._speed * self._transfer(self._lag_kernel(lag))
+        whole = whole + self._drag(parameters) * self._transfer(self._drag_kernel(settling))
+        whole = whole + self._bend(parameters) * self._transfer(
+            self._ring_kernel(frequency, decay)
+        )
+        first = np.repeat(parameters[_BEND_LATER + 1 :], len(self._grid.rows))
+        return self._packets(whole) + first
+
+    def columns(self, parameters: Floats) -> Floats:
+        """Return the derivatives by the linear parameters (j n, k)."""
+        _, settling, frequency, decay = parameters[:4]
+        drag = self._transfer(self._drag_kernel(settling))
+        ring = self._transfer(self._ring_kernel(frequency, decay))
+        friction, static, unmoved = (self._packets(each * drag) for each in self._inputs)
+        bends = [self._packets(self._acceleration * ring * each) for each in (1.0, self._later)]
+        packets = len(self._grid.rows)
+        own = np.zeros((self._joints * packets, self._joints))
+        for joint in range(self._joints):
+            rows = slice(joint * packets, (joint + 1) * packets)
+            own[rows, joint] = 1.0 + unmoved[rows]
+        return np.concatenate([np.stack([friction, static, *bends], axis=1), own], axis=1)
+
+    def derivatives(self, parameters: Floats) -> Floats:
+        """Return the derivatives by all parameters (j n, k)."""
+        lag, settling, frequency, decay = parameters[:4]
+        drag, bend = self._drag(parameters), self._bend(parameters)
+        shapes = (
+            (self._speed, _slope(self._lag_kernel, max(lag, 1e-5), 1e-6)),
+            (drag, _slope(self._drag_kernel, settling, 1e-4)),
+            (bend, _slope(lambda x: self._ring_kernel(x, decay), frequency, 1e-5)),
+            (bend, _slope(lambda x: self._ring_kernel(frequency, x), decay, 1e-5)),
+        )
+        parts = [self._packets(each * self._transfer(kernel)) for each, kernel in shapes]
+        return np.concatenate([np.stack(parts, axis=1), self.columns(parameters)], axis=1)
+
+    # -- filters ---------------------------------------------------------------------------------
+
+    def _lag_kernel(self, lag: float) -> Floats:
+        """Return the kernel of a first-order lag, for a speed that changes evenly in a cycle."""
+        lag = max(lag, 1e-6)
+        left, share = exp(-self._grid.cycle / lag), lag / self._grid.cycle
+        now = 1.0 - share * (1.0 - left)
+        before = share * (1.0 - left) - left
+        rest = left ** np.arange(min(60.0, self._kernel_length)) * (left * now + before)
+        kernel: Floats = lag * np.concatenate([[now], rest])
+        return kernel
+
+    def _drag_kernel(self, log_settling: float) -> Floats:
+        left = exp(-self._grid.cycle / exp(log_settling))
+        kernel: Floats = (1.0 - left) * left ** np.arange(float(self._kernel_length))
+        return kernel
+
+    def _ring_kernel(self, log_frequency: float, log_decay: float) -> Floats:
+        """Return the kernel of an oscillator, for an input that changes evenly in a cycle."""
+        omega, decay = 2.0 * pi * exp(log_frequency), exp(log_decay)
+        cycle, square = self._grid.cycle, omega**2 + decay**2
+        t = cycle * np.arange(self._kernel_length + 1)
+        # The answer to an input that rises from 0 by 1 per second.
+        swing = (omega - decay**2 / omega) * np.sin(omega * t) - 2.0 * decay * np.cos(omega * t)
+        rise = t - (2.0 * decay + np.exp(-decay * t) * swing) / square
+        kernel: Floats = np.diff(rise, 2, prepend=0.0) / cycle
+        return kernel
+
+    @property
+    def _later(self) -> Spectrum:
+        """The delay by a cycle."""
+        turns = np.arange(self._size // 2 + 1) / self._size
+        delay: Spectrum = np.exp(-2j * pi * turns)
+        return delay
+
+    def _drag(self, parameters: Floats) -> Spectrum:
+        friction, static, unmoved = self._inputs
+        own = parameters[_BEND_LATER + 1 :, None]
+        moving, resting = parameters[_FRICTION] * friction, parameters[_STATIC] * static
+        drag: Spectrum = moving + resting + own * unmoved
+        return drag
+
+    def _bend(self, parameters: Floats) -> Spectrum:
+        # When the acceleration of two packets acts within the cycles around them is not known; a
+        # mixture of two cycles is a delay in between.
+        now, later = parameters[_BEND], parameters[_BEND_LATER]
+        bend: Spectrum = self._acceleration * (now + later * self._later)
+        return bend
+
+    def _spectrum(self, values: Floats) -> Spectrum:
+        spectrum: Spectrum = np.fft.rfft(values, self._size)
+        return spectrum
+
+    def _transfer(self, kernel: Floats) -> Spectrum:
+        transfer: Spectrum = np.fft.rfft(kernel, self._size)
+        return transfer
+
+    def _packets(self, spectrum: Spectrum) -> Floats:
+        """Return values at the packets of all joints in a row (j n,)."""
+        values: Floats = np.fft.irfft(spectrum, self._size)[:, self._grid.rows].ravel()
+        return values
+
+
+def _best(grid: _Grid) -> Fit | None:
+    """Fit from the frequency of the ringing that leaves least."""
+    model, measured = _Model(grid), grid.error.ravel()
+    starts = []
+    for frequency in _FREQUENCIES:
+        start = np.zeros(8 + len(grid.qd))
+        start[:4] = _LAG_START, log(_SETTLING_START), log(frequency), log(_DECAY_START)
+        columns = model.columns(start)
+        rest = measured - model(start)
+        start[4:] = np.linalg.lstsq(columns, rest)[0]
+        starts.append((float(np.sum((rest - columns @ start[4:]) ** 2)), start.tolist()))
+    return fit(
+        model,
+        measured,
+        min(starts)[1],
+        np.tile(np.diff(grid.rows, prepend=-2) == 1, len(grid.qd)),
+        derivatives=model.derivatives,
+        floor=_FLOOR,
+    )
+
+
+def _slope(kernel: Callable[[float], Floats], at: float, step: float) -> Floats:
+    slope: Floats = (kernel(at + step) - kernel(at - step)) / (2.0 * step)
+    return slope
+
+
+# ---- noise -----------------------------------------------------------------------------------
+
+
+def resolution_of(actual_q: Floats) -> float:
+    """Return the step between measured positions [rad]; 0 if they have none."""
+    smallest = []
+    for column in actual_q.T:
+        steps = np.diff(np.unique(column))
+        steps = steps[steps > 1e-10]
+        if len(steps) < 20:
+            continue
+        least = float(steps.min())
+        multiples = steps / least
+        if np.abs(multiples - np.round(multiples)).max() < 0.05 and multiples.max() < 1e4:
+            smallest.append(least)
+    return min(smallest) if smallest else 0.0
+
+
+def find_noise(samples: ArmSamples) -> Measured | None:
+    """
+    Return the noise of measured joints, peak to peak, as if it were evenly distributed [rad].
+
+    Third differences of the error contain nothing else: s^2 = mean(d^2) / 20. The resolution of a
+    joint that moves adds r^2/12 to the w^2/12 of the noise.
+    """
+    if samples.actual_q is None:
+        return None
+    resolution = resolution_of(samples.actual_q)
+    step = np.diff(samples.time)
+    even = np.abs(step - samples.cycle) < 0.2 * samples.cycle
+    whole = even[:-2] & even[1:-1] & even[2:]
+    error = samples.actual_q - samples.target_q
+    travels = np.abs(np.diff(samples.target_q, axis=0))
+    squares = [
+        (np.diff(error[:, joint], 3)[whole & (travels[1:-1, joint] > 0.5 * resolution)]) ** 2
+        / 20.0
+        for joint in range(6)
+        if np.ptp(samples.target_q[:, joint]) > _MIN_TURN
+    ]
+    squares = [part for part in squares if len(part) > 100]
+    if not squares:
+        return None
+    count = sum(map(len, squares))
+    mean = float(np.concatenate(squares).mean())
+    spread = 0.0
+    for part in squares:
+        off = part - mean
+        spread += float(off @ off)
+        for lag in range(1, _LAGS + 1):
+            spread += 2.0 * (1.0 - lag / (_LAGS + 1.0)) * float(off[lag:] @ off[:-lag])
+    error_of_mean = sqrt(max(spread, 0.0)) / count
+    square = 12.0 * mean - resolution**2
+    if square <= 0.0:
+        return None
+    wide = sqrt(square)
+    return Measured(value=wide, error=6.0 * error_of_mean / wide, freedom=float(count))

@@ -1,0 +1,375 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The estimators: each finds one law, or a few, in the moves and packets of recordings.
+
+A law is found only from moves that show it, and only if the moves follow the shape that the law
+has; a move that does not is named in place of a number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import sqrt
+
+import numpy as np
+
+from ur_cartesian_driver.identification.arm_errors import find_arm_errors, find_noise
+from ur_cartesian_driver.identification.arm_samples import ArmSamples
+from ur_cartesian_driver.identification.geometry import Kind
+from ur_cartesian_driver.identification.least_squares import combined, Measured, student
+from ur_cartesian_driver.identification.moves import FoundMove
+from ur_cartesian_driver.identification.profile import find_profile, Misfit, Profile
+from ur_cartesian_driver.identification.segmentation import Ending
+from ur_cartesian_driver.identification.stop_ramp import find_ramp
+from ur_cartesian_driver.motion.twin.laws import LAWS
+from ur_cartesian_driver.motion.twin.twin import Estimate
+
+#: How far a profile may be from the one that was asked for, so that its axis leads.
+_LEADS = 1e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Unknown:
+    """A law that was not identified: the reason, and the experiment that would do it."""
+
+    reason: str
+    experiment: str
+
+    def __str__(self) -> str:
+        return f'{self.reason}; {self.experiment}'
+
+
+#: What one estimator found of a law.
+Result = Estimate | Unknown
+
+
+def start_time(moves: Sequence[FoundMove]) -> Result:
+    """Find the time within which the first motion of a program sets out."""
+    profiles = [
+        move.profile
+        for move in moves
+        if isinstance(move.profile, Profile) and move.profile.start and not move.piece.chained
+    ]
+    starts = [profile.start for profile in profiles if profile.start]
+    steps = sum(profile.step > 0.0 for profile in profiles)
+    return _result(
+        'start_time',
+        starts,
+        f'{_plural(len(starts), "start")} of programs'
+        + (f', {steps} with a rate that changes once a cycle' if steps else ''),
+        _misfits(moves) or 'no move sets out as the first one of a program does',
+        'record a program from its start, with a move of a second or more',
+        left_over=_rms(profiles),
+    )
+
+
+def turn_ratio(moves: Sequence[FoundMove]) -> Result:
+    """
+    Find the angular speed of a line for each m/s of its v, where the turn leads.
+
+    The turn leads where its speed and acceleration are those of the call by the same factor.
+    """
+    found: list[Measured] = []
+    profiles, odd = [], 0
+    for move in moves:
+        command = move.command
+        if move.kind is not Kind.LINE or command is None or None in (command.a, command.v):
+            continue
+        if command.t is not None or move.travel.turn is None or _translation_leads(move):
+            continue
+        time, rows = move.rows
+        turn = find_profile(time, move.travel.turn, rows, may_start=not move.piece.chained)
+        if not isinstance(turn, Profile):
+            odd += isinstance(turn, Misfit)
+            continue
+        ratios = [_times(turn.acceleration, 1.0 / (command.a or 1.0))]
+        if turn.speed is not None:
+            ratios.append(_times(turn.speed, 1.0 / (command.v or 1.0)))
+            if abs(ratios[0].value / ratios[1].value - 1.0) > 0.01:
+                odd += 1
+                continue
+        found.append(min(ratios, key=lambda ratio: ratio.error))
+        profiles.append(turn)
+    return _result(
+        'turn_ratio',
+        found,
+        f'{_plural(len(found), "line")} in which the turn leads',
+        f'{_plural(odd, "turn")} of lines followed no law that is known'
+        if odd
+        else 'no line whose turn leads, with a and v that are known',
+        'record a movel that turns the tool by 45 degrees on the spot, and name its a and v',
+        left_over=_rms(profiles),
+    )
+
+
+def _translation_leads(move: FoundMove) -> bool:
+    """Return whether the travel of the tool has the acceleration of its call."""
+    profile, command = move.profile, move.command
+    if move.travel.line is None or not isinstance(profile, Profile) or command is None:
+        return False
+    asked = command.a or 1.0
+    tolerance = _LEADS + 3.0 * profile.acceleration.error / asked
+    return abs(profile.acceleration.value / asked - 1.0) < tolerance
+
+
+def left_out(moves: Sequence[FoundMove], kind: Kind) -> tuple[Result, Result]:
+    """Find acceleration and speed of moves of a kind whose call left both out."""
+    call = 'movej' if kind is Kind.JOINT else 'movel'
+    names = _LEFT_OUT[kind]
+    accelerations, speeds, profiles, odd, quotients = [], [], [], 0, []
+    for move in moves:
+        command = move.command
+        if command is None or command.name != call or move.kind is not kind:
+            continue
+        if command.a is not None or command.v is not None:
+            continue
+        if not isinstance(move.profile, Profile):
+            odd += isinstance(move.profile, Misfit)
+        elif kind is Kind.LINE and move.travel.line is None:
+            continue
+        elif command.t is not None:
+            quotients += [move.profile.speed_squared_by_acceleration]
+        else:
+            accelerations.append(move.profile.acceleration)
+            speeds += [move.profile.speed] if move.profile.speed else []
+            profiles.append(move.profile)
+    reason = f'no {call} without a, v and t among the calls'
+    known = [quotient for quotient in quotients if quotient is not None]
+    if odd:
+        reason = f'{_plural(odd, call)} without a and v followed no law that is known'
+    elif known:
+        whole = combined(known)
+        reason = (
+            f'{_plural(len(known), call)} with t show only v^2/a, {whole.value:.5g} +- '
+            f'{whole.half_width:.1g} {"rad" if kind is Kind.JOINT else "m"}'
+        )
+    experiment = f'record a {call} without a, v and t that cruises, and name the call'
+    evidence = f'{_plural(len(profiles), call)} without a and v'
+    return (
+        _result(names[0], accelerations, evidence, reason, experiment, left_over=_rms(profiles)),
+        _result(names[1], speeds, evidence, reason, experiment, left_over=_rms(profiles)),
+    )
+
+
+_LEFT_OUT = {
+    Kind.JOINT: ('timed_joint_acceleration', 'timed_joint_speed'),
+    Kind.LINE: ('timed_linear_acceleration', 'timed_linear_speed'),
+}
+
+
+def idle_between_moves(moves: Sequence[FoundMove]) -> Result:
+    """Find the time between the end of a move and the beginning of the next one in a chain."""
+    gaps, profiles = [], []
+    for before, after in pairwise(moves):
+        if before.samples is not after.samples or not after.piece.chained:
+            continue
+        if not (isinstance(before.profile, Profile) and isinstance(after.profile, Profile)):
+            continue
+        end, begin = before.profile.end, after.profile.begin
+        gaps.append(
+            Measured(
+                value=begin.value - end.value,
+                error=sqrt(begin.error**2 + end.error**2),
+                freedom=min(begin.freedom, end.freedom),
+            )
+        )
+        profiles += [before.profile, after.profile]
+    return _result(
+        'idle_between_moves',
+        gaps,
+        f'{_plural(len(gaps), "pair")} of moves in a row',
+        'no two moves in a row whose profiles are known',
+        'record a program of three joint moves without blends',
+        left_over=_rms(profiles),
+    )
+
+
+_STOPS = {
+    Ending.PROGRAM_STOP: (
+        'program was stopped',
+        'stop a program while a long move cruises, and record runtime_state',
+    ),
+    Ending.PAUSE: (
+        'program was paused',
+        'pause a program while a long move cruises, and record runtime_state',
+    ),
+    Ending.PROTECTIVE_STOP: (
+        'protective stop happened',
+        'a protective stop is not provoked; if one happens on a cruising move, keep its recording',
+    ),
+}
+
+
+def stop_ramp(moves: Sequence[FoundMove], ending: Ending) -> Result:
+    """Find the time from full speed to rest of one kind of stop."""
+    ramps, odd, unsteady = [], 0, 0
+    for move in moves:
+        if move.piece.ending is not ending or move.leading is None:
+            continue
+        time, rows = move.rows
+        ramp = find_ramp(time, move.leading, rows)
+        odd += isinstance(ramp, Misfit)
+        unsteady += ramp is None
+        if isinstance(ramp, Measured):
+            ramps.append(ramp)
+    event, experiment = _STOPS[ending]
+    reason = f'no {event} in motion'
+    if odd:
+        reason = f'{_plural(odd, "stop")} followed no even ramp'
+    elif unsteady:
+        reason = f'{_plural(unsteady, "stop")} came while the arm did not move at constant speed'
+    return _result(
+        ending.value, ramps, _plural(len(ramps), 'stop') + ' at constant speed', reason, experiment
+    )
+
+
+def arm_figures(recordings: Sequence[ArmSamples]) -> dict[str, Result]:
+    """Find lag, friction, static error, ringing and noise of the measured joints."""
+    found = [errors for samples in recordings if (errors := find_arm_errors(samples)) is not None]
+    noises = [noise for samples in recordings if (noise := find_noise(samples)) is not None]
+    experiment = (
+        'record actual_q beside target_q while single joints turn fast and slowly, with a second '
+        'of rest after each'
+    )
+    reason = 'no recording with measured joints that move and rest again'
+    odd = [errors for errors in found if not errors.is_known_law]
+    found = [errors for errors in found if errors.is_known_law]
+    if odd:
+        worst = max(odd, key=lambda errors: errors.rms)
+        reason = (
+            f'the joints follow their targets by another law in {_plural(len(odd), "recording")}: '
+            f'{1e6 * worst.rms:.3g} urad are left, of which {1e6 * worst.noise:.3g} are noise'
+        )
+    if not any(samples.actual_q is not None for samples in recordings):
+        reason = 'no recording has actual_q'
+    results: dict[str, Result] = {}
+    for name, most in _MAX_WIDTH.items():
+        used = [errors for errors in found if name not in _RINGING or errors.cycle < MAX_CYCLE]
+        parts: list[Measured] = [getattr(errors, name) for errors in used]
+        evidence = _plural(sum(errors.joints for errors in used), 'moving joint')
+        left = f'{1e6 * max((errors.rms for errors in used), default=0.0):.3g} urad rms'
+        seldom = f'packets every {1e3 * found[0].cycle:.3g} ms are too rare' if found else ''
+        result = _result(name, parts, evidence, seldom or reason, experiment, left_over=left)
+        if parts and isinstance(result, Estimate):
+            whole = combined(parts)
+            if whole.half_width > most(whole.value):
+                result = Unknown(
+                    reason=f'the recordings leave it at {whole.value:.2g} +- '
+                    f'{whole.half_width:.1g} {LAWS[name].unit}',
+                    experiment=experiment,
+                )
+        results[name] = result
+    results['position_noise'] = _result(
+        'position_noise',
+        noises,
+        _plural(len(noises), 'recording'),
+        'no measured joint that moves',
+        experiment,
+    )
+    return results
+
+
+#: Packets that are further apart [s] do not show when the acceleration changes, nor how the arm
+#: rings then.
+MAX_CYCLE = 0.005
+_RINGING = ('acceleration_error', 'ringing_frequency', 'ringing_decay')
+#: Widest useful half of an interval, by value.
+_MAX_WIDTH: dict[str, Callable[[float], float]] = {
+    'lag': lambda value: max(3e-4, 0.3 * value),
+    'friction': lambda value: max(3e-5, 0.3 * value),
+    'static_error': lambda value: max(3e-5, 0.3 * value),
+    'acceleration_error': lambda value: max(2e-5, 0.3 * value),
+    'ringing_frequency': lambda value: 0.3 * value,
+    'ringing_decay': lambda value: 0.5 * value,
+}
+
+
+def packet_gaps(recordings: Sequence[ArmSamples]) -> dict[str, Result]:
+    """Find the shares of packets after which one is missing, and after which more are."""
+    single = several = packets = 0
+    for samples in recordings:
+        missing = np.round(np.diff(samples.time) / samples.cycle) - 1.0
+        packets += len(missing)
+        single += int((missing == 1.0).sum())
+        several += int((missing > 1.0).sum())
+    evidence = _plural(packets, 'packet')
+    experiment = 'record a minute of RTDE at its full rate'
+    results: dict[str, Result] = {}
+    for name, count in (('single_gaps', single), ('long_gaps', several)):
+        low, high = _wilson(count, packets)
+        if high - low > max(0.02, 0.5 * high) and packets < 20_000:
+            results[name] = Unknown(
+                reason=f'{packets} packets are too few to count gaps', experiment=experiment
+            )
+        else:
+            share = count / packets
+            results[name] = Estimate(
+                value=share, interval=(min(low, share), max(high, share)), evidence=evidence
+            )
+    return results
+
+
+def _wilson(count: int, total: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share (Wilson, 1927)."""
+    z = student(float(max(total, 4)))
+    middle = (count + 0.5 * z * z) / (total + z * z)
+    half = z / (total + z * z) * sqrt(count * (total - count) / total + 0.25 * z * z)
+    return max(middle - half, 0.0), min(middle + half, 1.0)
+
+
+# ---- results -----------------------------------------------------------------------------------
+
+
+def _result(
+    name: str,
+    parts: Sequence[Measured],
+    evidence: str,
+    reason: str,
+    experiment: str,
+    *,
+    left_over: str = '',
+) -> Result:
+    """Return the estimate of a law from its measurements, or why there is none."""
+    if not parts:
+        return Unknown(reason=reason, experiment=experiment)
+    whole, law = combined(parts), LAWS[name]
+    low, high = whole.value - whole.half_width, whole.value + whole.half_width
+    value = min(max(whole.value, law.low), law.high)
+    if abs(value - whole.value) > 2.0 * whole.half_width:
+        return Unknown(
+            reason=f'it came out as {whole.value:.3g} {law.unit}; it {law.problem(whole.value)}',
+            experiment=experiment,
+        )
+    low, high = min(max(low, law.low), value), max(min(high, law.high), value)
+    return Estimate(value=value, interval=(low, high), evidence=evidence, left_over=left_over)
+
+
+def _times(measured: Measured, factor: float) -> Measured:
+    return Measured(
+        value=factor * measured.value,
+        error=abs(factor) * measured.error,
+        freedom=measured.freedom,
+    )
+
+
+def _misfits(moves: Iterable[FoundMove]) -> str:
+    odd = [move.profile.rms for move in moves if isinstance(move.profile, Misfit)]
+    if not odd:
+        return ''
+    return (
+        f'{_plural(len(odd), "move")} followed no trapezoid: {1e6 * max(odd):.3g} um or urad are '
+        'left'
+    )
+
+
+def _rms(profiles: Sequence[Profile]) -> str:
+    if not profiles:
+        return ''
+    return f'{1e6 * max(profile.fit.rms for profile in profiles):.2g} um or urad rms'
+
+
+def _plural(count: int, noun: str) -> str:
+    return f'{count} {noun}{"s" * (count != 1)}'

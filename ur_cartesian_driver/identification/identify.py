@@ -1,0 +1,95 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The laws of the arm that made recordings, each with an interval or the reason why not."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ur_cartesian_driver.identification import estimators
+from ur_cartesian_driver.identification.arm_samples import ArmSamples
+from ur_cartesian_driver.identification.estimators import Result, Unknown
+from ur_cartesian_driver.identification.geometry import Kind
+from ur_cartesian_driver.identification.moves import find_moves, FoundMove, join_commands
+from ur_cartesian_driver.identification.profile import Misfit
+from ur_cartesian_driver.identification.recorded_calls import MotionCommand
+from ur_cartesian_driver.identification.segmentation import Ending
+from ur_cartesian_driver.motion.twin.laws import LAWS
+
+#: Laws that no recording identifies so far.
+_LATER = {
+    'set_point_deceleration': 'set-points are not recorded',
+    'servo_gain_factor': 'set-points are not recorded',
+    'servo_lookahead_factor': 'set-points are not recorded',
+    'blend_begin': 'blends are not evaluated',
+    'blend_shape': 'blends are not evaluated',
+    'blend_speed_ratio': 'blends are not evaluated',
+    'speed_noise': 'measured speeds are not evaluated',
+}
+_CHECK_ROBOT = 'check-robot --with-motion shows how far this arm follows what is assumed'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identification:
+    """
+    What recordings say of their arm.
+
+    :param moves: in the order of the recordings.
+    :param results: by the name of the law, in the order of the table of laws.
+    """
+
+    moves: Sequence[FoundMove]
+    results: dict[str, Result]
+
+    def summary(self) -> str:
+        """Return a sentence about the moves that were found."""
+        kinds = Counter(move.kind for move in self.moves)
+        names = {Kind.LINE: 'lines', Kind.JOINT: 'joint moves', Kind.EITHER: 'turns of one joint'}
+        parts = [f'{kinds[kind]} {name}' for kind, name in names.items() if kinds[kind]]
+        if kinds[Kind.OTHER]:
+            parts.append(f'{kinds[Kind.OTHER]} of another shape (not used)')
+        count = len(self.moves)
+        odd = [move for move in self.moves if isinstance(move.profile, Misfit)]
+        text = f'{count} move{"s" * (count != 1)}: {", ".join(parts)}.' if parts else 'No moves.'
+        for move in odd:
+            rms = 1e6 * move.profile.rms  # type: ignore[union-attr]  # only misfits
+            text += (
+                f'\nThe move at {move.samples.time[move.piece.moving[0]]:.2f} s of '
+                f'{move.samples.name} is no trapezoid: {rms:.3g} um or urad are left.'
+            )
+        return text
+
+
+def identify(
+    recordings: Sequence[ArmSamples],
+    commands: Sequence[MotionCommand] = (),
+    commands_name: str = 'the calls',
+) -> Identification:
+    """
+    Estimate the laws of motion of the arm that made recordings.
+
+    :param commands: the calls behind the moves of all recordings, in order; empty = unknown.
+    :param commands_name: the file of the calls, for error texts.
+    :raises ValueError: the calls do not match the moves.
+    """
+    moves = [move for samples in recordings for move in find_moves(samples)]
+    if commands:
+        moves = join_commands(moves, commands, commands_name)
+    joint, linear = (estimators.left_out(moves, kind) for kind in (Kind.JOINT, Kind.LINE))
+    found: dict[str, Result] = {
+        'start_time': estimators.start_time(moves),
+        **{ending.value: estimators.stop_ramp(moves, ending) for ending in Ending},
+        'turn_ratio': estimators.turn_ratio(moves),
+        'timed_joint_acceleration': joint[0],
+        'timed_joint_speed': joint[1],
+        'timed_linear_acceleration': linear[0],
+        'timed_linear_speed': linear[1],
+        'idle_between_moves': estimators.idle_between_moves(moves),
+        **estimators.arm_figures(recordings),
+        **estimators.packet_gaps(recordings),
+    }
+    for name, reason in _LATER.items():
+        found[name] = Unknown(reason=reason, experiment=_CHECK_ROBOT)
+    return Identification(moves=moves, results={name: found[name] for name in LAWS})
