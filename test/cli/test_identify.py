@@ -57,7 +57,9 @@ def test_our_own_recordings_name_their_arm(laws, tmp_path, capsys):
     program = Program(laws=laws, random=Random(8), cycle=0.008)
     program.movej([0.9, 0.2, 0.0, 0.0, 0.0, 0.1], a=1.0, v=0.5)
     samples = program.record('moves')
-    rows = zip(samples.time.tolist(), samples.target_q.tolist(), samples.actual_q.tolist(), strict=True)
+    rows = zip(
+        samples.time.tolist(), samples.target_q.tolist(), samples.actual_q.tolist(), strict=True
+    )
     packets = [
         RobotState(
             timestamp=time,
