@@ -14,7 +14,7 @@ import inspect
 from types import CodeType
 
 from ur_cartesian_driver.urscript.compiling.expression_compiler import (
-    Code,
+    CompiledExpression,
     DEPTH,
     ExpressionCompiler,
     Shared,
@@ -213,21 +213,21 @@ class _FunctionCompiler(ExpressionCompiler):
             self.set(found, call),
             *(
                 self.if_true(
-                    self.compare(self.name(found), ast.Eq(), self.constant(way)),
-                    [self._leave(way)],
+                    self.compare(self.name(found), ast.Eq(), self.constant(jump)),
+                    [self._leave(jump)],
                 )
-                for way in sorted(exits)
+                for jump in sorted(exits)
             ),
         ], weight
 
-    def _leave(self, way: str) -> ast.stmt:
+    def _leave(self, jump: str) -> ast.stmt:
         """Leave a loop, or the function; outside of loops, `break` and `continue` do that, too."""
-        if self._loops and way != _RETURN:
-            return self.node(ast.Break if way == _BREAK else ast.Continue)
+        if self._loops and jump != _RETURN:
+            return self.node(ast.Break if jump == _BREAK else ast.Continue)
         if self._exits is None:
             return self.node(ast.Return, None)
-        self._exits.add(way)
-        return self.node(ast.Return, self.constant(way))
+        self._exits.add(jump)
+        return self.node(ast.Return, self.constant(jump))
 
     def _statement_at_switch(self, node: tree.Statement) -> tuple[list[ast.stmt], int]:
         """Compile a statement before which threads may be switched; return also its cost."""
@@ -327,7 +327,7 @@ class _FunctionCompiler(ExpressionCompiler):
 
     def _if(self, node: tree.IfStatement) -> tuple[list[ast.stmt], int]:
         weight = 1
-        conditions: list[Code] = []
+        conditions: list[CompiledExpression] = []
         bodies = []
         for branch in node.branches:
             conditions.append(self.condition(branch.condition))

@@ -41,7 +41,7 @@ DEPTH = 'depth'
 
 
 @dataclass(frozen=True, slots=True)
-class Code:
+class CompiledExpression:
     """The code of an expression, and its cost in nodes of the tree."""
 
     python: ast.expr
@@ -78,15 +78,19 @@ class ExpressionCompiler(PythonWriter):
         self._temporaries += 1
         return f't{self._temporaries}'
 
-    def expression(self, node: tree.Expression) -> Code:
+    def expression(self, node: tree.Expression) -> CompiledExpression:
         match node:
             case tree.ConstantExpression():
                 self.at(node)
                 is_truth = isinstance(node.value, bool)
-                return Code(self.constant(node.value), is_truth=is_truth, is_simple=True)
+                return CompiledExpression(
+                    self.constant(node.value), is_truth=is_truth, is_simple=True
+                )
             case tree.NameExpression():
                 self.at(node)
-                return Code(self.name(self.variable(node.identifier)), is_simple=True)
+                return CompiledExpression(
+                    self.name(self.variable(node.identifier)), is_simple=True
+                )
             case tree.UnaryExpression():
                 return self._unary(node)
             case tree.BinaryExpression():
@@ -101,7 +105,7 @@ class ExpressionCompiler(PythonWriter):
                 target = self.expression(node.target)
                 self.at(node)
                 part = self.call('get_part', target.python, self.constant(node.name))
-                return Code(part, 1 + target.weight)
+                return CompiledExpression(part, 1 + target.weight)
             case tree.CallExpression():
                 callee = self._scope.function(node.function)
                 return self._builtin(node) if callee is None else self._call(node, callee)
@@ -112,19 +116,19 @@ class ExpressionCompiler(PythonWriter):
                 assert callee is not None
                 self.at(node)
                 function = self._shared.functions[id(callee)].name
-                return Code(self.call('spawn', self.name(function)))
+                return CompiledExpression(self.call('spawn', self.name(function)))
         raise AssertionError(node)
 
-    def condition(self, node: tree.Expression) -> Code:
+    def condition(self, node: tree.Expression) -> CompiledExpression:
         """Compile an expression of which only the truth counts."""
         return self._truth(self.expression(node))
 
-    def _truth(self, code: Code) -> Code:
+    def _truth(self, code: CompiledExpression) -> CompiledExpression:
         if code.is_truth:
             return code
-        return Code(self.call('truth', code.python), code.weight, is_truth=True)
+        return CompiledExpression(self.call('truth', code.python), code.weight, is_truth=True)
 
-    def copied(self, node: tree.Expression) -> Code:
+    def copied(self, node: tree.Expression) -> CompiledExpression:
         """Compile an expression whose value will be stored or passed on."""
         if isinstance(node, tree.CallExpression) and self._scope.function(node.function) is None:
             call = self._builtin_call(node)
@@ -139,7 +143,7 @@ class ExpressionCompiler(PythonWriter):
         return replace(code, python=python, is_simple=False)
 
     @staticmethod
-    def _may_be_stored(node: tree.Expression, code: Code) -> bool:
+    def _may_be_stored(node: tree.Expression, code: CompiledExpression) -> bool:
         """Return whether the value of an expression may be stored elsewhere, too."""
         stored = (
             tree.NameExpression
@@ -150,7 +154,7 @@ class ExpressionCompiler(PythonWriter):
         )
         return isinstance(node, stored) and not isinstance(code.python, ast.Constant)
 
-    def _twice(self, code: Code) -> tuple[ast.expr, ast.expr]:
+    def _twice(self, code: CompiledExpression) -> tuple[ast.expr, ast.expr]:
         """Return code that evaluates an expression, and code that has its value afterwards."""
         if code.is_simple:
             return code.python, code.python
@@ -163,7 +167,7 @@ class ExpressionCompiler(PythonWriter):
             return local_name(name)
         return global_name(name)
 
-    def _literal(self, node: tree.ListLiteral | tree.PoseLiteral) -> Code:
+    def _literal(self, node: tree.ListLiteral | tree.PoseLiteral) -> CompiledExpression:
         is_list = isinstance(node, tree.ListLiteral)
         codes = [self.expression(item) for item in node.items]
         self.at(node)
@@ -171,19 +175,21 @@ class ExpressionCompiler(PythonWriter):
         numbers = [_number(code.python) for code in codes]
         items = self.items([code.python for code in codes])
         if None in numbers:
-            return Code(self.call('make_list' if is_list else 'make_pose', items), weight)
+            return CompiledExpression(
+                self.call('make_list' if is_list else 'make_pose', items), weight
+            )
         if is_list:
-            return Code(items, weight)
+            return CompiledExpression(items, weight)
         function = self._shared.functions[id(self._scope)].name
         name = f'{function}_pose{len(self._constants)}'
         self._constants[name] = values.make_pose(numbers)
-        return Code(self.name(name), weight)
+        return CompiledExpression(self.name(name), weight)
 
-    def _unary(self, node: tree.UnaryExpression) -> Code:
+    def _unary(self, node: tree.UnaryExpression) -> CompiledExpression:
         if node.operator == 'not':
             code = self.condition(node.operand)
             self.at(node)
-            return Code(
+            return CompiledExpression(
                 self.node(ast.UnaryOp, ast.Not(), code.python), 1 + code.weight, is_truth=True
             )
         code = self.expression(node.operand)
@@ -191,15 +197,15 @@ class ExpressionCompiler(PythonWriter):
         number = _number(code.python)
         if number is not None:
             signed = -number if node.operator == '-' else number
-            return Code(self.constant(signed), 1 + code.weight, is_simple=True)
+            return CompiledExpression(self.constant(signed), 1 + code.weight, is_simple=True)
         if node.operator == '+':
-            return Code(self.call('plus', code.python), 1 + code.weight)
+            return CompiledExpression(self.call('plus', code.python), 1 + code.weight)
         first, again = self._twice(code)
         negative = self.node(ast.UnaryOp, ast.USub(), again)
         python = self.choose(self.has_type(first, 'float'), negative, self.call('minus', again))
-        return Code(python, 1 + code.weight)
+        return CompiledExpression(python, 1 + code.weight)
 
-    def _binary(self, node: tree.BinaryExpression) -> Code:
+    def _binary(self, node: tree.BinaryExpression) -> CompiledExpression:
         symbol = node.operator
         left, right = self.expression(node.left), self.expression(node.right)
         self.at(node)
@@ -208,19 +214,21 @@ class ExpressionCompiler(PythonWriter):
         constants = [isinstance(code.python, ast.Constant) for code in (left, right)]
         if symbol in ('==', '!=') and any(constants):
             python = self.compare(left.python, _COMPARISONS[symbol], right.python)
-            return Code(python, weight, is_truth)
+            return CompiledExpression(python, weight, is_truth)
         if symbol == '%' or not all(
             _number(code.python) is not None
             for code, is_constant in zip((left, right), constants, strict=True)
             if is_constant
         ):
-            return Code(self.call(OPERATORS[symbol], left.python, right.python), weight, is_truth)
+            return CompiledExpression(
+                self.call(OPERATORS[symbol], left.python, right.python), weight, is_truth
+            )
         if not right.is_simple and not self._is_fixed(left):
             left = replace(left, is_simple=False)  # the right side may change its value
         (first_a, a), (first_b, b) = self._twice(left), self._twice(right)
         is_quick = self._are_quick(symbol, constants, first_a, first_b, right.is_simple)
         if is_quick is None:  # two constants
-            return Code(self.call(OPERATORS[symbol], a, b), weight, is_truth)
+            return CompiledExpression(self.call(OPERATORS[symbol], a, b), weight, is_truth)
         if symbol == '/':
             is_quick = self.both([is_quick, b])
         quick = (
@@ -229,9 +237,9 @@ class ExpressionCompiler(PythonWriter):
             else self.node(ast.BinOp, a, _ARITHMETIC[symbol], b)
         )
         slow = self.call(OPERATORS[symbol], a, b)
-        return Code(self.choose(is_quick, quick, slow), weight, is_truth)
+        return CompiledExpression(self.choose(is_quick, quick, slow), weight, is_truth)
 
-    def _is_fixed(self, code: Code) -> bool:
+    def _is_fixed(self, code: CompiledExpression) -> bool:
         """Return whether nothing but this function changes the value of simple code."""
         return isinstance(code.python, ast.Constant) or (
             isinstance(code.python, ast.Name) and not code.python.id.startswith('g_')
@@ -257,19 +265,19 @@ class ExpressionCompiler(PythonWriter):
         # `and` would leave out the right operand if the left one is no float.
         return self.node(ast.BinOp, checks[0], ast.BitAnd(), checks[1])
 
-    def _logical(self, node: tree.LogicalExpression) -> Code:
+    def _logical(self, node: tree.LogicalExpression) -> CompiledExpression:
         left, right = self.condition(node.left), self.condition(node.right)
         self.at(node)
         weight = 1 + left.weight + right.weight
         if node.operator == 'xor':
-            return Code(
+            return CompiledExpression(
                 self.compare(left.python, ast.NotEq(), right.python), weight, is_truth=True
             )
         operator = ast.Or() if node.operator == 'or' else ast.And()
         both = self.node(ast.BoolOp, operator, [left.python, right.python])
-        return Code(both, weight, is_truth=True)
+        return CompiledExpression(both, weight, is_truth=True)
 
-    def _index(self, node: tree.IndexExpression) -> Code:
+    def _index(self, node: tree.IndexExpression) -> CompiledExpression:
         target = self.expression(node.target)
         indices = [self.expression(index) for index in node.indices]
         self.at(node)
@@ -282,16 +290,18 @@ class ExpressionCompiler(PythonWriter):
             and type(index.value) is int
             and index.value >= 0
         ):
-            return Code(self.call('get_item', target.python, *key), weight)
+            return CompiledExpression(self.call('get_item', target.python, *key), weight)
         first, again = self._twice(target)
         fits = self.compare(self.call('len', again), ast.Gt(), index)
         item = self.item(again, index)
         is_quick = self.both([self.has_type(first, 'list'), fits])
-        return Code(self.choose(is_quick, item, self.call('get_item', again, index)), weight)
+        return CompiledExpression(
+            self.choose(is_quick, item, self.call('get_item', again, index)), weight
+        )
 
     # Calls
 
-    def _call(self, node: tree.CallExpression, callee: Scope) -> Code:
+    def _call(self, node: tree.CallExpression, callee: Scope) -> CompiledExpression:
         assert callee.definition is not None
         positional: list[ast.expr] = []
         named: dict[str, ast.expr] = {}
@@ -307,15 +317,15 @@ class ExpressionCompiler(PythonWriter):
         depth = self.node(ast.BinOp, self.name(DEPTH), ast.Add(), self.constant(1))
         function = self._shared.functions[id(callee)]
         call: ast.expr = self.call(function.name, depth, *positional, **named)
-        return Code(self.steps(call) if function.suspends else call, weight)
+        return CompiledExpression(self.steps(call) if function.suspends else call, weight)
 
-    def _builtin(self, node: tree.CallExpression) -> Code:
+    def _builtin(self, node: tree.CallExpression) -> CompiledExpression:
         call = self._builtin_call(node)
         if isinstance(call.python, ast.YieldFrom):
             return call
         return replace(call, python=self.call('paid', call.python))
 
-    def _builtin_call(self, node: tree.CallExpression) -> Code:
+    def _builtin_call(self, node: tree.CallExpression) -> CompiledExpression:
         codes = [self.copied(argument.value) for argument in node.arguments]
         self.at(node)
         positional = [
@@ -331,9 +341,9 @@ class ExpressionCompiler(PythonWriter):
         call: ast.expr = self.call(builtin_name(node.function), *positional, **named)
         if inspect.isgeneratorfunction(self._shared.builtins[node.function]):
             call = self.steps(call)
-        return Code(call, 1 + sum(code.weight for code in codes))
+        return CompiledExpression(call, 1 + sum(code.weight for code in codes))
 
-    def _method(self, node: tree.MethodCallExpression) -> Code:
+    def _method(self, node: tree.MethodCallExpression) -> CompiledExpression:
         target = self.expression(node.target)
         codes = [self.copied(argument.value) for argument in node.arguments]
         self.at(node)
@@ -342,7 +352,7 @@ class ExpressionCompiler(PythonWriter):
         result = self.temporary()
         takes_time = self.has_type(self.keep(result, call), 'Generator')
         python = self.choose(takes_time, self.steps(self.name(result)), self.name(result))
-        return Code(python, 1 + target.weight + sum(code.weight for code in codes))
+        return CompiledExpression(python, 1 + target.weight + sum(code.weight for code in codes))
 
 
 def _number(python: ast.expr) -> int | float | None:

@@ -22,7 +22,7 @@ from ur_cartesian_driver.urscript.parsing.parser import parse_line
 from ur_cartesian_driver.urscript.script_errors import CompileError
 
 
-class Runtime(Protocol):
+class LineRuntime(Protocol):
     """The interpreter that runs the program."""
 
     interleaves: bool
@@ -47,7 +47,7 @@ class LineCompiler:
     """Compiles the lines of one program and keeps their variables and functions."""
 
     def __init__(
-        self, program: GeneratedCode, builtins: Mapping[str, Builtin], runtime: Runtime
+        self, program: GeneratedCode, builtins: Mapping[str, Builtin], runtime: LineRuntime
     ) -> None:
         """Start without lines."""
         self._program = program
