@@ -167,7 +167,7 @@ class _Resumption:
             stopped=self.stopped,
             places=places,
             time_since=self._time_since,
-            way=self._way,
+            distance=self._distance,
             behind=self._behind,
         )
         if self.rounded and not self.goal.corner_deviation:
@@ -259,19 +259,19 @@ class _Resumption:
             raise InvalidGoal(f'segments[{k}].via', f'makes no arc: {self.faults[k]}')
         return float(self.curves.length[k])
 
-    def _way(self, begin: float, end: float) -> float:
+    def _distance(self, begin: float, end: float) -> float:
         """Return the way from one place to another [m]; negative if it leads back."""
         if end < begin:
-            return -self._way(end, begin)
+            return -self._distance(end, begin)
         return sum(
             self._length(k) * (min(end, k + 1.0) - max(begin, float(k)))
             for k in range(floor(begin), min(floor(end) + 1, len(self.points)))
         )
 
-    def _behind(self, place: float, way: float) -> float:
+    def _behind(self, place: float, distance: float) -> float:
         """Return the place some way [m] behind a place; before it if the way is negative."""
-        step = 1 if way > 0.0 else -1
-        k, left = round(place) - (step < 0), abs(way)
+        step = 1 if distance > 0.0 else -1
+        k, left = round(place) - (step < 0), abs(distance)
         while 0 <= k < len(self.points) and (length := self._length(k)) < left:
             left, k = left - length, k + step
         if k < 0:

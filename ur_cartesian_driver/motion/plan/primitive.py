@@ -184,7 +184,7 @@ class LeadLaw:
     #: How much ahead of its place the output switches, in real time [s].
     lead: float
     #: Way of the tool from the trigger pose to the place [m]; its turn [rad] if it only turns.
-    way: float
+    distance: float
     #: Speeds of the tool [m/s or rad/s] at full speed, from the place back to the trigger pose, at
     #: equal distances in time. The acceleration between them is constant.
     speeds: tuple[float, ...]

@@ -409,7 +409,7 @@ def _law_fields(law: SpeedLaw) -> PointFields:
 
 
 def _lead_fields(law: LeadLaw) -> PointFields:
-    switch = (FollowKind.LEAD, law.lead, 1, law.way, 1, law.turns)
+    switch = (FollowKind.LEAD, law.lead, 1, law.distance, 1, law.turns)
     return (*law.speeds, *switch, 0, 0, MotionType.SWITCH_OUTPUT)
 
 
@@ -518,7 +518,7 @@ def _output(fields: Sequence[float]) -> OutputRecord:
     if fields[12] == FollowKind.LEAD:
         return LeadLaw(
             lead=fields[13],
-            way=fields[15],
+            distance=fields[15],
             speeds=tuple(fields[: LEAD_PIECES + 1]),
             turns=bool(fields[17]),
         )

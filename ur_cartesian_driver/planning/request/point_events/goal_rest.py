@@ -34,7 +34,7 @@ class GoalRest:
     #: other arguments are the name and value of the time offset of an event at the waypoint.
     time_since: Callable[[int, str, float], float]
     #: Function that returns the way from one place to another along the path [m].
-    way: Callable[[float, float], float]
+    distance: Callable[[float, float], float]
     #: Function that returns the place that is some way [m] behind another one.
     behind: Callable[[float, float], float]
 

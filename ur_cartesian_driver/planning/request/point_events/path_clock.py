@@ -25,11 +25,11 @@ from ur_cartesian_driver.motion.plan.plan import ReferencePath
 # makes way, too.
 _ARM_LENGTH = 0.1
 # A tool with less way than this per turn [m/rad] only turns.
-_LEAST_TURNING = 1e-3
+_MIN_LENGTH_PER_TURN = 1e-3
 # Samples that are not farther apart than this are dense [s].
 _DENSE = 0.02
 # A piece of the path that is not longer than this [m] is a rest.
-_NO_WAY = 1e-9
+_NO_LENGTH = 1e-9
 
 
 class PathClock:
@@ -41,7 +41,7 @@ class PathClock:
         a, b = self._poses[:-1], self._poses[1:]
         lengths, angles = distance_rows(a, b), angle_rows(a[:, 3:], b[:, 3:])
         #: (m,) way of the tool from the start to each sample [m].
-        self._ways = np.append(0.0, np.cumsum(lengths))
+        self._arc_lengths = np.append(0.0, np.cumsum(lengths))
         self._turns = np.append(0.0, np.cumsum(angles))
         self._steps = np.hypot(lengths, _ARM_LENGTH * angles)
         self._speeds = _speeds(self._steps, np.diff(self._times))
@@ -51,9 +51,9 @@ class PathClock:
         k, part = self._piece(time)
         return pose_from_row(self._poses[k]).interpolate(pose_from_row(self._poses[k + 1]), part)
 
-    def way(self, time: float) -> float:
+    def arc_length(self, time: float) -> float:
         """Return the way from the start to a time [m]."""
-        return self._between(self._ways, time)
+        return self._between(self._arc_lengths, time)
 
     def turn(self, time: float) -> float:
         """Return by how much the tool has turned from the start to a time [rad]."""
@@ -62,7 +62,7 @@ class PathClock:
     @property
     def length(self) -> float:
         """The length of the path [m]."""
-        return float(self._ways[-1])
+        return float(self._arc_lengths[-1])
 
     def motion_back(self, time: float, span: float, pieces: int) -> tuple[float, Floats, bool]:
         """
@@ -73,29 +73,29 @@ class PathClock:
             end back to its begin; whether way and speeds are angular [rad], [rad/s], because the
             tool only turns.
         """
-        way = self.way(time) - self.way(time - span)
+        arc_length = self.arc_length(time) - self.arc_length(time - span)
         turn = self.turn(time) - self.turn(time - span)
-        turns = way < _LEAST_TURNING * turn
-        values, length = (self._turns, turn) if turns else (self._ways, way)
+        turns = arc_length < _MIN_LENGTH_PER_TURN * turn
+        values, length = (self._turns, turn) if turns else (self._arc_lengths, arc_length)
         times = time - span * np.arange(pieces + 1) / pieces
         speeds = np.array([self._speed(values, each) for each in times.tolist()])
         # The robot program takes the acceleration between two speeds for constant.
         found = float((speeds[1:] + speeds[:-1]).sum()) * span / (2.0 * pieces)
         return length, speeds * (length / found if found > 0.0 else 0.0), turns
 
-    def time_at(self, way: float, *, leaving: bool) -> float:
+    def time_at(self, arc_length: float, *, leaving: bool) -> float:
         """
         Return when the tool has made some way from the start [s].
 
         :param leaving: where the tool rests there, whether the end of the rest is meant.
         """
         if leaving:
-            k = int(np.searchsorted(self._ways, way + _NO_WAY, side='right')) - 1
+            k = int(np.searchsorted(self._arc_lengths, arc_length + _NO_LENGTH, side='right')) - 1
         else:
-            k = int(np.searchsorted(self._ways, way - _NO_WAY, side='left')) - 1
+            k = int(np.searchsorted(self._arc_lengths, arc_length - _NO_LENGTH, side='left')) - 1
         k = min(max(k, 0), len(self._steps) - 1)
-        length = float(self._ways[k + 1] - self._ways[k])
-        part = min(max((way - float(self._ways[k])) / length, 0.0), 1.0) if length > 0.0 else 0.0
+        begin, end = float(self._arc_lengths[k]), float(self._arc_lengths[k + 1])
+        part = min(max((arc_length - begin) / (end - begin), 0.0), 1.0) if end > begin else 0.0
         span = float(self._times[k + 1] - self._times[k])
         u, v = float(self._speeds[k]), float(self._speeds[k + 1])
         # The part of the way is (u t + (v - u) t^2 / 2) / ((u + v) / 2), with t = 0 to 1.
@@ -142,9 +142,9 @@ def _speeds(steps: Floats, spans: Floats) -> Floats:
         after, after_span = pieces[k + 1] if k + 1 < len(pieces) else (0.0, 0.0)
         if span <= 0.0:
             speeds.append(speeds[-1])
-        elif step <= _NO_WAY:
+        elif step <= _NO_LENGTH:
             speeds.append(0.0)
-        elif after > _NO_WAY and 0.0 < after_span <= _DENSE and span <= _DENSE:
+        elif after > _NO_LENGTH and 0.0 < after_span <= _DENSE and span <= _DENSE:
             mean, mean_after = step / span, after / after_span
             speeds.append((mean * after_span + mean_after * span) / (span + after_span))
         else:

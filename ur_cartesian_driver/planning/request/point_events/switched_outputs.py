@@ -180,11 +180,11 @@ def _ahead(command: IOCommand, place: float, rest: GoalRest) -> IOCommand:
     """Return a command whose place is ahead, with its point in the resumed goal."""
     point, distance, fraction = command.waypoint, command.distance, command.fraction
     if rest.is_passed(point):
-        number, distance, fraction = rest.first, rest.way(rest.begin, place), 0.0
+        number, distance, fraction = rest.first, rest.distance(rest.begin, place), 0.0
     else:
         number = rest.index(point)
         if fraction < 0.0 and rest.begin > point:  # of a segment that is cut
-            distance, fraction = rest.way(point + 1.0, place), 0.0
+            distance, fraction = rest.distance(point + 1.0, place), 0.0
     return replace(command, waypoint=number, distance=round(distance, _DIGITS), fraction=fraction)
 
 

@@ -107,9 +107,6 @@ class TimedPath:
         self._point_times = point_times
         self._primitives, self._reference = segments.primitives, reference
         self.clock = PathClock(reference)
-        steps = np.diff(reference.poses[:, :3], axis=0)
-        #: (m,) way of the tool from the start to each sample [m].
-        self._ways = np.append(0.0, np.cumsum(np.linalg.norm(steps, axis=1)))
         self.ends: Floats = start_time + np.cumsum(segments.durations)
         self._blend_halves = np.zeros(len(segments)) if blend_halves is None else blend_halves
         self._returns: Floats = self.ends - self._blend_halves
@@ -153,26 +150,26 @@ class TimedPath:
         :raises InvalidGoal: the path does not lead there, or the robot program would read the
             record too late.
         """
-        here, clock = self._way_of(waypoint), self.clock
+        here, clock = self._arc_length_of(waypoint), self.clock
         name, value, where = 'distance', f'{distance:g} m', f'{1e3 * abs(distance):g} mm'
         if not distance:
-            length = self._way_of(waypoint + (1 if fraction > 0.0 else -1)) - here
+            length = self._arc_length_of(waypoint + (1 if fraction > 0.0 else -1)) - here
             distance = abs(fraction) * length
             name, value = 'fraction', f'{fraction:g} ({1e3 * distance:.3g} mm)'
             where = f'{100.0 * abs(fraction):g} % of the segment'
         side = 'before' if distance < 0.0 or fraction < 0.0 else 'after'
-        way, length = here + distance, clock.length
-        if not -_MIN_MOTION <= way <= length + _MIN_MOTION or not distance:
+        arc_length, length = here + distance, clock.length
+        if not -_MIN_MOTION <= arc_length <= length + _MIN_MOTION or not distance:
             left = here if side == 'before' else length - here
             raise InvalidGoal(
                 f'{field}.{name}',
                 f'is {value}, but the path {side} point {waypoint} is {1e3 * left:.4g} mm long',
                 'reduce it, or name another point',
             )
-        time = clock.time_at(way, leaving=distance < 0.0)
+        time = clock.time_at(arc_length, leaving=distance < 0.0)
         after = self.last_returned(time)
         if after < 0:
-            first = clock.way(float(self._returns[0])) - here
+            first = clock.arc_length(float(self._returns[0])) - here
             raise InvalidGoal(
                 f'{field}.{name}',
                 f'is {value}, but the robot program reads outputs only when its first motion has '
@@ -201,8 +198,8 @@ class TimedPath:
             'the place exact)'
         )
 
-    def _way_of(self, waypoint: int) -> float:
-        """Return the way from the start to a point [m]; 0 for a point before the first motion."""
+    def _arc_length_of(self, waypoint: int) -> float:
+        """Return the length of the path to a point [m]; 0 before the first motion."""
         if waypoint < 0:
             return 0.0
         if waypoint > max(self._rows):
@@ -210,7 +207,9 @@ class TimedPath:
         point = self.point(waypoint)
         if point is None:
             return 0.0
-        return self.clock.way(point.time if point.trigger_time is None else point.trigger_time)
+        return self.clock.arc_length(
+            point.time if point.trigger_time is None else point.trigger_time
+        )
 
     def _within(self, waypoint: int, time: float) -> PassedPoint:
         """Return how the tool passes a point at a time [s] within a motion."""
@@ -270,8 +269,8 @@ class TimedPath:
                 f'{max(time - begin, 0.0):.3f} s',
                 'reduce the lead, or move the place',
             )
-        way, speeds, turns = self.clock.motion_back(time, lead, LEAD_PIECES)
-        law = LeadLaw(lead=lead, way=way, speeds=tuple(speeds.tolist()), turns=turns)
+        distance, speeds, turns = self.clock.motion_back(time, lead, LEAD_PIECES)
+        law = LeadLaw(lead=lead, distance=distance, speeds=tuple(speeds.tolist()), turns=turns)
         return self.last_returned(time - lead), time - lead, law
 
     def last_returned(self, time: float) -> int:
