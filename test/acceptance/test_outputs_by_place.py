@@ -19,7 +19,7 @@ from robot_in_memory import RobotInMemory
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal, IOCommand, OutputKind, Segment, Waypoint
@@ -151,9 +151,11 @@ class PathTime:
         return speeds[max(k - 3, 0) : k + 2].min() < 0.2 * speeds.max()
 
 
-def misses(run, path_time, bound=1.0):
+def misses(run, path_time, bound=1.5):
     """
     Return by how many cycles each output was late or early, if by more than ``bound``.
+
+    An edge beside the cycle in which the output is due is at most one and a half away.
 
     Near a rest the speed tells little of the slider, and the tool makes little way: there the
     bound is wider.
@@ -287,6 +289,15 @@ def test_the_longest_lead_is_in_the_refusal():
     assert_in_time(seam(longest - 0.001), SLIDERS['full'])
 
 
+@pytest.mark.parametrize('place', [{'distance': -0.01}, {'fraction': 0.1}, {'lead': 0.1}])
+def test_goals_to_which_points_can_be_appended_have_neither(place):
+    def goal(home):
+        return zigzag(home, [command(1, 0, **place)], keep_open=True)
+
+    with pytest.raises(NotAvailable, match='a goal with keep_open switches outputs at its points'):
+        Run(RobotInMemory('ur5e'), goal)
+
+
 @pytest.mark.parametrize(
     ('place', 'field', 'text'),
     [
@@ -342,6 +353,6 @@ def test_random_places_and_leads():
         accepted += 1
         path_time = path_time_of(robot, by_kind(kind, commands, speed))
         # How long the controller takes in a blend is known less well.
-        bound = 2.0 if kind == 'blends' else 1.0
+        bound = 2.5 if kind == 'blends' else 1.5
         assert misses(run, path_time, bound) == {}, f'case {number}: {kind} at {speed:.3f} m/s'
     assert accepted > 0.3 * cases(500)

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind, SafeOutput
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.goal.output_names import output_fault, output_name
@@ -48,7 +47,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
             check_point(field, waypoint, goal)
         if goal.keep_open:
             for i, command in enumerate(goal.io_commands):
-                _check_open(f'{self.field}[{i}]', command, mode)
+                _check_open(f'{self.field}[{i}]', command)
 
     def check_event(self, where: str, command: IOCommand) -> None:
         """Refuse an output that the robot does not have, its value, or a place that is two."""
@@ -143,29 +142,20 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
         return point
 
 
-def _check_open(where: str, command: IOCommand, mode: ExecutionMode) -> None:
-    """Refuse places and leads that a goal to which points can be appended does not support."""
-    place = 'distance' if command.distance else 'fraction' if command.fraction else ''
-    if command.offset < 0.0:
-        raise NotAvailable(
-            f'{where}.offset',
-            f'is {command.offset:g} s, but a goal with keep_open has no leads: how fast the tool '
-            'gets to a place may depend on points that are yet to come',
-            'move the place by a distance, or send all points at once',
-        )
-    if place and mode is ExecutionMode.SPLINE:
-        raise NotAvailable(
-            f'{where}.{place}',
-            f'is {getattr(command, place):g}, but a SPLINE goal with keep_open switches outputs '
-            'at its points or later',
-            'add a point there, or send all points at once',
-        )
-    if place and command.offset > 0.0:
-        raise NotAvailable(
-            f'{where}.offset',
-            f'is {command.offset:g} s after a place beside a point, but the goal has keep_open',
-            f'increase {place}',
-        )
+def _check_open(where: str, command: IOCommand) -> None:
+    """Refuse places and leads in a goal to which points can be appended."""
+    for name, value in (
+        ('distance', command.distance),
+        ('fraction', command.fraction),
+        ('offset', min(command.offset, 0.0)),
+    ):
+        if value:
+            raise NotAvailable(
+                f'{where}.{name}',
+                f'is {value:g}, but a goal with keep_open switches outputs at its points or '
+                'later: points that are yet to come change the path and its times',
+                'add a point there, or send all points at once',
+            )
 
 
 def _place(command: IOCommand, rest: GoalRest) -> float:
