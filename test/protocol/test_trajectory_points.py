@@ -352,7 +352,7 @@ def words_with(**changes):
         words_with(w20=-1),
         words_with(w20=51),
         words_with(w20=51, w19=3),
-        words_with(w20=200, w12=6_000_000),
+        words_with(w20=200, w12=7_000_000),
         words_with(w20=3, w14=2_000_000),
         words_with(w20=3, w14=500_000),
     ],

@@ -14,10 +14,11 @@ from ur_cartesian_driver.motion.goal.output_names import output_fault, output_na
 from ur_cartesian_driver.motion.plan.primitive import SwitchOutput
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
-from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
+from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest, NO_FRACTION
 from ur_cartesian_driver.planning.request.point_events.output_event import OutputEvent
 from ur_cartesian_driver.planning.request.point_events.point_event import check_point
 from ur_cartesian_driver.planning.request.point_events.timed_path import (
+    PassedPoint,
     PlacedOutput,
     SAME_TIME,
     TimedPath,
@@ -44,24 +45,43 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
             )
         for field, waypoint in self.places(goal):
             check_point(field, waypoint, goal)
+        if goal.keep_open:
+            for i, command in enumerate(goal.io_commands):
+                _check_open(f'{self.field}[{i}]', command)
 
     def check_event(self, where: str, command: IOCommand) -> None:
-        """Refuse an output that the robot does not have, or a value that it does not accept."""
+        """Refuse an output that the robot does not have, its value, or a place that is two."""
         check_output(where, command)
+        if command.distance and command.fraction:
+            raise InvalidGoal(
+                f'{where}.fraction',
+                f'is {command.fraction:g}, but distance = {command.distance:g} m gives the place '
+                'already',
+                'leave one of them out',
+            )
 
     def left(self, events: Sequence[IOCommand], rest: GoalRest) -> Sequence[IOCommand]:
         """Return commands that restore the outputs at the resumption, and the commands ahead."""
         state: dict[tuple[int, int], IOCommand] = {}
         left = []
-        for i, command in sorted(
-            enumerate(events), key=lambda each: (each[1].waypoint, each[1].offset)
+        places = [_place(command, rest) for command in events]
+        for place, _, i in sorted(
+            (place, command.offset, i)
+            for i, (place, command) in enumerate(zip(places, events, strict=True))
         ):
-            if not rest.is_passed(command.waypoint):
-                left.append(replace(command, waypoint=rest.index(command.waypoint)))
+            command = events[i]
+            if place > rest.begin + NO_FRACTION:
+                left.append(_ahead(command, place, rest))
                 continue
             field, offset = f'io_commands[{i}].offset', command.offset
             due = offset - rest.time_since(command.waypoint, field, offset)
-            command = replace(command, waypoint=rest.first, offset=max(round(due, _DIGITS), 0.0))
+            command = replace(
+                command,
+                waypoint=rest.first,
+                offset=max(round(due, _DIGITS), 0.0),
+                distance=0.0,
+                fraction=0.0,
+            )
             if due > 0.0:
                 left.append(command)
             else:
@@ -70,19 +90,18 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
 
     def place(self, command: IOCommand, field: str, path: TimedPath) -> list[PlacedOutput]:
         """Return the record that switches the output, with its time and place."""
-        point = path.point(command.waypoint)
-        if point is None:
-            raise InvalidGoal(
-                f'{field}.point_index',
-                f'is {command.waypoint}, but no motion leads there: the robot is already there',
-                'switch the output before the goal',
-            )
-        time, last = point.time + command.offset, len(path.ends) - 1
-        late, delay, trigger_time = time - float(path.ends[last]), 0.0, None
+        point, lead = self._passed(command, field, path), max(-command.offset, 0.0)
+        time, last = point.time + max(command.offset, 0.0), len(path.ends) - 1
+        late, delay, trigger_time, law = time - float(path.ends[last]), 0.0, None, None
         rest = path.rests.get(command.waypoint)
-        if command.offset <= SAME_TIME:
+        has_place = bool(command.distance or command.fraction)
+        if lead > 0.0:
+            time = point.time if point.trigger_time is None else point.trigger_time
+            after, trigger_time, law = path.ahead(time, lead, f'{field}.offset')
+            where = f'{lead:.3f} s ahead, {point.where}'
+        elif command.offset <= SAME_TIME:
             after, trigger_time, where = point.after, point.trigger_time, point.where
-        elif rest is not None and time <= path.ends[rest]:
+        elif rest is not None and time <= path.ends[rest] and not has_place:
             after, delay = rest - 1, command.offset
             where = f'{command.offset:.3f} s after stopping there'
         elif late > -SAME_TIME:
@@ -90,7 +109,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
             where = f'{delay:.3f} s after the end'
         else:
             after, trigger_time = path.last_returned(time), time
-            where = f'{command.offset:.3f} s after it'
+            where = f'{command.offset:.3f} s after {point.where if has_place else "it"}'
         record = SwitchOutput(
             output=command.output,
             pin=command.pin,
@@ -100,13 +119,63 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
         )
         return [
             PlacedOutput(
+                lead=lead,
                 time=time if trigger_time is None else trigger_time,
                 after_index=after,
                 report_index=point.row,
-                records=(path.triggered(record, trigger_time, after),),
+                records=(*filter(None, (law,)), path.triggered(record, trigger_time, after)),
                 text=f'switches {describe_command(command)} {where}',
             )
         ]
+
+    def _passed(self, command: IOCommand, field: str, path: TimedPath) -> PassedPoint:
+        """Return how the tool passes the place of a command."""
+        if command.distance or command.fraction:
+            return path.beside(command.waypoint, command.distance, command.fraction, field)
+        point = path.point(command.waypoint)
+        if point is None:
+            raise InvalidGoal(
+                f'{field}.point_index',
+                f'is {command.waypoint}, but no motion leads there: the robot is already there',
+                'switch the output before the goal',
+            )
+        return point
+
+
+def _check_open(where: str, command: IOCommand) -> None:
+    """Refuse places and leads in a goal to which points can be appended."""
+    for name, value in (
+        ('distance', command.distance),
+        ('fraction', command.fraction),
+        ('offset', min(command.offset, 0.0)),
+    ):
+        if value:
+            raise NotAvailable(
+                f'{where}.{name}',
+                f'is {value:g}, but a goal with keep_open switches outputs at its points or '
+                'later: points that are yet to come change the path and its times',
+                'add a point there, or send all points at once',
+            )
+
+
+def _place(command: IOCommand, rest: GoalRest) -> float:
+    """Return the place of a command on the path of the goal that was stopped."""
+    point = command.waypoint + 1.0
+    if command.distance:
+        return rest.behind(point, command.distance)
+    return point + command.fraction
+
+
+def _ahead(command: IOCommand, place: float, rest: GoalRest) -> IOCommand:
+    """Return a command whose place is ahead, with its point in the resumed goal."""
+    point, distance, fraction = command.waypoint, command.distance, command.fraction
+    if rest.is_passed(point):
+        number, distance, fraction = rest.first, rest.distance(rest.begin, place), 0.0
+    else:
+        number = rest.index(point)
+        if fraction < 0.0 and rest.begin > point:  # of a segment that is cut
+            distance, fraction = rest.distance(point + 1.0, place), 0.0
+    return replace(command, waypoint=number, distance=round(distance, _DIGITS), fraction=fraction)
 
 
 def check_output(where: str, named: IOCommand | SafeOutput) -> None:

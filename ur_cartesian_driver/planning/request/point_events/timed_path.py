@@ -8,6 +8,10 @@ motion's stop, or where its blend begins), and switches the output when the tool
 trigger pose. So the time of a command (the time of its point plus its offset) becomes a trigger
 pose on the planned path, and the record is sent after the last motion that has returned by then. A
 robot that runs slower than planned switches at the same poses.
+
+Between two samples of the path the tool moves at constant acceleration, because the planner places
+a sample wherever the acceleration changes. So the speeds at the samples follow from their times
+and distances, and with them the place at each time.
 """
 
 from __future__ import annotations
@@ -16,17 +20,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.arrays import Floats
-from ur_cartesian_driver.motion.geometry.pose import conjugate, Pose, pose_from_row, rotate
+from ur_cartesian_driver.motion.geometry.pose import conjugate, Pose, rotate
 from ur_cartesian_driver.motion.geometry.vectors import subtract, Vector6
 from ur_cartesian_driver.motion.plan.plan import PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import (
+    LEAD_PIECES,
+    LeadLaw,
     OutputRecord,
     Spline,
     Stop,
     SwitchOutput,
     Wait,
 )
+from ur_cartesian_driver.planning.request.point_events.path_clock import PathClock
 
 #: Times that differ by at most this [s] are the same.
 SAME_TIME = 1e-6
@@ -47,7 +55,7 @@ _BEYOND = 1e-4
 class PlacedOutput:
     """The records of one output, with their place in the plan."""
 
-    #: When the output is switched [s].
+    #: When the output is switched at full speed [s].
     time: float
     #: The row of the segment after which the records are sent.
     after_index: int
@@ -55,6 +63,8 @@ class PlacedOutput:
     report_index: int
     records: tuple[OutputRecord, ...]
     text: str
+    #: How much later the tool is at the place of the output, at full speed [s].
+    lead: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,6 +106,7 @@ class TimedPath:
         """
         self._point_times = point_times
         self._primitives, self._reference = segments.primitives, reference
+        self.clock = PathClock(reference)
         self.ends: Floats = start_time + np.cumsum(segments.durations)
         self._blend_halves = np.zeros(len(segments)) if blend_halves is None else blend_halves
         self._returns: Floats = self.ends - self._blend_halves
@@ -105,6 +116,7 @@ class TimedPath:
             for k in np.flatnonzero(still).tolist()
             if isinstance(segments.primitives[k], Stop)
         }
+        self._stops, self._begins = list(stops), self.ends - segments.durations
         #: Rows of the waits, by waypoint.
         self.rests = {
             int(segments.waypoints[k]): k for k, stop in stops.items() if isinstance(stop, Wait)
@@ -128,6 +140,77 @@ class TimedPath:
             where=self._where(row),
         )
 
+    def beside(self, waypoint: int, distance: float, fraction: float, field: str) -> PassedPoint:
+        """
+        Return how the tool passes a place beside a point.
+
+        :param distance: way along the path from the point to the place [m], negative before it;
+            0 = ``fraction`` of the length of the segment before or after the point instead.
+        :param field: name of the event in a refusal.
+        :raises InvalidGoal: the path does not lead there, or the robot program would read the
+            record too late.
+        """
+        here, clock = self._arc_length_of(waypoint), self.clock
+        name, value, where = 'distance', f'{distance:g} m', f'{1e3 * abs(distance):g} mm'
+        if not distance:
+            length = self._arc_length_of(waypoint + (1 if fraction > 0.0 else -1)) - here
+            distance = abs(fraction) * length
+            name, value = 'fraction', f'{fraction:g} ({1e3 * distance:.3g} mm)'
+            where = f'{100.0 * abs(fraction):g} % of the segment'
+        side = 'before' if distance < 0.0 or fraction < 0.0 else 'after'
+        arc_length, length = here + distance, clock.length
+        if not -_MIN_MOTION <= arc_length <= length + _MIN_MOTION or not distance:
+            left = here if side == 'before' else length - here
+            raise InvalidGoal(
+                f'{field}.{name}',
+                f'is {value}, but the path {side} point {waypoint} is {1e3 * left:.4g} mm long',
+                'reduce it, or name another point',
+            )
+        time = clock.time_at(arc_length, leaving=distance < 0.0)
+        after = self.last_returned(time)
+        if after < 0:
+            first = clock.arc_length(float(self._returns[0])) - here
+            raise InvalidGoal(
+                f'{field}.{name}',
+                f'is {value}, but the robot program reads outputs only when its first motion has '
+                f'returned, {1e3 * abs(first):.4g} mm {"before" if first < 0.0 else "after"} '
+                f'point {waypoint}',
+                'name a place after that, or add a point before it',
+            )
+        return PassedPoint(
+            row=min(int(np.searchsorted(self.ends, time)), len(self.ends) - 1),
+            after=after,
+            time=time,
+            trigger_time=time,
+            where=f'{where} {side} it{self._doubt(time)}',
+        )
+
+    def _doubt(self, time: float) -> str:
+        """Return a clause about a place in a blend, of whose shape only a bound is known."""
+        k = min(
+            max(int(np.searchsorted(self._reference.time, time)), 1), len(self._reference.time)
+        )
+        bound = float(self._reference.blend_tolerance[k - 1 : k + 1, 0].max(initial=0.0))
+        if bound <= 0.0:
+            return ''
+        return (
+            f', in a blend whose shape is known to {1e3 * bound:.2g} mm (corner_deviation makes '
+            'the place exact)'
+        )
+
+    def _arc_length_of(self, waypoint: int) -> float:
+        """Return the length of the path to a point [m]; 0 before the first motion."""
+        if waypoint < 0:
+            return 0.0
+        if waypoint > max(self._rows):
+            return self.clock.length
+        point = self.point(waypoint)
+        if point is None:
+            return 0.0
+        return self.clock.arc_length(
+            point.time if point.trigger_time is None else point.trigger_time
+        )
+
     def _within(self, waypoint: int, time: float) -> PassedPoint:
         """Return how the tool passes a point at a time [s] within a motion."""
         after = self.last_returned(time)
@@ -147,7 +230,7 @@ class TimedPath:
         """
         if time is None or (direction := self._trigger_direction(time)) is None:
             return record
-        pose, read = self._pose(time), self._pose(float(self._returns[after]))
+        pose, read = self.clock.pose(time), self.clock.pose(float(self._returns[after]))
         start = (pose.inverse() @ read).rotation_vector()
         beyond = sum(a * b for a, b in zip(start, direction, strict=True))
         return replace(
@@ -156,6 +239,39 @@ class TimedPath:
             trigger_direction=direction,
             starts_beyond=beyond > _BEYOND,
         )
+
+    def ahead(self, time: float, lead: float, field: str) -> tuple[int, float, LeadLaw]:
+        """
+        Return the row after which a record with a lead is read, its trigger time [s], and its law.
+
+        The output is triggered where the lead is due at full speed; a slower tool switches later.
+
+        :param time: when the tool is at the place of the record [s].
+        :param lead: how much ahead of that the output switches, in real time [s].
+        :raises InvalidGoal: the lead reaches back to before the record can be read, or over a
+            rest; the text gives the longest possible lead.
+        """
+        rests = [
+            float(self.ends[k])
+            for k in self._stops
+            if time - lead < self.ends[k] - SAME_TIME and self._begins[k] + SAME_TIME < time
+        ]
+        begin = max([float(self._returns[0]), *rests])
+        if time - lead < begin - SAME_TIME:
+            why = (
+                'the arm rests before that'
+                if rests
+                else 'the robot program has not read the record by then'
+            )
+            raise InvalidGoal(
+                field,
+                f'is {-lead:g} s, but {why}: the longest lead here is '
+                f'{max(time - begin, 0.0):.3f} s',
+                'reduce the lead, or move the place',
+            )
+        distance, speeds, turns = self.clock.motion_back(time, lead, LEAD_PIECES)
+        law = LeadLaw(lead=lead, distance=distance, speeds=tuple(speeds.tolist()), turns=turns)
+        return self.last_returned(time - lead), time - lead, law
 
     def last_returned(self, time: float) -> int:
         """Return the index of the last motion that has returned by a time [s]; -1 = none."""
@@ -199,18 +315,11 @@ class TimedPath:
         k = int(np.argmin(np.linalg.norm(points[:-1] + u[:, None] * chords - position, axis=1)))
         return float(np.clip(t[k] + u[k] * (t[k + 1] - t[k]), begin, end))
 
-    def _pose(self, time: float) -> Pose:
-        times, rows = self._reference.time, self._reference.poses
-        k = min(max(int(np.searchsorted(times, time)), 1), len(times) - 1)
-        before, span = float(times[k - 1]), float(times[k] - times[k - 1])
-        part = min(max((time - before) / span, 0.0), 1.0) if span > 0.0 else 1.0
-        return pose_from_row(rows[k - 1]).interpolate(pose_from_row(rows[k]), part)
-
     def _trigger_direction(self, time: float) -> Vector6 | None:
         """Return the path's direction at a time; None if the tool rests or turns back there."""
-        pose, half = self._pose(time), _DIRECTION_TIME
+        pose, half = self.clock.pose(time), _DIRECTION_TIME
         while half <= _MAX_DIRECTION_TIME:
-            a, b = self._pose(time - half), self._pose(time + half)
+            a, b = self.clock.pose(time - half), self.clock.pose(time + half)
             distance, angle = a.distance_to(b), a.angle_to(b)
             if distance < _TURNS_BACK * (a.distance_to(pose) + pose.distance_to(b)):
                 return None
