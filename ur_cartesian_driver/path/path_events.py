@@ -41,7 +41,13 @@ class PathWithEvents(PathOfMotions):
     """A path whose points have events; see :class:`~.path_builder.Path`."""
 
     def set(
-        self, output: Output, value: float, *, after: float = 0.0, before: float = 0.0
+        self,
+        output: Output,
+        value: float,
+        *,
+        after: float = 0.0,
+        before: float = 0.0,
+        lead: str = '',
     ) -> Self:
         """
         Set an output when the tool passes the last point.
@@ -49,6 +55,8 @@ class PathWithEvents(PathOfMotions):
         :param value: True or False for a digital output, fraction of the range for an analog one.
         :param after: time after the point [s].
         :param before: time before the point [s]; only if the motion to it has a duration.
+        :param lead: name of a valve in the driver's ``lead_file``; the output switches earlier by
+            its dead time.
         :raises InvalidGoal: there is no point, or the value or a time is not possible.
         """
         if not self._points:
@@ -67,7 +75,7 @@ class PathWithEvents(PathOfMotions):
                     'add a point where the output is to change',
                 )
             offset += self._points[index].segment.dwell
-        command = output.command(value, 0, round(offset * NANOSECONDS) / NANOSECONDS)
+        command = output.command(value, 0, round(offset * NANOSECONDS) / NANOSECONDS, lead)
         point = self._points[index]
         return self._with_point(index, replace(point, events=(*point.events, command)))
 

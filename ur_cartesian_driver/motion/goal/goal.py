@@ -304,6 +304,8 @@ class IOCommand:
     value: float
     #: Whether an analog output carries a current or a voltage.
     domain: Annotated[AnalogDomain, DOMAIN] = AnalogDomain.CURRENT
+    #: Name of a lead: the command comes earlier by its dead time, see ``lead_file``; '' = none.
+    lead: Annotated[str, Sent(after='offset')] = ''
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
