@@ -30,7 +30,7 @@ class Output:
         """Refuse a pin that the robot does not have."""
         self._check(0.0)
 
-    def command(self, value: float, waypoint: int, offset: float, lead: str = '') -> IOCommand:
+    def command(self, value: float, waypoint: int, offset: float) -> IOCommand:
         """
         Return the command that sets the output at a waypoint.
 
@@ -43,7 +43,6 @@ class Output:
             pin=self.pin,
             value=self._check(value),
             domain=self.domain,
-            lead=lead,
         )
 
     def safe(self, value: float, restore: bool) -> SafeOutput:

@@ -13,6 +13,8 @@ from ur_cartesian_driver.motion.geometry.vectors import ZERO6
 from ur_cartesian_driver.motion.goal.goal import (
     ContactEnd,
     InputWait,
+    MAX_OUTPUT_LEAD,
+    MAX_OUTPUT_OFFSET,
     MAX_STOP_TIME,
     OutputKind,
     PayloadChange,
@@ -47,27 +49,41 @@ class PathWithEvents(PathOfMotions):
         *,
         after: float = 0.0,
         before: float = 0.0,
-        lead: str = '',
+        distance: float = 0.0,
+        fraction: float = 0.0,
+        lead: float | str = 0.0,
     ) -> Self:
         """
-        Set an output when the tool passes the last point.
+        Set an output when the tool passes the last point, or a place before or after it.
 
         :param value: True or False for a digital output, fraction of the range for an analog one.
-        :param after: time after the point [s].
+        :param after: time after the place [s].
         :param before: time before the point [s]; only if the motion to it has a duration.
-        :param lead: name of a valve in the driver's ``lead_file``; the output switches earlier by
-            its dead time.
-        :raises InvalidGoal: there is no point, or the value or a time is not possible.
+        :param distance: way along the path from the point to the place [m]; negative = before it.
+        :param fraction: the same as a fraction of the segment to the point (negative), or of the
+            segment that follows (positive).
+        :param lead: how much ahead of the place to switch, in real time [s]: the dead time of a
+            valve, or the name of the valve in the driver's ``lead_file``.
+        :raises InvalidGoal: there is no point, or the value, a time or the place is not possible.
         """
         if not self._points:
             raise InvalidGoal('set()', 'comes before the first point', 'add a motion first')
         index, offset = len(self) - 1, after
         where = f'set() at point {index}'
-        for name, time in (('after', after), ('before', before)):
-            amount(where, name, time, 60.0, 's')
+        valve, ahead = (lead, 0.0) if isinstance(lead, str) else ('', lead)
+        for name, time, most in (
+            ('after', after, MAX_OUTPUT_OFFSET),
+            ('before', before, MAX_OUTPUT_OFFSET),
+            ('lead', ahead, MAX_OUTPUT_LEAD),
+        ):
+            amount(where, name, time, most, 's')
+        if lead and (after or before):
+            raise InvalidGoal(
+                where, f'has lead={lead!r} and another time', 'move the place by a distance'
+            )
         if before:
             index, offset = index - 1, self._points[-1].duration / NANOSECONDS - before
-            if not self._points[-1].duration or offset < 0.0 or index < 0 or after:
+            if not self._points[-1].duration or offset < 0.0 or index < 0 or after or distance:
                 raise InvalidGoal(
                     where,
                     f'has before={before:g} s, but no motion with a duration of that time leads '
@@ -75,7 +91,13 @@ class PathWithEvents(PathOfMotions):
                     'add a point where the output is to change',
                 )
             offset += self._points[index].segment.dwell
-        command = output.command(value, 0, round(offset * NANOSECONDS) / NANOSECONDS, lead)
+        command = replace(
+            output.command(value, 0, round((offset - ahead) * NANOSECONDS) / NANOSECONDS),
+            distance=float(distance),
+            fraction=float(fraction),
+            lead=valve,
+        )
+        check_event(where, command)
         point = self._points[index]
         return self._with_point(index, replace(point, events=(*point.events, command)))
 

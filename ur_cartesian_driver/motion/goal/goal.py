@@ -166,12 +166,17 @@ DEFAULT_CORNER_ANGLE = 0.02
 MAX_STOP_TIME = 600.0
 #: The longest time between a point and an output that it switches [s].
 MAX_OUTPUT_OFFSET = 60.0
+#: The longest time by which an output is switched ahead of its place [s].
+MAX_OUTPUT_LEAD = 1.0
+#: The longest way between a point and the place where an output is switched [m].
+MAX_OUTPUT_DISTANCE = 10.0
 
 FINITE, NOT_NEGATIVE = Range(), Range(0.0)
 FRACTION, SMALL_LEAD = Range(0.0, 1.0), Range(0.0, 10.0)
 #: In a spline, NaN lets the driver choose the number.
 RATE = Range(nan_in_splines=True)
 TIMEOUT = Range(0.0, MAX_STOP_TIME, 's', above=True)
+DISTANCE = Range(-MAX_OUTPUT_DISTANCE, MAX_OUTPUT_DISTANCE, 'm', 'name another point')
 CORNER_DEVIATION = Range(2e-5, 0.1, 'm', zero='corners as they are')
 CORNER_ANGLE = Range(1e-3, 0.5, 'rad', zero=f'{DEFAULT_CORNER_ANGLE:g} rad')
 
@@ -289,14 +294,19 @@ class SegmentColumns:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IOCommand:
-    """Switch an output when the tool passes a waypoint."""
+    """
+    Switch an output when the tool passes a place: a waypoint, or a place beside it on the path.
+
+    ``distance`` or ``fraction`` move the place away from the waypoint, ``offset`` moves the time.
+    """
 
     waypoint: Annotated[int, POINT]
-    #: Time after the waypoint [s].
+    #: Time after the place, in the controller's scaled time [s]. If negative, a lead: the output
+    #: switches that much ahead of the place, in real time.
     offset: Annotated[
         float,
         Sent(form=Form.DURATION, always=False, after='domain'),
-        Range(0.0, MAX_OUTPUT_OFFSET, 's', 'name another point'),
+        Range(-MAX_OUTPUT_LEAD, MAX_OUTPUT_OFFSET, 's', 'name another point'),
     ]
     output: OutputKind
     pin: int
@@ -304,8 +314,13 @@ class IOCommand:
     value: float
     #: Whether an analog output carries a current or a voltage.
     domain: Annotated[AnalogDomain, DOMAIN] = AnalogDomain.CURRENT
+    #: Way along the path from the waypoint to the place [m]; negative = before the waypoint.
+    distance: Annotated[float, DISTANCE] = 0.0
+    #: The same as a fraction of a segment's length: of the one that ends at the waypoint if
+    #: negative, of the one that begins there if positive.
+    fraction: Annotated[float, Range(-1.0, 1.0)] = 0.0
     #: Name of a lead: the command comes earlier by its dead time, see ``lead_file``; '' = none.
-    lead: Annotated[str, Sent(after='offset')] = ''
+    lead: str = ''
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

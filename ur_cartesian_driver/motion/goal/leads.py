@@ -9,11 +9,8 @@ from dataclasses import dataclass, replace
 from math import isfinite
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind
+from ur_cartesian_driver.motion.goal.goal import IOCommand, MAX_OUTPUT_LEAD, OutputKind
 from ur_cartesian_driver.motion.goal.output_names import output_fault, output_name
-
-#: Longest dead time of a valve [s]; a longer one must be in milliseconds.
-MAX_DEAD_TIME = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,10 +36,10 @@ class Lead:
         if not self.name:
             raise ValueError('the name is empty; give one, such as valve_1')
         for field, time in (('open', self.open), ('close', self.close)):
-            if not isfinite(time) or not 0.0 <= time <= MAX_DEAD_TIME:
+            if not isfinite(time) or not 0.0 <= time <= MAX_OUTPUT_LEAD:
                 raise ValueError(
                     f'{field} of {self.name!r} is {time:g} s, but a dead time is from 0 to '
-                    f'{MAX_DEAD_TIME:g} s; give the measured one in seconds'
+                    f'{MAX_OUTPUT_LEAD:g} s; give the measured one in seconds'
                 )
         if (fault := output_fault(self.output, self.pin, 0.0)) is not None:
             raise ValueError(f'the {fault[0]} of {self.name!r} {fault[1]}; {fault[2]}')

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind, SafeOutput
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.goal.output_names import output_fault, output_name
@@ -18,6 +19,7 @@ from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
 from ur_cartesian_driver.planning.request.point_events.output_event import OutputEvent
 from ur_cartesian_driver.planning.request.point_events.point_event import check_point
 from ur_cartesian_driver.planning.request.point_events.timed_path import (
+    PassedPoint,
     PlacedOutput,
     SAME_TIME,
     TimedPath,
@@ -44,10 +46,28 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
             )
         for field, waypoint in self.places(goal):
             check_point(field, waypoint, goal)
+        if goal.keep_open and mode is ExecutionMode.SPLINE:
+            for i, command in enumerate(goal.io_commands):
+                for name in ('distance', 'fraction', 'offset'):
+                    value = getattr(command, name)
+                    if value < 0.0 or (value > 0.0 and name != 'offset'):
+                        raise NotAvailable(
+                            f'{self.field}[{i}].{name}',
+                            f'is {value:g}, but a SPLINE goal with keep_open switches outputs at '
+                            'its points or later',
+                            'add a point there, or send all points at once',
+                        )
 
     def check_event(self, where: str, command: IOCommand) -> None:
-        """Refuse an output that the robot does not have, or a value that it does not accept."""
+        """Refuse an output that the robot does not have, its value, or a place that is two."""
         check_output(where, command)
+        if command.distance and command.fraction:
+            raise InvalidGoal(
+                f'{where}.fraction',
+                f'is {command.fraction:g}, but distance = {command.distance:g} m gives the place '
+                'already',
+                'leave one of them out',
+            )
 
     def left(self, events: Sequence[IOCommand], rest: GoalRest) -> Sequence[IOCommand]:
         """Return commands that restore the outputs at the resumption, and the commands ahead."""
@@ -70,19 +90,18 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
 
     def place(self, command: IOCommand, field: str, path: TimedPath) -> list[PlacedOutput]:
         """Return the record that switches the output, with its time and place."""
-        point = path.point(command.waypoint)
-        if point is None:
-            raise InvalidGoal(
-                f'{field}.point_index',
-                f'is {command.waypoint}, but no motion leads there: the robot is already there',
-                'switch the output before the goal',
-            )
-        time, last = point.time + command.offset, len(path.ends) - 1
+        point, lead = self._passed(command, field, path), max(-command.offset, 0.0)
+        time, last = point.time + max(command.offset, 0.0), len(path.ends) - 1
         late, delay, trigger_time = time - float(path.ends[last]), 0.0, None
         rest = path.rests.get(command.waypoint)
-        if command.offset <= SAME_TIME:
+        has_place = bool(command.distance or command.fraction)
+        if lead > 0.0:
+            time = point.time if point.trigger_time is None else point.trigger_time
+            after, trigger_time = path.ahead(time, lead, f'{field}.offset')
+            where = f'{lead:.3f} s ahead, {point.where}'
+        elif command.offset <= SAME_TIME:
             after, trigger_time, where = point.after, point.trigger_time, point.where
-        elif rest is not None and time <= path.ends[rest]:
+        elif rest is not None and time <= path.ends[rest] and not has_place:
             after, delay = rest - 1, command.offset
             where = f'{command.offset:.3f} s after stopping there'
         elif late > -SAME_TIME:
@@ -90,7 +109,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
             where = f'{delay:.3f} s after the end'
         else:
             after, trigger_time = path.last_returned(time), time
-            where = f'{command.offset:.3f} s after it'
+            where = f'{command.offset:.3f} s after {point.where if has_place else "it"}'
         record = SwitchOutput(
             output=command.output,
             pin=command.pin,
@@ -107,6 +126,19 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
                 text=f'switches {describe_command(command)} {where}',
             )
         ]
+
+    def _passed(self, command: IOCommand, field: str, path: TimedPath) -> PassedPoint:
+        """Return how the tool passes the place of a command."""
+        if command.distance or command.fraction:
+            return path.beside(command.waypoint, command.distance, command.fraction, field)
+        point = path.point(command.waypoint)
+        if point is None:
+            raise InvalidGoal(
+                f'{field}.point_index',
+                f'is {command.waypoint}, but no motion leads there: the robot is already there',
+                'switch the output before the goal',
+            )
+        return point
 
 
 def check_output(where: str, named: IOCommand | SafeOutput) -> None:

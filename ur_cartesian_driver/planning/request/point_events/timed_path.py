@@ -8,6 +8,10 @@ motion's stop, or where its blend begins), and switches the output when the tool
 trigger pose. So the time of a command (the time of its point plus its offset) becomes a trigger
 pose on the planned path, and the record is sent after the last motion that has returned by then. A
 robot that runs slower than planned switches at the same poses.
+
+Between two samples of the path the tool moves at constant acceleration, because the planner places
+a sample wherever the acceleration changes. So the speeds at the samples follow from their times
+and distances, and with them the place at each time.
 """
 
 from __future__ import annotations
@@ -16,8 +20,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.arrays import Floats
-from ur_cartesian_driver.motion.geometry.pose import conjugate, Pose, pose_from_row, rotate
+from ur_cartesian_driver.motion.geometry.pose import conjugate, Pose, rotate
 from ur_cartesian_driver.motion.geometry.vectors import subtract, Vector6
 from ur_cartesian_driver.motion.plan.plan import PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import (
@@ -27,6 +32,7 @@ from ur_cartesian_driver.motion.plan.primitive import (
     SwitchOutput,
     Wait,
 )
+from ur_cartesian_driver.planning.request.point_events.path_clock import PathClock
 
 #: Times that differ by at most this [s] are the same.
 SAME_TIME = 1e-6
@@ -96,6 +102,10 @@ class TimedPath:
         """
         self._point_times = point_times
         self._primitives, self._reference = segments.primitives, reference
+        self.clock = PathClock(reference)
+        steps = np.diff(reference.poses[:, :3], axis=0)
+        #: (m,) way of the tool from the start to each sample [m].
+        self._ways = np.append(0.0, np.cumsum(np.linalg.norm(steps, axis=1)))
         self.ends: Floats = start_time + np.cumsum(segments.durations)
         self._blend_halves = np.zeros(len(segments)) if blend_halves is None else blend_halves
         self._returns: Floats = self.ends - self._blend_halves
@@ -105,6 +115,7 @@ class TimedPath:
             for k in np.flatnonzero(still).tolist()
             if isinstance(segments.primitives[k], Stop)
         }
+        self._stops, self._begins = list(stops), self.ends - segments.durations
         #: Rows of the waits, by waypoint.
         self.rests = {
             int(segments.waypoints[k]): k for k, stop in stops.items() if isinstance(stop, Wait)
@@ -128,6 +139,62 @@ class TimedPath:
             where=self._where(row),
         )
 
+    def beside(self, waypoint: int, distance: float, fraction: float, field: str) -> PassedPoint:
+        """
+        Return how the tool passes a place beside a point.
+
+        :param distance: way along the path from the point to the place [m], negative before it;
+            0 = ``fraction`` of the length of the segment before or after the point instead.
+        :param field: name of the event in a refusal.
+        :raises InvalidGoal: the path does not lead there, or the robot program would read the
+            record too late.
+        """
+        here, clock = self._way_of(waypoint), self.clock
+        name, value, where = 'distance', f'{distance:g} m', f'{1e3 * abs(distance):g} mm'
+        if not distance:
+            length = self._way_of(waypoint + (1 if fraction > 0.0 else -1)) - here
+            distance = abs(fraction) * length
+            name, value = 'fraction', f'{fraction:g} ({1e3 * distance:.3g} mm)'
+            where = f'{100.0 * abs(fraction):g} % of the segment'
+        side = 'before' if distance < 0.0 or fraction < 0.0 else 'after'
+        way, length = here + distance, clock.length
+        if not -_MIN_MOTION <= way <= length + _MIN_MOTION or not distance:
+            left = here if side == 'before' else length - here
+            raise InvalidGoal(
+                f'{field}.{name}',
+                f'is {value}, but the path {side} point {waypoint} is {1e3 * left:.4g} mm long',
+                'reduce it, or name another point',
+            )
+        time = clock.time_at(way, leaving=distance < 0.0)
+        after = self.last_returned(time)
+        if after < 0:
+            first = clock.way(float(self._returns[0])) - here
+            raise InvalidGoal(
+                f'{field}.{name}',
+                f'is {value}, but the robot program reads outputs only when its first motion has '
+                f'returned, {1e3 * abs(first):.4g} mm {"before" if first < 0.0 else "after"} '
+                f'point {waypoint}',
+                'name a place after that, or add a point before it',
+            )
+        return PassedPoint(
+            row=min(int(np.searchsorted(self.ends, time)), len(self.ends) - 1),
+            after=after,
+            time=time,
+            trigger_time=time,
+            where=f'{where} {side} it',
+        )
+
+    def _way_of(self, waypoint: int) -> float:
+        """Return the way from the start to a point [m]; 0 for a point before the first motion."""
+        if waypoint < 0:
+            return 0.0
+        if waypoint > max(self._rows):
+            return self.clock.length
+        point = self.point(waypoint)
+        if point is None:
+            return 0.0
+        return self.clock.way(point.time if point.trigger_time is None else point.trigger_time)
+
     def _within(self, waypoint: int, time: float) -> PassedPoint:
         """Return how the tool passes a point at a time [s] within a motion."""
         after = self.last_returned(time)
@@ -147,7 +214,7 @@ class TimedPath:
         """
         if time is None or (direction := self._trigger_direction(time)) is None:
             return record
-        pose, read = self._pose(time), self._pose(float(self._returns[after]))
+        pose, read = self.clock.pose(time), self.clock.pose(float(self._returns[after]))
         start = (pose.inverse() @ read).rotation_vector()
         beyond = sum(a * b for a, b in zip(start, direction, strict=True))
         return replace(
@@ -156,6 +223,36 @@ class TimedPath:
             trigger_direction=direction,
             starts_beyond=beyond > _BEYOND,
         )
+
+    def ahead(self, time: float, lead: float, field: str) -> tuple[int, float]:
+        """
+        Return the row of the motion after which a record is read, and when it may be due at first.
+
+        :param time: when the tool is at the place of the record [s].
+        :param lead: how much ahead of that the output switches, in real time [s]. At full speed it
+            is this much in the time of the path, too; else less.
+        :raises InvalidGoal: the lead reaches back to before the record can be read, or over a
+            rest; the text gives the longest possible lead.
+        """
+        rests = [
+            float(self.ends[k])
+            for k in self._stops
+            if time - lead < self.ends[k] - SAME_TIME and self._begins[k] + SAME_TIME < time
+        ]
+        begin = max([float(self._returns[0]), *rests])
+        if time - lead < begin - SAME_TIME:
+            why = (
+                'the arm rests before that'
+                if rests
+                else 'the robot program has not read the record by then'
+            )
+            raise InvalidGoal(
+                field,
+                f'is {-lead:g} s, but {why}: the longest lead here is '
+                f'{max(time - begin, 0.0):.3f} s',
+                'reduce the lead, or move the place',
+            )
+        return self.last_returned(time - lead), time - lead
 
     def last_returned(self, time: float) -> int:
         """Return the index of the last motion that has returned by a time [s]; -1 = none."""
@@ -199,18 +296,11 @@ class TimedPath:
         k = int(np.argmin(np.linalg.norm(points[:-1] + u[:, None] * chords - position, axis=1)))
         return float(np.clip(t[k] + u[k] * (t[k + 1] - t[k]), begin, end))
 
-    def _pose(self, time: float) -> Pose:
-        times, rows = self._reference.time, self._reference.poses
-        k = min(max(int(np.searchsorted(times, time)), 1), len(times) - 1)
-        before, span = float(times[k - 1]), float(times[k] - times[k - 1])
-        part = min(max((time - before) / span, 0.0), 1.0) if span > 0.0 else 1.0
-        return pose_from_row(rows[k - 1]).interpolate(pose_from_row(rows[k]), part)
-
     def _trigger_direction(self, time: float) -> Vector6 | None:
         """Return the path's direction at a time; None if the tool rests or turns back there."""
-        pose, half = self._pose(time), _DIRECTION_TIME
+        pose, half = self.clock.pose(time), _DIRECTION_TIME
         while half <= _MAX_DIRECTION_TIME:
-            a, b = self._pose(time - half), self._pose(time + half)
+            a, b = self.clock.pose(time - half), self.clock.pose(time + half)
             distance, angle = a.distance_to(b), a.angle_to(b)
             if distance < _TURNS_BACK * (a.distance_to(pose) + pose.distance_to(b)):
                 return None

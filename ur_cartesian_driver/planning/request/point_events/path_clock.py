@@ -1,0 +1,111 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The way and the pose of the tool at each time of a planned path, and the time at each way.
+
+Lines are sampled only where the acceleration changes, so the tool does not move evenly between
+samples: it moves at constant acceleration. The speeds at the samples follow from that, one after
+the other: the mean of the speeds at both ends of a piece is its length over its time.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, distance_rows
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
+
+# How far a point beside the TCP moves when the tool turns by 1 rad [m]: so a tool that only turns
+# makes way, too.
+_ARM_LENGTH = 0.1
+# A piece of the path that is not longer than this [m] is a rest.
+_NO_WAY = 1e-9
+
+
+class PathClock:
+    """The samples of a path, with the speed at each."""
+
+    def __init__(self, reference: ReferencePath) -> None:
+        """Measure the way between the samples."""
+        self._poses, self._times = reference.poses, reference.time
+        a, b = self._poses[:-1], self._poses[1:]
+        lengths, angles = distance_rows(a, b), angle_rows(a, b)
+        #: (m,) way of the tool from the start to each sample [m].
+        self._ways = np.append(0.0, np.cumsum(lengths))
+        self._turns = np.append(0.0, np.cumsum(angles))
+        self._steps = np.hypot(lengths, _ARM_LENGTH * angles)
+        self._speeds = _speeds(self._steps, np.diff(self._times))
+
+    def pose(self, time: float) -> Pose:
+        """Return the pose of the TCP at a time [s]."""
+        k, part = self._piece(time)
+        return pose_from_row(self._poses[k]).interpolate(pose_from_row(self._poses[k + 1]), part)
+
+    def way(self, time: float) -> float:
+        """Return the way from the start to a time [m]."""
+        return self._between(self._ways, time)
+
+    def turn(self, time: float) -> float:
+        """Return by how much the tool has turned from the start to a time [rad]."""
+        return self._between(self._turns, time)
+
+    @property
+    def length(self) -> float:
+        """The length of the path [m]."""
+        return float(self._ways[-1])
+
+    def time_at(self, way: float, *, leaving: bool) -> float:
+        """
+        Return when the tool has made some way from the start [s].
+
+        :param leaving: where the tool rests there, whether the end of the rest is meant.
+        """
+        side = 'right' if leaving else 'left'
+        shift = _NO_WAY if leaving else -_NO_WAY
+        k = int(np.searchsorted(self._ways, way + shift, side=side)) - 1
+        k = min(max(k, 0), len(self._steps) - 1)
+        length = float(self._ways[k + 1] - self._ways[k])
+        part = min(max((way - float(self._ways[k])) / length, 0.0), 1.0) if length > 0.0 else 0.0
+        span = float(self._times[k + 1] - self._times[k])
+        u, v = float(self._speeds[k]), float(self._speeds[k + 1])
+        # The part of the way is (u t + (v - u) t^2 / 2) / ((u + v) / 2), with t = 0 to 1.
+        root = sqrt(max(u * u + (v * v - u * u) * part, 0.0))
+        t = part * (u + v) / (u + root) if u + root > 0.0 else part
+        return float(self._times[k]) + span * t
+
+    def _piece(self, time: float) -> tuple[int, float]:
+        """Return the sample before a time, and the part of the way to the next one."""
+        k = int(np.searchsorted(self._times, time, side='right')) - 1
+        k = min(max(k, 0), len(self._steps) - 1)
+        span = float(self._times[k + 1] - self._times[k])
+        t = min(max((time - float(self._times[k])) / span, 0.0), 1.0) if span > 0.0 else 1.0
+        u, v = float(self._speeds[k]), float(self._speeds[k + 1])
+        return k, (2.0 * u + (v - u) * t) * t / (u + v) if u + v > 0.0 else t
+
+    def _between(self, values: Floats, time: float) -> float:
+        k, part = self._piece(time)
+        return float(values[k] + part * (values[k + 1] - values[k]))
+
+
+def _speeds(steps: Floats, spans: Floats) -> Floats:
+    """
+    Return the speed at each sample (m,) of a path that begins at rest.
+
+    The unit is arbitrary, as only the ratios of speeds at both ends of a piece are used.
+
+    :param steps: length of each piece (m - 1,).
+    :param spans: its duration (m - 1,) [s].
+    """
+    speeds = [0.0]
+    for step, span in zip(steps.tolist(), spans.tolist(), strict=True):
+        if span <= 0.0:
+            speeds.append(speeds[-1])
+        elif step <= _NO_WAY:
+            speeds.append(0.0)
+        else:
+            speeds.append(max(2.0 * step / span - speeds[-1], 0.0))
+    return np.array(speeds)
