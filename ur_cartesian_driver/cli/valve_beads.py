@@ -31,6 +31,8 @@ DIRECTIONS = {
     'y': ((0, 1), (1, 0)),
     '-y': ((0, -1), (1, 0)),
 }
+#: The points of the path to which the beads lead.
+BEAD_POINTS = (1, 8)
 #: A dead time that is negative by more standard uncertainties is a mistake of the measurement.
 _MAX_NEGATIVE = 3.0
 
@@ -78,7 +80,7 @@ class Beads:
 
         :param start: where the tool is, with its nozzle as far above the work as for a bead.
         """
-        path = Path(start).safe(valve, False).steady(0.99)
+        path = Path(start).safe(valve, False)
         path = self._bead(path, self.slow, valve).at(speed=TRAVEL_SPEED)
         across = [self.beside * part for part in DIRECTIONS[self.along][1]]
         path = path.by(dz=-LIFT, of_tool=True).by(*self._ahead(-self.room), of_tool=True)

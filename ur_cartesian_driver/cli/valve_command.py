@@ -12,11 +12,11 @@ from pathlib import Path
 import sys
 
 from ur_cartesian_driver.cli.check_robot import ask
-from ur_cartesian_driver.cli.valve_beads import Beads, dead_times, DeadTimes
+from ur_cartesian_driver.cli.valve_beads import BEAD_POINTS, Beads, dead_times, DeadTimes
 from ur_cartesian_driver.driver import Driver, DriverConfig
 from ur_cartesian_driver.goal_files.lead_file import read_leads, write_lead
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.errors import RobotNotReady
+from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.events import Progress
 from ur_cartesian_driver.motion.goal.leads import Lead
 from ur_cartesian_driver.motion.goal.output_names import output_name, parse_output
@@ -93,13 +93,21 @@ def lay_beads(driver: Driver, beads: Beads, valve: Output, agrees: Callable[[str
     """
     Lay the beads from where the tool is, if the person agrees; return whether they were laid.
 
-    :raises DriverError: the path was refused or not completed.
+    :raises DriverError: the path was refused or not completed, or a bead cannot have its speed.
     :raises RobotNotReady: the robot reports no state, or did not move at full speed.
     """
     state = driver.rest_state
     if state is None:
         raise RobotNotReady('The robot does not report its state.')
     plan = driver.plan(beads.path(state.actual_tcp_pose, valve))
+    for stretch in plan.find_slow_stretches():
+        if any(stretch.first <= point <= stretch.last for point in BEAD_POINTS):
+            raise InvalidGoal(
+                'A bead',
+                f'would be laid at {stretch.lowest:.3g} of {stretch.asked:.3g} m/s, because '
+                f'{stretch.reason}',
+                'ask for less speed',
+            )
     question = (
         f'{WARNING}\nTwo beads of {1e3 * beads.length:g} mm along the {beads.along} axis of the '
         f'tool, {1e3 * beads.beside:g} mm apart, from where it is: at {1e3 * beads.slow:g} mm/s, '
