@@ -60,8 +60,9 @@ def goal(*segments, times=(), **fields):
     )
 
 
-def switch(waypoint, value, offset=0.0, pin=1):
+def switch(waypoint, value, offset=0.0, pin=1, **place):
     return IOCommand(
+        **place,
         waypoint=waypoint,
         offset=offset,
         output=OutputKind.STANDARD_DIGITAL,
@@ -167,6 +168,36 @@ def test_outputs_get_the_state_of_the_place_and_the_rest_of_the_commands():
         ),
         key=repr,
     )
+
+
+def test_places_beside_points_stay_where_they_are_on_the_path():
+    commands = (
+        switch(0, 1.0, distance=0.03),
+        switch(0, 1.0, distance=0.07, pin=2),
+        switch(0, 1.0, fraction=0.8, pin=3),
+        switch(1, 1.0, fraction=-0.1, pin=4, offset=-0.05),
+        switch(1, 1.0, distance=-0.06, pin=5, offset=-0.05),
+        switch(1, 1.0, distance=-0.02, pin=6),
+        switch(2, 1.0, fraction=-0.5, pin=7),
+    )
+    left = resume(goal(io_commands=commands), at(1, 0.5), overlap=0.0).goal
+    assert sorted(left.io_commands, key=repr) == sorted(
+        (
+            switch(1, 1.0),
+            switch(1, 1.0, distance=0.02, pin=2),
+            switch(1, 1.0, distance=0.03, pin=3),
+            switch(2, 1.0, distance=-0.01, pin=4, offset=-0.05),
+            switch(1, 1.0, pin=5),
+            switch(2, 1.0, distance=-0.02, pin=6),
+            switch(3, 1.0, fraction=-0.5, pin=7),
+        ),
+        key=repr,
+    )
+
+
+def test_a_place_before_the_first_point_is_ahead_of_a_goal_that_begins_anew():
+    command = switch(0, 1.0, distance=-0.01)
+    assert resume(goal(io_commands=(command,)), at(0, 0.5)).goal.io_commands == (command,)
 
 
 def test_what_happens_at_points_happens_there_and_the_last_of_before_again():

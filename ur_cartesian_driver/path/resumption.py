@@ -163,7 +163,12 @@ class _Resumption:
         self, points: Sequence[Waypoint], segments: Sequence[Segment], places: Sequence[float]
     ) -> ResumedGoal:
         rest = GoalRest(
-            begin=self.begin, stopped=self.stopped, places=places, time_since=self._time_since
+            begin=self.begin,
+            stopped=self.stopped,
+            places=places,
+            time_since=self._time_since,
+            way=self._way,
+            behind=self._behind,
         )
         if self.rounded and not self.goal.corner_deviation:
             segments = self._with_a_corner(segments)
@@ -253,6 +258,28 @@ class _Resumption:
         if k in self.faults:
             raise InvalidGoal(f'segments[{k}].via', f'makes no arc: {self.faults[k]}')
         return float(self.curves.length[k])
+
+    def _way(self, begin: float, end: float) -> float:
+        """Return the way from one place to another [m]; negative if it leads back."""
+        if end < begin:
+            return -self._way(end, begin)
+        return sum(
+            self._length(k) * (min(end, k + 1.0) - max(begin, float(k)))
+            for k in range(floor(begin), min(floor(end) + 1, len(self.points)))
+        )
+
+    def _behind(self, place: float, way: float) -> float:
+        """Return the place some way [m] behind a place; before it if the way is negative."""
+        step = 1 if way > 0.0 else -1
+        k, left = round(place) - (step < 0), abs(way)
+        while 0 <= k < len(self.points) and (length := self._length(k)) < left:
+            left, k = left - length, k + step
+        if k < 0:
+            return 0.5  # somewhere on segment 0, whose length is not known
+        if k >= len(self.points):
+            return float(k)
+        u = left / length if length > 0.0 else 0.0
+        return k + u if step > 0 else k + 1.0 - u
 
     def _pose(self, k: int, u: float) -> Pose:
         if self.spline is not None:

@@ -11,10 +11,14 @@ from typing import Any
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.plan.plan import PlannedRows, ReferencePath
-from ur_cartesian_driver.motion.plan.primitive import OutputRecord, SpeedLaw
+from ur_cartesian_driver.motion.plan.primitive import OutputRecord, SwitchOutput
 from ur_cartesian_driver.planning.request.point_events.registry import OUTPUT_EVENTS
-from ur_cartesian_driver.planning.request.point_events.timed_path import TimedPath
-from ur_cartesian_driver.protocol.program.trajectory_points import MAX_PENDING_OUTPUTS
+from ur_cartesian_driver.planning.request.point_events.timed_path import (
+    PlacedOutput,
+    SAME_TIME,
+    TimedPath,
+)
+from ur_cartesian_driver.protocol.program.trajectory_points import MAX_LEADS, MAX_PENDING_OUTPUTS
 
 
 def place_outputs(
@@ -47,6 +51,7 @@ def place_outputs(
         for i, event in enumerate(events.get(kind.field, ()))
         for found in kind.place(event, f'{kind.field}[{i}]', path)
     ]
+    _check_leads(switches)
     outputs: dict[int, tuple[OutputRecord, ...]] = {}
     notes = dict(segments.notes)
     for found in sorted(switches, key=lambda found: found.time):
@@ -64,6 +69,38 @@ def place_outputs(
     return replace(segments, outputs=outputs, notes=notes)
 
 
+def _check_leads(switches: Sequence[PlacedOutput]) -> None:
+    """Refuse more leads at one time than the program follows, and one that reverses an order."""
+    leads = [found for found in switches if found.lead > 0.0]
+    for each in leads:
+        if sum(found.time <= each.time < found.time + found.lead for found in leads) > MAX_LEADS:
+            raise InvalidGoal(
+                'io_commands',
+                f'has more than {MAX_LEADS} leads that run at the same time, {each.time:.3f} s '
+                'after the start',
+                'shorten them, or move the places apart',
+            )
+        for other in switches:
+            is_first = other.time + other.lead < each.time + each.lead - SAME_TIME
+            if is_first and each.time < other.time - SAME_TIME and _same_output(each, other):
+                raise InvalidGoal(
+                    'io_commands',
+                    f'has a lead of {each.lead:g} s, with which that output is switched before '
+                    'the change ahead of it on the path',
+                    'move the places apart, or reduce the lead',
+                )
+
+
+def _same_output(a: PlacedOutput, b: PlacedOutput) -> bool:
+    """Return whether the records of two outputs, the last ones of each, switch the same one."""
+    first, second = a.records[-1], b.records[-1]
+    assert isinstance(first, SwitchOutput)
+    assert isinstance(second, SwitchOutput)
+    return (first.output, first.pin) == (second.output, second.pin)
+
+
 def _waiting(records: Sequence[OutputRecord]) -> int:
-    """Return the number of records that wait for a trigger pose, speed laws included."""
-    return sum(isinstance(each, SpeedLaw) or each.trigger_pose is not None for each in records)
+    """Return the number of records that wait for a trigger pose, laws included."""
+    return sum(
+        not isinstance(each, SwitchOutput) or each.trigger_pose is not None for each in records
+    )

@@ -29,7 +29,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.motion.geometry.workspace import Plane
 from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.plan.plan import Plan
-from ur_cartesian_driver.motion.plan.primitive import AwaitInput, CallFunction, SpeedLaw
+from ur_cartesian_driver.motion.plan.primitive import AwaitInput, CallFunction, SwitchOutput
 from ur_cartesian_driver.planning.preflight.tightest_margins import normalized_margins
 from ur_cartesian_driver.planning.request.point_events.switched_outputs import describe_command
 from ur_cartesian_driver.preview.plan_samples import Preview, sample, table
@@ -258,7 +258,7 @@ def _outputs(plan: Plan) -> Iterator[tuple[str, Floats]]:
             text = stop.text if isinstance(stop, CallFunction) else f'waits for {stop.condition}'
             yield text, plan.reference.poses[last, :3]
         for output in segment.outputs:
-            if isinstance(output, SpeedLaw):
+            if not isinstance(output, SwitchOutput):
                 continue
             at = output.trigger_pose or pose_from_row(plan.reference.poses[last])
             yield describe_command(output), np.array(at.position)

@@ -40,6 +40,7 @@ from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.goal.goal import ContactEnd, InputKind, OutputKind
 from ur_cartesian_driver.motion.plan.approach import ARRIVAL_TOLERANCE, BRAKING_FRACTION
+from ur_cartesian_driver.motion.plan.primitive import LEAD_PIECES
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.framing import FIXED_POINT
 from ur_cartesian_driver.protocol.program import point_fields, registers, reverse, script_command
@@ -174,6 +175,7 @@ OUTPUT_COLUMNS = {
     point_fields.PointField.OUTPUT_PIN: 'PIN',
     point_fields.PointField.OUTPUT_VALUE: 'VALUE',
     point_fields.PointField.OUTPUT_DOMAIN: 'DOMAIN',
+    point_fields.PointField.HAS_TRIGGER_POSE: 'HAS_TRIGGER_POSE',
     point_fields.PointField.STARTS_BEYOND: 'STARTS_BEYOND',
 }
 
@@ -181,6 +183,13 @@ OUTPUT_COLUMNS = {
 #: The columns for an analog output that follows the speed: its law in the order of a record,
 #: whether the output follows the speed now, and the filtered speed [m/s].
 FOLLOW_COLUMNS = ('GAIN', 'OFFSET', 'MINIMUM', 'MAXIMUM', 'FILTER_TIME', 'ACTIVE', 'SPEED')
+
+#: The columns for an output with a lead after the planned speeds: the lead [s], the way that is
+#: left [m or rad], the way that is left at the end of the present piece, the number of this piece,
+#: how fast the time of the path runs, whether the lead runs, and whether the tool only turns.
+LEAD_COLUMNS = ('TIME', 'LEFT', 'LEFT_LATER', 'PIECE', 'RATE', 'ACTIVE', 'TURNS')
+#: Planned speed [m/s or rad/s] below which the speed does not tell how fast the time runs.
+LEAD_MIN_SPEED = 2e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -397,9 +406,16 @@ def _output_constants() -> Iterator[str]:
     yield f'MAX_PENDING_OUTPUTS = {trajectory.MAX_PENDING_OUTPUTS}'
     yield f'OUTPUT_WORDS = {OUTPUT_WORDS}'
     # Floats, because a matrix of floats is made from them.
-    yield f'OUTPUT_ONES = {[1.0] * trajectory.MAX_PENDING_OUTPUTS}'
+    yield f'OUTPUT_ONES = {[1.0] * (trajectory.MAX_PENDING_OUTPUTS + trajectory.MAX_LEADS)}'
     yield f'OUTPUT_ROW = {[0.0] * OUTPUT_WORDS}'
     yield f'OUTPUT_LEAD = {OUTPUT_LEAD}'
+    yield f'MAX_LEADS = {trajectory.MAX_LEADS}'
+    yield f'LEAD_PIECES = {LEAD_PIECES}'
+    yield f'LEAD_ONES = {[1.0] * trajectory.MAX_LEADS}'
+    yield f'LEAD_ROW = {[0.0] * (LEAD_PIECES + 1 + len(LEAD_COLUMNS))}'
+    for column, name in enumerate(LEAD_COLUMNS, LEAD_PIECES + 1):
+        yield f'LEAD_{name} = {column}'
+    yield f'LEAD_MIN_SPEED = {LEAD_MIN_SPEED}'
     yield from _enum('OUTPUT', OutputKind)
 
 

@@ -168,8 +168,32 @@ class SpeedLaw:
     filter_time: float = 0.0
 
 
+#: Number of pieces, equal in time, into which a :class:`LeadLaw` divides its way.
+LEAD_PIECES = 11
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeadLaw:
+    """
+    Not a motion: the lead of the next output, and the planned motion to the place of that output.
+
+    The trigger pose of that output is where the tool is a lead before the place at full speed. A
+    slower tool switches it later on the way from there to the place.
+    """
+
+    #: How much ahead of its place the output switches, in real time [s].
+    lead: float
+    #: Way of the tool from the trigger pose to the place [m]; its turn [rad] if it only turns.
+    way: float
+    #: Speeds of the tool [m/s or rad/s] at full speed, from the place back to the trigger pose, at
+    #: equal distances in time. The acceleration between them is constant.
+    speeds: tuple[float, ...]
+    #: Whether way and speeds are angular.
+    turns: bool = False
+
+
 #: A record that is neither a motion nor a stop.
-OutputRecord: TypeAlias = SwitchOutput | SpeedLaw
+OutputRecord: TypeAlias = SwitchOutput | SpeedLaw | LeadLaw
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.goal.goal import IOCommand, Segment
 from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable, WaypointRows
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline, SAME_TIME
 from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
-from ur_cartesian_driver.motion.plan.primitive import OutputRecord, SpeedLaw, Spline, SwitchOutput
+from ur_cartesian_driver.motion.plan.primitive import Spline, SwitchOutput
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.append.appendable_goal import (
     AppendableGoal,
@@ -298,7 +298,10 @@ class _PartPlanner:
             ),
         ]
         committed_records = Counter(
-            _output_key(record) for segment in plan.segments[:-1] for record in segment.outputs
+            _output_key(record)
+            for segment in plan.segments[:-1]
+            for record in segment.outputs
+            if isinstance(record, SwitchOutput)
         )
         still = []
         for end_time, command in sorted(commands, key=lambda one: one[0]):
@@ -608,8 +611,7 @@ def _blend_half(segment: PlannedSegment) -> float:
     return segment.blend_entry.half if segment.blend_entry else 0.0
 
 
-def _output_key(output: IOCommand | OutputRecord) -> tuple[object, ...]:
-    assert not isinstance(output, SpeedLaw)  # open goals have no speed laws
+def _output_key(output: IOCommand | SwitchOutput) -> tuple[object, ...]:
     return output.output, output.pin, output.value, output.domain
 
 

@@ -39,7 +39,9 @@ SWITCH_OUTPUT takes no time:
 The output kind 5 makes an analog output follow the speed of the tool until the output is switched
 again. A record of the output kind 4 gives the law for the next record of kind 5: it has no trigger
 pose although its word 16 is 1, and its words 0 - 4 are gain [1/(m/s)], offset, minimum, maximum
-and the time constant of the filter [s].
+and the time constant of the filter [s]. A record of the output kind 6 gives the lead of the next
+output, likewise: words 0 - 11 are the planned speeds from its place back to its trigger pose, word
+13 is the lead [s], 15 the way between the two [m or rad], and 17 is 1 if the tool only turns.
 
 The stops, which only our own program knows, are motions during which the arm stands still.
 WAIT waits: word 18 is the time from the end of the previous motion until the next one may begin.
@@ -89,6 +91,8 @@ from ur_cartesian_driver.motion.plan.primitive import (
     ChangePayload,
     EndPress,
     Instruction,
+    LEAD_PIECES,
+    LeadLaw,
     MoveC,
     MoveJ,
     MoveL,
@@ -167,10 +171,11 @@ class SplineKind(IntEnum):
 
 
 class FollowKind(IntEnum):
-    """Word 12 of a SWITCH_OUTPUT whose output follows the speed; others have an OutputKind."""
+    """Word 12 of a SWITCH_OUTPUT that follows the speed, or has a law; else an OutputKind."""
 
     LAW = 4
     BEGIN = 5
+    LEAD = 6
 
 
 class PointField(IntEnum):
@@ -287,7 +292,7 @@ def motion_type(primitive: Instruction) -> MotionType:
 
     :raises LocalProtocolError: the instruction is neither a primitive nor an output.
     """
-    if isinstance(primitive, SwitchOutput | SpeedLaw):
+    if isinstance(primitive, OutputRecord):
         return MotionType.SWITCH_OUTPUT
     if isinstance(primitive, MoveC):
         return _ARC_TYPES[isinstance(primitive.target, Pose), isinstance(primitive.via, Pose)]
@@ -312,6 +317,8 @@ def to_fields(primitive: Instruction) -> PointFields:
         return _output_fields(primitive)
     if isinstance(primitive, SpeedLaw):
         return _law_fields(primitive)
+    if isinstance(primitive, LeadLaw):
+        return _lead_fields(primitive)
     if isinstance(primitive, Spline):
         return _spline_fields(primitive)
     if isinstance(primitive, Stop):
@@ -399,6 +406,11 @@ def _law_fields(law: SpeedLaw) -> PointFields:
     # The value is 1, because in a stop the robot program switches waiting outputs of value 0.
     switch = (FollowKind.LAW, 0, 1, 0, 1, 0)
     return (*numbers, *ZERO6, *switch, 0, 0, MotionType.SWITCH_OUTPUT)
+
+
+def _lead_fields(law: LeadLaw) -> PointFields:
+    switch = (FollowKind.LEAD, law.lead, 1, law.way, 1, law.turns)
+    return (*law.speeds, *switch, 0, 0, MotionType.SWITCH_OUTPUT)
 
 
 def _stop_fields(stop: Stop) -> PointFields:
@@ -502,6 +514,13 @@ def _output(fields: Sequence[float]) -> OutputRecord:
             minimum=fields[2],
             maximum=fields[3],
             filter_time=fields[4],
+        )
+    if fields[12] == FollowKind.LEAD:
+        return LeadLaw(
+            lead=fields[13],
+            way=fields[15],
+            speeds=tuple(fields[: LEAD_PIECES + 1]),
+            turns=bool(fields[17]),
         )
     follows_speed = fields[12] == FollowKind.BEGIN
     trigger_pose = Pose.from_rotation_vector(vector6(fields[:6])) if fields[16] else None

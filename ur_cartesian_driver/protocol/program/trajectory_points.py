@@ -61,6 +61,8 @@ from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, DIALECTS
 
 #: Number of outputs that may wait for their trigger poses at one time.
 MAX_PENDING_OUTPUTS = 64
+#: Number of outputs that may have passed their trigger poses and wait for their leads.
+MAX_LEADS = 8
 POINT_FIELDS = 21
 POINT_SIZE = 4 * POINT_FIELDS
 

@@ -33,6 +33,10 @@ class GoalRest:
     #: Function that returns the time from a waypoint to ``begin`` [s]; 0 for an offset <= 0. Its
     #: other arguments are the name and value of the time offset of an event at the waypoint.
     time_since: Callable[[int, str, float], float]
+    #: Function that returns the way from one place to another along the path [m].
+    way: Callable[[float, float], float]
+    #: Function that returns the place that is some way [m] behind another one.
+    behind: Callable[[float, float], float]
 
     @property
     def first(self) -> int:

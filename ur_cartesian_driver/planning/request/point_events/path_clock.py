@@ -22,6 +22,8 @@ from ur_cartesian_driver.motion.plan.plan import ReferencePath
 # How far a point beside the TCP moves when the tool turns by 1 rad [m]: so a tool that only turns
 # makes way, too.
 _ARM_LENGTH = 0.1
+# A tool with less way than this per turn [m/rad] only turns.
+_LEAST_TURNING = 1e-3
 # A piece of the path that is not longer than this [m] is a rest.
 _NO_WAY = 1e-9
 
@@ -33,7 +35,7 @@ class PathClock:
         """Measure the way between the samples."""
         self._poses, self._times = reference.poses, reference.time
         a, b = self._poses[:-1], self._poses[1:]
-        lengths, angles = distance_rows(a, b), angle_rows(a, b)
+        lengths, angles = distance_rows(a, b), angle_rows(a[:, 3:], b[:, 3:])
         #: (m,) way of the tool from the start to each sample [m].
         self._ways = np.append(0.0, np.cumsum(lengths))
         self._turns = np.append(0.0, np.cumsum(angles))
@@ -57,6 +59,25 @@ class PathClock:
     def length(self) -> float:
         """The length of the path [m]."""
         return float(self._ways[-1])
+
+    def motion_back(self, time: float, span: float, pieces: int) -> tuple[float, Floats, bool]:
+        """
+        Return the motion of the tool that ends at a time [s].
+
+        :param span: how long it takes [s].
+        :returns: its way [m]; the speeds (pieces + 1,) [m/s] at equal distances in time, from its
+            end back to its begin; whether way and speeds are angular [rad], [rad/s], because the
+            tool only turns.
+        """
+        way = self.way(time) - self.way(time - span)
+        turn = self.turn(time) - self.turn(time - span)
+        turns = way < _LEAST_TURNING * turn
+        values, length = (self._turns, turn) if turns else (self._ways, way)
+        times = time - span * np.arange(pieces + 1) / pieces
+        speeds = np.array([self._speed(values, each) for each in times.tolist()])
+        # The robot program takes the acceleration between two speeds for constant.
+        found = float((speeds[1:] + speeds[:-1]).sum()) * span / (2.0 * pieces)
+        return length, speeds * (length / found if found > 0.0 else 0.0), turns
 
     def time_at(self, way: float, *, leaving: bool) -> float:
         """
@@ -85,6 +106,16 @@ class PathClock:
         t = min(max((time - float(self._times[k])) / span, 0.0), 1.0) if span > 0.0 else 1.0
         u, v = float(self._speeds[k]), float(self._speeds[k + 1])
         return k, (2.0 * u + (v - u) * t) * t / (u + v) if u + v > 0.0 else t
+
+    def _speed(self, values: Floats, time: float) -> float:
+        """Return the rate of change at a time [1/s] of what is ``values`` at the samples."""
+        k, _ = self._piece(time)
+        span = float(self._times[k + 1] - self._times[k])
+        u, v = float(self._speeds[k]), float(self._speeds[k + 1])
+        if span <= 0.0 or u + v <= 0.0:
+            return 0.0
+        t = min(max((time - float(self._times[k])) / span, 0.0), 1.0)
+        return float(values[k + 1] - values[k]) / span * 2.0 * (u + (v - u) * t) / (u + v)
 
     def _between(self, values: Floats, time: float) -> float:
         k, part = self._piece(time)

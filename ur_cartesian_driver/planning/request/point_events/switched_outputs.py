@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.goal.output_names import output_fault, output_na
 from ur_cartesian_driver.motion.plan.primitive import SwitchOutput
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
-from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
+from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest, NO_FRACTION
 from ur_cartesian_driver.planning.request.point_events.output_event import OutputEvent
 from ur_cartesian_driver.planning.request.point_events.point_event import check_point
 from ur_cartesian_driver.planning.request.point_events.timed_path import (
@@ -73,15 +73,24 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
         """Return commands that restore the outputs at the resumption, and the commands ahead."""
         state: dict[tuple[int, int], IOCommand] = {}
         left = []
-        for i, command in sorted(
-            enumerate(events), key=lambda each: (each[1].waypoint, each[1].offset)
+        places = [_place(command, rest) for command in events]
+        for place, _, i in sorted(
+            (place, command.offset, i)
+            for i, (place, command) in enumerate(zip(places, events, strict=True))
         ):
-            if not rest.is_passed(command.waypoint):
-                left.append(replace(command, waypoint=rest.index(command.waypoint)))
+            command = events[i]
+            if place > rest.begin + NO_FRACTION:
+                left.append(_ahead(command, place, rest))
                 continue
             field, offset = f'io_commands[{i}].offset', command.offset
             due = offset - rest.time_since(command.waypoint, field, offset)
-            command = replace(command, waypoint=rest.first, offset=max(round(due, _DIGITS), 0.0))
+            command = replace(
+                command,
+                waypoint=rest.first,
+                offset=max(round(due, _DIGITS), 0.0),
+                distance=0.0,
+                fraction=0.0,
+            )
             if due > 0.0:
                 left.append(command)
             else:
@@ -92,12 +101,12 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
         """Return the record that switches the output, with its time and place."""
         point, lead = self._passed(command, field, path), max(-command.offset, 0.0)
         time, last = point.time + max(command.offset, 0.0), len(path.ends) - 1
-        late, delay, trigger_time = time - float(path.ends[last]), 0.0, None
+        late, delay, trigger_time, law = time - float(path.ends[last]), 0.0, None, None
         rest = path.rests.get(command.waypoint)
         has_place = bool(command.distance or command.fraction)
         if lead > 0.0:
             time = point.time if point.trigger_time is None else point.trigger_time
-            after, trigger_time = path.ahead(time, lead, f'{field}.offset')
+            after, trigger_time, law = path.ahead(time, lead, f'{field}.offset')
             where = f'{lead:.3f} s ahead, {point.where}'
         elif command.offset <= SAME_TIME:
             after, trigger_time, where = point.after, point.trigger_time, point.where
@@ -119,10 +128,11 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
         )
         return [
             PlacedOutput(
+                lead=lead,
                 time=time if trigger_time is None else trigger_time,
                 after_index=after,
                 report_index=point.row,
-                records=(path.triggered(record, trigger_time, after),),
+                records=(*filter(None, (law,)), path.triggered(record, trigger_time, after)),
                 text=f'switches {describe_command(command)} {where}',
             )
         ]
@@ -139,6 +149,26 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
                 'switch the output before the goal',
             )
         return point
+
+
+def _place(command: IOCommand, rest: GoalRest) -> float:
+    """Return the place of a command on the path of the goal that was stopped."""
+    point = command.waypoint + 1.0
+    if command.distance:
+        return rest.behind(point, command.distance)
+    return point + command.fraction
+
+
+def _ahead(command: IOCommand, place: float, rest: GoalRest) -> IOCommand:
+    """Return a command whose place is ahead, with its point in the resumed goal."""
+    point, distance, fraction = command.waypoint, command.distance, command.fraction
+    if rest.is_passed(point):
+        number, distance, fraction = rest.first, rest.way(rest.begin, place), 0.0
+    else:
+        number = rest.index(point)
+        if fraction < 0.0 and rest.begin > point:  # of a segment that is cut
+            distance, fraction = rest.way(point + 1.0, place), 0.0
+    return replace(command, waypoint=number, distance=round(distance, _DIGITS), fraction=fraction)
 
 
 def check_output(where: str, named: IOCommand | SafeOutput) -> None:

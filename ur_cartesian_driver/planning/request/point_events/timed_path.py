@@ -26,6 +26,8 @@ from ur_cartesian_driver.motion.geometry.pose import conjugate, Pose, rotate
 from ur_cartesian_driver.motion.geometry.vectors import subtract, Vector6
 from ur_cartesian_driver.motion.plan.plan import PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import (
+    LEAD_PIECES,
+    LeadLaw,
     OutputRecord,
     Spline,
     Stop,
@@ -53,7 +55,7 @@ _BEYOND = 1e-4
 class PlacedOutput:
     """The records of one output, with their place in the plan."""
 
-    #: When the output is switched [s].
+    #: When the output is switched at full speed [s].
     time: float
     #: The row of the segment after which the records are sent.
     after_index: int
@@ -61,6 +63,8 @@ class PlacedOutput:
     report_index: int
     records: tuple[OutputRecord, ...]
     text: str
+    #: How much later the tool is at the place of the output, at full speed [s].
+    lead: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -181,7 +185,20 @@ class TimedPath:
             after=after,
             time=time,
             trigger_time=time,
-            where=f'{where} {side} it',
+            where=f'{where} {side} it{self._doubt(time)}',
+        )
+
+    def _doubt(self, time: float) -> str:
+        """Return a clause about a place in a blend, of whose shape only a bound is known."""
+        k = min(
+            max(int(np.searchsorted(self._reference.time, time)), 1), len(self._reference.time)
+        )
+        bound = float(self._reference.blend_tolerance[k - 1 : k + 1, 0].max(initial=0.0))
+        if bound <= 0.0:
+            return ''
+        return (
+            f', in a blend whose shape is known to {1e3 * bound:.2g} mm (corner_deviation makes '
+            'the place exact)'
         )
 
     def _way_of(self, waypoint: int) -> float:
@@ -224,13 +241,14 @@ class TimedPath:
             starts_beyond=beyond > _BEYOND,
         )
 
-    def ahead(self, time: float, lead: float, field: str) -> tuple[int, float]:
+    def ahead(self, time: float, lead: float, field: str) -> tuple[int, float, LeadLaw]:
         """
-        Return the row of the motion after which a record is read, and when it may be due at first.
+        Return the row after which a record with a lead is read, its trigger time [s], and its law.
+
+        The output is triggered where the lead is due at full speed; a slower tool switches later.
 
         :param time: when the tool is at the place of the record [s].
-        :param lead: how much ahead of that the output switches, in real time [s]. At full speed it
-            is this much in the time of the path, too; else less.
+        :param lead: how much ahead of that the output switches, in real time [s].
         :raises InvalidGoal: the lead reaches back to before the record can be read, or over a
             rest; the text gives the longest possible lead.
         """
@@ -252,7 +270,9 @@ class TimedPath:
                 f'{max(time - begin, 0.0):.3f} s',
                 'reduce the lead, or move the place',
             )
-        return self.last_returned(time - lead), time - lead
+        way, speeds, turns = self.clock.motion_back(time, lead, LEAD_PIECES)
+        law = LeadLaw(lead=lead, way=way, speeds=tuple(speeds.tolist()), turns=turns)
+        return self.last_returned(time - lead), time - lead, law
 
     def last_returned(self, time: float) -> int:
         """Return the index of the last motion that has returned by a time [s]; -1 = none."""

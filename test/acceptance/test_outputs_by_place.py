@@ -1,0 +1,317 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Outputs at places beside points and with leads: the cycle of each edge, against the tool's own way.
+
+The judge knows positions and outputs of the simulated controller in each cycle, and nothing of
+the plan. The way of the tool is the sum of its steps; a point is on it where a step is nearest. A
+run at full speed tells when the tool is at each way: the time of the path. In any run, an output
+is due when no more of this time is left to its place than passes within its lead.
+"""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from random_cases import cases, random_of
+from robot_in_memory import RobotInMemory
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import Goal, IOCommand, OutputKind, Segment, Waypoint
+from ur_cartesian_driver.planning import plan, PlanningOptions
+
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+
+ARM, STEP = Arm(robot_model('ur5e')), 0.002
+HOME = (0.3, -1.4, 1.5, -1.6, -1.5, 0.2)
+OPTIONS = PlanningOptions(max_tool_speed=1.0)
+#: A zigzag that does not come near itself [m].
+ZIGZAG = ((0.0, 0.03), (0.05, 0.05), (0.07, 0.0), (0.12, 0.02), (0.13, 0.07))
+
+
+def command(waypoint, pin, value=1.0, **place):
+    return IOCommand(
+        **{
+            'waypoint': waypoint,
+            'pin': pin,
+            'offset': -place.pop('lead', 0.0),
+            'output': OutputKind.STANDARD_DIGITAL,
+            'value': value,
+        }
+        | place
+    )
+
+
+def zigzag(home, commands, points=ZIGZAG, speed=0.1, blend=0.0, **changes):
+    x, y, z = home.position
+    last = len(points) - 1
+    segments = tuple(
+        Segment(velocity=speed, acceleration=1.2, blend_radius=blend if k < last else 0.0)
+        for k in range(len(points))
+    )
+    return Goal(
+        **{
+            'waypoints': tuple(
+                Waypoint(pose=Pose((x + dx, y + dy, z), home.quaternion)) for dx, dy in points
+            ),
+            'segments': segments,
+            'io_commands': tuple(commands),
+        }
+        | changes
+    )
+
+
+def spline(home, commands, period=0.5, **changes):
+    """Return the goal through the points as a spline with times."""
+    x, y, z = home.position
+    return Goal(
+        waypoints=tuple(
+            Waypoint(pose=Pose((x + dx, y + dy, z), home.quaternion), time=period * (k + 1))
+            for k, (dx, dy) in enumerate(ZIGZAG)
+        ),
+        execution=ExecutionMode.SPLINE,
+        io_commands=tuple(commands),
+        **changes,
+    )
+
+
+class Run:
+    """One run of a goal: the way of the tool, and the edges of the outputs, by cycle."""
+
+    def __init__(
+        self, robot, goal_of, slider=lambda cycle: 1.0, act=lambda controller, cycle: None
+    ):
+        state = robot.place(HOME, Pose((0.0, 0.02, 0.12)))
+        self.goal = goal_of(state.actual_tcp_pose)
+        self.plan = plan(self.goal, state, ARM, OPTIONS)
+        outputs = robot.controller.io.digital_out.standard
+        outputs[:] = [False] * 8
+        before, self.edges = list(outputs), []
+        positions = [robot.controller.motion.T_base_tcp.position]
+
+        def watch(controller):
+            positions.append(controller.motion.T_base_tcp.position)
+            for pin, (a, b) in enumerate(zip(before, outputs, strict=True)):
+                if a != b:
+                    self.edges.append((pin, b, len(positions) - 1))
+            before[:] = outputs
+            controller.set_slider(slider(len(positions)))
+            act(controller, len(positions))
+
+        robot.controller.set_slider(slider(0))
+        run = robot.run(list(self.plan.instructions), on_cycle=watch)
+        assert not run.failure
+        self.positions = np.array(positions)
+        self.ways = np.append(
+            0.0, np.cumsum(np.linalg.norm(np.diff(self.positions, axis=0), axis=1))
+        )
+
+    def way_of(self, point):
+        """Return the way to where the tool is nearest to a point of the goal."""
+        target = np.array(self.goal.waypoints[point].pose.position)
+        a, step = self.positions[:-1], np.diff(self.positions, axis=0)
+        square = np.maximum((step**2).sum(axis=1), 1e-300)
+        u = np.clip(((target - a) * step).sum(axis=1) / square, 0.0, 1.0)
+        k = int(np.argmin(np.linalg.norm(a + u[:, None] * step - target, axis=1)))
+        return self.ways[k] + u[k] * np.sqrt(square[k])
+
+    def place(self, wanted):
+        """Return the way to the place of a command."""
+        here = self.way_of(wanted.waypoint)
+        if wanted.fraction:
+            other = wanted.waypoint + (1 if wanted.fraction > 0.0 else -1)
+            return here + abs(wanted.fraction) * (self.way_of(other) - here)
+        return here + wanted.distance
+
+
+def due(run, full, wanted):
+    """Return when a command is due in a run [cycles], by the times of a run at full speed."""
+    ways, first = np.unique(full.ways, return_index=True)
+    # Rests are no time of the path.
+    moving = STEP * np.append(0.0, np.cumsum(np.diff(full.ways) > 0.0))
+    times = np.interp(run.ways, ways, moving[first])
+    left = np.interp(run.place(wanted), ways, moving[first]) - times
+    rate = np.diff(times, prepend=0.0) / STEP
+    ahead = left - max(-wanted.offset, 0.0) * rate
+    k = int(np.flatnonzero((ahead <= 0.0) & ((rate > 0.0) | (left <= 0.0)))[0])
+    return k - ahead[k] / min(ahead[k] - ahead[k - 1], -1e-12)
+
+
+def late(run, full):
+    """Return by how many cycles each output was late."""
+    assert Counter(pin for pin, *_ in run.edges) == Counter(
+        wanted.pin for wanted in run.goal.io_commands
+    )
+    at = {pin: cycle for pin, _, cycle in run.edges}
+    return {wanted.pin: at[wanted.pin] - due(run, full, wanted) for wanted in run.goal.io_commands}
+
+
+def assert_in_time(goal_of, slider=lambda cycle: 1.0, **act):
+    robot = RobotInMemory('ur5e')
+    full = Run(robot, goal_of)
+    run = full if slider is None else Run(robot, goal_of, slider, **act)
+    found = late(run, full)
+    assert max(map(abs, found.values())) <= 1, found
+    return run
+
+
+PLACES = (
+    command(0, 0, distance=0.012),
+    command(1, 1, distance=-0.02),
+    command(1, 2, fraction=0.3),
+    command(3, 3, fraction=-0.25),
+    command(2, 4, lead=0.06),
+    command(2, 5, distance=0.02, lead=0.11),
+    command(2, 6, distance=0.021, lead=0.04),
+    command(4, 7, lead=0.03),
+)
+
+SLIDERS = {
+    'full': lambda cycle: 1.0,
+    'low': lambda cycle: 0.1,
+    'changing': lambda cycle: 0.55 + 0.45 * np.cos(cycle / 40.0),
+    'steps': lambda cycle: (1.0, 0.2, 0.6)[cycle // 130 % 3],
+}
+
+
+def by_kind(kind, commands=PLACES, speed=0.1):
+    if kind == 'spline':
+        return lambda home: spline(home, commands, period=0.06 / speed)
+    changes = {
+        'stops': {},
+        'blends': {'blend': 0.008},
+        'rounded': {'corner_deviation': 0.001},
+    }[kind]
+    return lambda home: zigzag(home, commands, speed=speed, **changes)
+
+
+@pytest.mark.parametrize('slider', SLIDERS)
+@pytest.mark.parametrize('kind', ['stops', 'blends', 'rounded', 'spline'])
+def test_each_output_switches_in_the_cycle_in_which_it_is_due(kind, slider):
+    assert_in_time(by_kind(kind), SLIDERS[slider])
+
+
+@pytest.mark.parametrize('speed', [0.001, 0.01, 0.25])
+def test_slow_and_fast_tools(speed):
+    points = tuple((min(1.0, 20.0 * speed) * x, min(1.0, 20.0 * speed) * y) for x, y in ZIGZAG)
+    size = min(1.0, 20.0 * speed)
+    commands = (
+        command(1, 0, distance=-0.01 * size),
+        command(2, 1, distance=0.02 * size, lead=0.05),
+        command(2, 2, fraction=0.8, lead=0.02),
+    )
+    assert_in_time(lambda home: zigzag(home, commands, points, speed))
+
+
+def test_leads_overtake_one_another():
+    commands = (
+        command(1, 0, distance=0.020),
+        command(1, 1, distance=0.021, lead=0.1),
+        command(1, 2, distance=0.022, lead=0.02),
+        command(1, 3, distance=0.023, lead=0.15),
+    )
+    orders = {}
+    for name in ('full', 'low'):
+        run = assert_in_time(by_kind('stops', commands), SLIDERS[name])
+        orders[name] = [pin for pin, *_ in run.edges]
+    assert orders == {'full': [3, 1, 0, 2], 'low': [0, 1, 3, 2]}
+
+
+def test_a_dwell_and_a_pause_shift_no_output():
+    def dwelling(home):
+        goal = zigzag(home, PLACES)
+        segments = list(goal.segments)
+        segments[1] = Segment(velocity=0.1, acceleration=1.2, dwell=0.3)
+        return Goal(
+            waypoints=goal.waypoints, segments=tuple(segments), io_commands=goal.io_commands
+        )
+
+    def act(controller, cycle):
+        if cycle in (300, 700):
+            controller.programs.pause()
+        elif cycle in (400, 800):
+            controller.programs.play()
+
+    robot = RobotInMemory('ur5e')
+    full = Run(robot, dwelling)
+    assert max(map(abs, late(full, full).values())) <= 1
+    paused = Run(robot, dwelling, act=act)
+    assert len(paused.ways) > len(full.ways) + 150
+    assert max(map(abs, late(paused, full).values())) <= 1
+
+
+def test_the_longest_lead_is_in_the_refusal():
+    robot = RobotInMemory('ur5e')
+    for shorter in (0.0, 0.001):
+        try:
+            Run(robot, by_kind('stops', [command(1, 0, distance=-0.045, lead=0.9)]))
+        except InvalidGoal as refusal:
+            text = str(refusal)
+        longest = float(text.partition('longest lead here is ')[2].split()[0])
+        goal = by_kind('stops', [command(1, 0, distance=-0.045, lead=longest - shorter)])
+        if shorter:
+            assert_in_time(goal)
+    assert 'io_commands[0].offset' in text
+    assert 0.1 < longest < 0.9
+
+
+@pytest.mark.parametrize(
+    ('place', 'field', 'text'),
+    [
+        ({'distance': 0.5}, 'distance', 'but the path after point 2 is'),
+        ({'distance': -0.5}, 'distance', 'but the path before point 2 is'),
+        ({'distance': -0.12}, 'distance', 'only when its first motion has returned'),
+        ({'distance': 0.01, 'fraction': 0.2}, 'fraction', 'gives the place already'),
+        ({'fraction': 1.5}, 'fraction', 'outside -1 to 1'),
+        ({'lead': 1.5}, 'offset', 'outside -1 to 60 s'),
+    ],
+)
+def test_places_that_do_not_exist_are_refused(place, field, text):
+    with pytest.raises(InvalidGoal, match=f'io_commands.0..{field} .*{text}'):
+        Run(RobotInMemory('ur5e'), by_kind('stops', [command(2, 0, **place)]))
+
+
+def test_a_lead_that_would_close_a_valve_before_it_opens_is_refused():
+    bead = [command(2, 0, distance=0.01), command(2, 0, 0.0, distance=0.012, lead=0.1)]
+    with pytest.raises(InvalidGoal, match='is switched before the change ahead of it'):
+        Run(RobotInMemory('ur5e'), by_kind('stops', bead))
+
+
+def test_more_leads_than_the_program_follows_are_refused():
+    many = [command(2, pin, distance=0.02, lead=0.1) for pin in range(8)]
+    many.append(command(2, 0, distance=0.02, lead=0.1, output=OutputKind.TOOL_DIGITAL))
+    with pytest.raises(InvalidGoal, match='more than 8 leads'):
+        Run(RobotInMemory('ur5e'), by_kind('stops', many))
+
+
+@pytest.mark.random
+def test_random_places_and_leads():
+    robot, accepted = RobotInMemory('ur5e'), 0
+    for number in range(cases(500)):
+        random = random_of('places', number)
+        kind = random.choice(['stops', 'blends', 'rounded', 'spline'])
+        speed = 10.0 ** random.uniform(-2.0, -0.61)
+        slider = SLIDERS[random.choice(list(SLIDERS))]
+        commands = []
+        for pin in range(8):
+            place = random.choice(
+                [
+                    {'distance': random.uniform(-0.03, 0.03)},
+                    {'fraction': random.uniform(-0.9, 0.9)},
+                    {},
+                ]
+            )
+            lead = random.choice([0.0, random.uniform(0.002, 0.2)])
+            commands.append(command(random.randint(1, 3), pin, lead=lead, **place))
+        try:
+            full = Run(robot, by_kind(kind, commands, speed))
+        except InvalidGoal:
+            continue
+        accepted += 1
+        found = late(Run(robot, by_kind(kind, commands, speed), slider), full)
+        assert max(map(abs, found.values())) <= 1, (number, kind, speed, found)
+    assert accepted > 0.3 * cases(500)
