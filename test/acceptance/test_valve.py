@@ -80,7 +80,6 @@ def lead(robot):
 
 def test_two_beads_show_both_dead_times(lead):
     times, _ = lead
-    print(times)
     assert abs(times.open - OPEN) < 3.0 * times.uncertainty
     assert abs(times.close - CLOSE) < 3.0 * times.uncertainty
     assert times.uncertainty < 0.001
@@ -93,19 +92,26 @@ class Bead:
         self.speed = 10.0 ** random.uniform(-2.0, np.log10(0.25))
         self.length = mm(random.uniform(20.0, 60.0))
         self.is_rounded = random.random() < 0.5
-        #: From the start to the bead, at full speed behind the first half [m].
-        self.run = 2.0 * (mm(6) + max(0.5 * self.speed**2, 0.1 * self.speed))
+        #: The way to gain speed and to lose it, with the way of the lead at full speed [m].
+        self.run = mm(6) + self.speed**2 + 0.08 * self.speed
 
     def path(self, start, lead):
-        path = Path(start).at(speed=self.speed, acceleration=1.0)
-        path = path.rounded(mm(1)) if self.is_rounded else path.at(blend=mm(2))
+        """Return a path with the bead at points that it passes, or between its points."""
+        on, off = (digital(PIN), True), (digital(PIN), False)
+        path = Path(start).at(speed=self.speed, acceleration=1.0).by(mm(5), of_tool=True)
+        if self.is_rounded:
+            return (
+                path.by(self.run - mm(5), of_tool=True)
+                .set(*on, lead=lead)
+                .by(self.length, of_tool=True)
+                .set(*off, lead=lead)
+                .by(self.run, of_tool=True)
+                .rounded(mm(1))
+            )
         return (
-            path.by(self.run / 2.0, of_tool=True)
-            .by(self.run / 2.0, of_tool=True)
-            .set(digital(PIN), True, lead=lead)
-            .by(self.length, of_tool=True)
-            .set(digital(PIN), False, lead=lead)
-            .by(self.run, of_tool=True, blend=0.0)
+            path.by(2.0 * self.run + self.length - mm(5), of_tool=True)
+            .set(*on, distance=-self.run - self.length, lead=lead)
+            .set(*off, distance=-self.run, lead=lead)
         )
 
 
@@ -121,15 +127,12 @@ def errors(robot, bead, lead, options):
 def test_beads_are_where_they_shall_be_at_all_speeds(robot, lead):
     _, found = lead
     options = PlanningOptions(leads=(found,))
-    worst = []
     for i in range(cases(100)):
         bead = Bead(random_of('bead', i))
         begin, end = errors(robot, bead, found.name, options)
         # An output switches at the end of a cycle, so half a cycle beside its place.
         bound = mm(0.2) + 0.5 * CYCLE * bead.speed
         assert max(abs(begin), abs(end), abs(end - begin)) < bound, (i, bead.speed, begin, end)
-        worst.append((bead.speed, begin, end))
-    print(*worst, sep='\n')
 
 
 @pytest.mark.random

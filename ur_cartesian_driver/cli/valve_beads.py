@@ -21,9 +21,11 @@ from ur_cartesian_driver.path import mm, Output, Path
 
 #: Acceleration of the beads, and speed between them [m/s^2], [m/s].
 ACCELERATION, TRAVEL_SPEED = 1.0, 0.05
-#: Constant speed before and behind a bead, blend at its ends, and height above it on the way to
-#: the next one [m].
-RUN, BLEND, LIFT = mm(10), mm(2), mm(20)
+#: Constant speed before and behind a bead, and height above it on the way to the next one [m].
+RUN, LIFT = mm(10), mm(20)
+#: Corner deviation at the ends of a bead, so that the arm passes them at full speed [m]: on a
+#: straight line it deviates by nothing. In a blend it would slow down.
+PASSING = mm(0.1)
 #: Direction of a bead and of the second one beside it, by name: axes of the tool.
 DIRECTIONS = {
     'x': ((1, 0), (0, 1)),
@@ -61,7 +63,7 @@ class Beads:
                 f'--fast is {self.fast:g} m/s and --slow {self.slow:g} m/s; lay one bead at least '
                 'twice as fast as the other'
             )
-        if self.length < 2.0 * BLEND + RUN:
+        if self.length < 2.0 * RUN:
             raise ValueError(f'--length is {1e3 * self.length:g} mm; lay beads of 20 mm or more')
 
     @property
@@ -90,9 +92,9 @@ class Beads:
     def _bead(self, path: Path, speed: float, valve: Output) -> Path:
         return (
             path.at(speed=speed, acceleration=ACCELERATION)
-            .by(*self._ahead(self.run), of_tool=True, blend=BLEND)
+            .by(*self._ahead(self.run), of_tool=True, corner_deviation=PASSING)
             .set(valve, True)
-            .by(*self._ahead(self.length), of_tool=True, blend=BLEND)
+            .by(*self._ahead(self.length), of_tool=True, corner_deviation=PASSING)
             .set(valve, False)
             .by(*self._ahead(self.run), of_tool=True)
         )
