@@ -156,7 +156,12 @@ def small():
 @pytest.mark.ur_sim(frequency=125.0)
 def test_the_beads_are_laid_if_the_person_agrees(driver, small):
     start, asked = driver.state.actual_tcp_pose, []
-    assert not lay_beads(driver, small, digital(PIN), lambda text: bool(asked.append(text)))
+
+    def declines(text):
+        asked.append(text)
+        return False
+
+    assert not lay_beads(driver, small, digital(PIN), declines)
     assert driver.state.actual_tcp_pose == start
     assert 'Two beads of 20 mm along the -y axis of the tool, 10 mm apart' in asked[0]
     assert 'The arm needs 80 mm in that direction' in asked[0]

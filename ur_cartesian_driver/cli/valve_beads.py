@@ -72,7 +72,7 @@ class Beads:
         return self.fast**2 / (2.0 * ACCELERATION) + RUN
 
     @property
-    def room(self) -> float:
+    def span(self) -> float:
         """The length of the whole motion [m]."""
         return self.length + 2.0 * self.run
 
@@ -85,7 +85,7 @@ class Beads:
         path = Path(start).safe(valve, False)
         path = self._bead(path, self.slow, valve).at(speed=TRAVEL_SPEED)
         across = [self.beside * part for part in DIRECTIONS[self.along][1]]
-        path = path.by(dz=-LIFT, of_tool=True).by(*self._ahead(-self.room), of_tool=True)
+        path = path.by(dz=-LIFT, of_tool=True).by(*self._ahead(-self.span), of_tool=True)
         path = path.by(*across, of_tool=True).by(dz=LIFT, of_tool=True)
         return self._bead(path, self.fast, valve).by(dz=-LIFT, of_tool=True, speed=TRAVEL_SPEED)
 

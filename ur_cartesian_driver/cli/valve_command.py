@@ -111,7 +111,7 @@ def lay_beads(driver: Driver, beads: Beads, valve: Output, agrees: Callable[[str
     question = (
         f'{WARNING}\nTwo beads of {1e3 * beads.length:g} mm along the {beads.along} axis of the '
         f'tool, {1e3 * beads.beside:g} mm apart, from where it is: at {1e3 * beads.slow:g} mm/s, '
-        f'then at {1e3 * beads.fast:g} mm/s. The arm needs {1e3 * beads.room:.0f} mm in that '
+        f'then at {1e3 * beads.fast:g} mm/s. The arm needs {1e3 * beads.span:.0f} mm in that '
         f'direction. The valve is {output_name(valve.kind, valve.pin)}.'
     )
     if not agrees(question):
@@ -119,7 +119,8 @@ def lay_beads(driver: Driver, beads: Beads, valve: Output, agrees: Callable[[str
     speeds: list[float] = []
 
     def watch(progress: Progress) -> None:
-        speeds.append(progress.speed_scaling)
+        if progress.waypoint in BEAD_POINTS:
+            speeds.append(progress.speed_scaling)
 
     driver.start(plan, watch).result().raise_for_error()
     if min(speeds, default=0.0) < _FULL_SPEED:
