@@ -253,7 +253,24 @@ def switches(first, count):
     )
 
 
-async def outputs_at(cell, kind, chunk):
+def switches_beside(first, count):
+    """As :func:`switches`, but before and after points."""
+    places = [(1, {'distance': 0.004}), (4, {'distance': -0.005}), (9, {'fraction': -0.4})]
+    return tuple(
+        IOCommand(
+            waypoint=point,
+            offset=0.0,
+            output=OutputKind.STANDARD_DIGITAL,
+            pin=k,
+            value=1.0,
+            **place,
+        )
+        for k, (point, place) in enumerate(places)
+        if first <= point < first + count
+    )
+
+
+async def outputs_at(cell, kind, chunk, switches=switches):
     """Run 15 points, known at once or in parts; return when each output came on in the motion."""
     home, times, begin = cell.memory.read().actual_tcp_pose, {}, []
 
@@ -261,7 +278,7 @@ async def outputs_at(cell, kind, chunk):
         while True:
             if not begin and any(cell.robot.controller.motion.qd):
                 begin.append(cell.robot.controller.time)
-            for k in range(len(SWITCHES)):
+            for k in range(8):
                 if cell.robot.state().digital_outputs >> k & 1:
                     times.setdefault(k, cell.robot.controller.time - begin[0])
             await asyncio.sleep(0.5 * CYCLE)
@@ -297,6 +314,12 @@ def test_outputs_are_switched_as_if_all_points_had_been_known(kind):
     known = run_cell(lambda cell: outputs_at(cell, kind, 15))
     assert sorted(known) == list(range(len(SWITCHES)))
     assert run_cell(lambda cell: outputs_at(cell, kind, 5)) == known
+
+
+def test_outputs_beside_points_are_switched_as_if_all_points_had_been_known():
+    known = run_cell(lambda cell: outputs_at(cell, 'lines', 15, switches_beside))
+    assert sorted(known) == [0, 1, 2]
+    assert run_cell(lambda cell: outputs_at(cell, 'lines', 5, switches_beside)) == known
 
 
 def test_memory_stays_the_same_however_long_a_goal_goes_on():

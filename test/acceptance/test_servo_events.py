@@ -62,8 +62,9 @@ BEAD = ProportionalOutput(
 )
 
 
-def command(waypoint, pin, value=1.0, offset=0.0):
+def command(waypoint, pin, value=1.0, offset=0.0, **place):
     return IOCommand(
+        **place,
         waypoint=waypoint,
         offset=offset,
         output=OutputKind.STANDARD_DIGITAL,
@@ -174,6 +175,34 @@ def test_outputs_switch_where_the_tool_is_beside_its_path(slider):
     assert run.switched(LIGHT)[:2] == pytest.approx(PLACES[-1], abs=1e-4)
     speeds = run.table[:, 4]
     assert speeds.max() == pytest.approx(SPEED * slider, rel=0.05)
+
+
+@pytest.mark.parametrize('slider', [1.0, 0.3])
+def test_outputs_switch_at_places_beside_points_and_ahead_of_them(slider):
+    lead, way = 0.1, 0.02
+
+    async def scenario(cell):
+        cell.robot.controller.set_slider(slider)
+        run = await Recorded(
+            cell,
+            io_commands=(
+                command(1, LAMP, distance=way),
+                command(1, VALVE, distance=way, offset=-lead),
+                command(2, LIGHT, fraction=-0.25),
+            ),
+            path_offset=PathOffset(),
+        ).start()
+        outcome = await run.end()
+        assert outcome.code is ErrorCode.SUCCESSFUL, outcome
+        return run
+
+    run = run_cell(scenario)
+    bound = SPEED * slider * CYCLE + BOUND
+    place = PLACES[1][0] + way
+    assert run.switched(LAMP)[0] == pytest.approx(place, abs=bound)
+    assert run.switched(VALVE)[0] == pytest.approx(place - lead * slider * SPEED, abs=bound)
+    x = PLACES[2][0] - 0.25 * (PLACES[2][0] - PLACES[1][0])
+    assert run.switched(LIGHT)[0] == pytest.approx(x, abs=bound)
 
 
 def wandering(seed, count=9):

@@ -241,7 +241,7 @@ REFUSED = [
     (command(value=nan), r'\.value is nan'),
     (command(output=OutputKind.STANDARD_ANALOG, value=1.01), r'\.value is 1\.01; .*fraction'),
     (command(output=OutputKind.STANDARD_ANALOG, value=-inf), r'\.value is -inf'),
-    (command(offset=-0.001), r'\.offset is -0\.001 s, outside 0 to 60 s; '),
+    (command(offset=-1.001), r'\.offset is -1\.001 s, outside -1 to 60 s; '),
     (command(offset=nan), r'\.offset is nan'),
     (command(offset=60.1), r'\.offset is 60\.1 s'),
 ]

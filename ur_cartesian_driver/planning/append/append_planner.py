@@ -234,7 +234,16 @@ class _PartPlanner:
             if command.waypoint == self._before.points - 1:
                 old.append(replace(command, waypoint=command.waypoint - first))
             elif end_time > start_time and committed >= 0:
-                old.append(replace(command, waypoint=committed, offset=end_time - start_time))
+                # The place of a command beside a point is committed: only its time is still due.
+                old.append(
+                    replace(
+                        command,
+                        waypoint=committed,
+                        offset=end_time - start_time,
+                        distance=0.0,
+                        fraction=0.0,
+                    )
+                )
         return (*old, *numbered(self._appended, first))
 
     def moves_part(self, plan: Plan, records_before: int, start_time: float) -> AppendPlan:
@@ -304,7 +313,9 @@ class _PartPlanner:
             if isinstance(record, SwitchOutput)
         )
         still = []
-        for end_time, command in sorted(commands, key=lambda one: one[0]):
+        for end_time, command in sorted(
+            commands, key=lambda one: (one[0], one[1].distance + one[1].fraction)
+        ):
             kind = _output_key(command)
             if committed_records[kind]:
                 committed_records[kind] -= 1

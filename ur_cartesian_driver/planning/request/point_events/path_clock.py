@@ -5,7 +5,9 @@ The way and the pose of the tool at each time of a planned path, and the time at
 
 Lines are sampled only where the acceleration changes, so the tool does not move evenly between
 samples: it moves at constant acceleration. The speeds at the samples follow from that, one after
-the other: the mean of the speeds at both ends of a piece is its length over its time.
+the other: the mean of the speeds at both ends of a piece is its length over its time. Where
+samples are dense, as on splines, the mean speeds of the pieces on both sides are the better
+source, because an error in one speed does not go on to the next.
 """
 
 from __future__ import annotations
@@ -24,6 +26,8 @@ from ur_cartesian_driver.motion.plan.plan import ReferencePath
 _ARM_LENGTH = 0.1
 # A tool with less way than this per turn [m/rad] only turns.
 _LEAST_TURNING = 1e-3
+# Samples that are not farther apart than this are dense [s].
+_DENSE = 0.02
 # A piece of the path that is not longer than this [m] is a rest.
 _NO_WAY = 1e-9
 
@@ -132,11 +136,16 @@ def _speeds(steps: Floats, spans: Floats) -> Floats:
     :param spans: its duration (m - 1,) [s].
     """
     speeds = [0.0]
-    for step, span in zip(steps.tolist(), spans.tolist(), strict=True):
+    pieces = list(zip(steps.tolist(), spans.tolist(), strict=True))
+    for k, (step, span) in enumerate(pieces):
+        after, after_span = pieces[k + 1] if k + 1 < len(pieces) else (0.0, 0.0)
         if span <= 0.0:
             speeds.append(speeds[-1])
         elif step <= _NO_WAY:
             speeds.append(0.0)
+        elif after > _NO_WAY and 0.0 < after_span <= _DENSE and span <= _DENSE:
+            mean, mean_after = step / span, after / after_span
+            speeds.append((mean * after_span + mean_after * span) / (span + after_span))
         else:
             speeds.append(max(2.0 * step / span - speeds[-1], 0.0))
     return np.array(speeds)

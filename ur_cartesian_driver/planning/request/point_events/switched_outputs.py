@@ -46,17 +46,9 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
             )
         for field, waypoint in self.places(goal):
             check_point(field, waypoint, goal)
-        if goal.keep_open and mode is ExecutionMode.SPLINE:
+        if goal.keep_open:
             for i, command in enumerate(goal.io_commands):
-                for name in ('distance', 'fraction', 'offset'):
-                    value = getattr(command, name)
-                    if value < 0.0 or (value > 0.0 and name != 'offset'):
-                        raise NotAvailable(
-                            f'{self.field}[{i}].{name}',
-                            f'is {value:g}, but a SPLINE goal with keep_open switches outputs at '
-                            'its points or later',
-                            'add a point there, or send all points at once',
-                        )
+                _check_open(f'{self.field}[{i}]', command, mode)
 
     def check_event(self, where: str, command: IOCommand) -> None:
         """Refuse an output that the robot does not have, its value, or a place that is two."""
@@ -149,6 +141,31 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
                 'switch the output before the goal',
             )
         return point
+
+
+def _check_open(where: str, command: IOCommand, mode: ExecutionMode) -> None:
+    """Refuse places and leads that a goal to which points can be appended does not support."""
+    place = 'distance' if command.distance else 'fraction' if command.fraction else ''
+    if command.offset < 0.0:
+        raise NotAvailable(
+            f'{where}.offset',
+            f'is {command.offset:g} s, but a goal with keep_open has no leads: how fast the tool '
+            'gets to a place may depend on points that are yet to come',
+            'move the place by a distance, or send all points at once',
+        )
+    if place and mode is ExecutionMode.SPLINE:
+        raise NotAvailable(
+            f'{where}.{place}',
+            f'is {getattr(command, place):g}, but a SPLINE goal with keep_open switches outputs at '
+            'its points or later',
+            'add a point there, or send all points at once',
+        )
+    if place and command.offset > 0.0:
+        raise NotAvailable(
+            f'{where}.offset',
+            f'is {command.offset:g} s after a place beside a point, but the goal has keep_open',
+            f'increase {place}',
+        )
 
 
 def _place(command: IOCommand, rest: GoalRest) -> float:
