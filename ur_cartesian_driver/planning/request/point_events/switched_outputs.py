@@ -156,8 +156,8 @@ def _check_open(where: str, command: IOCommand, mode: ExecutionMode) -> None:
     if place and mode is ExecutionMode.SPLINE:
         raise NotAvailable(
             f'{where}.{place}',
-            f'is {getattr(command, place):g}, but a SPLINE goal with keep_open switches outputs at '
-            'its points or later',
+            f'is {getattr(command, place):g}, but a SPLINE goal with keep_open switches outputs '
+            'at its points or later',
             'add a point there, or send all points at once',
         )
     if place and command.offset > 0.0:
