@@ -89,9 +89,10 @@ class PathClock:
 
         :param leaving: where the tool rests there, whether the end of the rest is meant.
         """
-        side = 'right' if leaving else 'left'
-        shift = _NO_WAY if leaving else -_NO_WAY
-        k = int(np.searchsorted(self._ways, way + shift, side=side)) - 1
+        if leaving:
+            k = int(np.searchsorted(self._ways, way + _NO_WAY, side='right')) - 1
+        else:
+            k = int(np.searchsorted(self._ways, way - _NO_WAY, side='left')) - 1
         k = min(max(k, 0), len(self._steps) - 1)
         length = float(self._ways[k + 1] - self._ways[k])
         part = min(max((way - float(self._ways[k])) / length, 0.0), 1.0) if length > 0.0 else 0.0
