@@ -151,9 +151,9 @@ class PathTime:
         return speeds[max(k - 3, 0) : k + 2].min() < 0.2 * speeds.max()
 
 
-def misses(run, path_time):
+def misses(run, path_time, bound=1.0):
     """
-    Return by how many cycles each output was late or early, if by more than one.
+    Return by how many cycles each output was late or early, if by more than ``bound``.
 
     Near a rest the speed tells little of the slider, and the tool makes little way: there the
     bound is wider.
@@ -173,7 +173,7 @@ def misses(run, path_time):
         late = at[wanted.pin] - due
         off = run.ways[at[wanted.pin]] - np.interp(due, np.arange(len(run.ways)), run.ways)
         slow = path_time.is_near_rest(place) or path_time.is_near_rest(run.ways[int(due)])
-        if abs(late) > 1.0 and not (slow and (abs(late) < REST_CYCLES or abs(off) < REST_BOUND)):
+        if abs(late) > bound and not (slow and (abs(late) < REST_CYCLES or abs(off) < REST_BOUND)):
             found[wanted.pin] = round(float(late), 2)
     return found
 
@@ -261,9 +261,9 @@ def test_a_dwell_and_a_pause_shift_no_output():
         )
 
     def act(controller, cycle):
-        if cycle in (330, 720):
+        if cycle in (285, 650):  # on a line, and in the dwell
             controller.programs.pause()
-        elif cycle in (430, 820):
+        elif cycle in (385, 750):
             controller.programs.play()
 
     robot = RobotInMemory('ur5e')
@@ -341,5 +341,7 @@ def test_random_places_and_leads():
             continue
         accepted += 1
         path_time = path_time_of(robot, by_kind(kind, commands, speed))
-        assert misses(run, path_time) == {}, f'case {number}: {kind} at {speed:.3f} m/s'
+        # How long the controller takes in a blend is known less well.
+        bound = 2.0 if kind == 'blends' else 1.0
+        assert misses(run, path_time, bound) == {}, f'case {number}: {kind} at {speed:.3f} m/s'
     assert accepted > 0.3 * cases(500)

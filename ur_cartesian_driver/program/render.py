@@ -167,6 +167,8 @@ OFFSET_CONSTANTS: dict[str, float] = {
 
 #: Cycles by which an output is switched early, because it takes effect at the end of a cycle.
 OUTPUT_LEAD = 1.5
+#: A tool that has moved by this much more [m] than its speed allows has coasted into a pause.
+OUTPUT_JUMP = 1e-4
 #: The number of words that the program keeps for a pending output.
 OUTPUT_WORDS = 18
 #: The columns among these words that the program uses, and their names in the program.
@@ -409,6 +411,7 @@ def _output_constants() -> Iterator[str]:
     yield f'OUTPUT_ONES = {[1.0] * (trajectory.MAX_PENDING_OUTPUTS + trajectory.MAX_LEADS)}'
     yield f'OUTPUT_ROW = {[0.0] * OUTPUT_WORDS}'
     yield f'OUTPUT_LEAD = {OUTPUT_LEAD}'
+    yield f'OUTPUT_JUMP = {OUTPUT_JUMP}'
     yield f'MAX_LEADS = {trajectory.MAX_LEADS}'
     yield f'LEAD_PIECES = {LEAD_PIECES}'
     yield f'LEAD_ONES = {[1.0] * trajectory.MAX_LEADS}'
