@@ -6,9 +6,9 @@ Two beads side by side, at two speeds, and the dead times of the valve that laid
 The output switches at the same two places of both beads. At the speed v, a valve that opens a time
 after its output begins the bead ``v * open`` behind the first place, and ends it ``v * close``
 behind the second. So the fast bead begins ``(fast - slow) * open`` behind the slow one, and ends
-``(fast - slow) * close`` behind it. Only these two distances have to be measured: the places, the
-width of a bead and the offset of the nozzle cancel out. The lengths of the beads do not suffice:
-they differ by ``(fast - slow) * (close - open)``, whatever ``open`` is.
+``(fast - slow) * close`` behind it. Only these two distances have to be measured: the places and
+the offset of the nozzle cancel out. The lengths of the beads do not suffice: they differ by
+``(fast - slow) * (close - open)``, whatever ``open`` is.
 """
 
 from __future__ import annotations

@@ -27,6 +27,10 @@ WARNING = (
     'The arm will move, and the valve will open. A hand on the emergency stop, nobody in reach, '
     'the nozzle as high above a test piece as above the work.'
 )
+HOW_TO_READ = (
+    'Read where the beads have their full width: the slow one is thicker, and its round ends '
+    'reach farther.'
+)
 #: Below this part of its speed the arm was slowed down by the slider.
 _FULL_SPEED = 0.99
 
@@ -59,6 +63,7 @@ def measure_valve(arguments: argparse.Namespace) -> int:
             driver.wait_ready(arguments.wait)
             if not lay_beads(driver, beads, Output(kind, pin), ask):
                 return 1
+        print(HOW_TO_READ)
         shifts = [ask_distance(question, input) for question in QUESTIONS]
     else:
         raise ValueError(
