@@ -86,11 +86,11 @@ def test_the_page_names_every_method_of_a_path():
     assert set(missing) <= known
 
 
-def test_the_goal_of_the_page_on_outputs_is_the_glue_example(tmp_path, monkeypatch):
+def test_the_goals_of_the_page_on_outputs_are_the_examples(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     page = (CHECKOUT / 'doc' / 'outputs.md').read_text('utf-8')
-    (program,) = re.findall(r'^```python\n(.*?)^```$', page, re.DOTALL | re.MULTILINE)
-    exec(program, {})
+    for program in re.findall(r'^```python\n(.*?)^```$', page, re.DOTALL | re.MULTILINE):
+        exec(program, {})
 
     def content(file):
         goal = Path.load(file).goal()
@@ -98,4 +98,5 @@ def test_the_goal_of_the_page_on_outputs_is_the_glue_example(tmp_path, monkeypat
         places = [waypoint.pose.position for waypoint in goal.waypoints]
         return places, motions, goal.io_commands, goal.safe_outputs
 
-    assert content('glue.yaml') == content(CHECKOUT / 'config' / 'examples' / 'glue.yaml')
+    for file in ('glue.yaml', 'bead_by_place.yaml'):
+        assert content(file) == content(CHECKOUT / 'config' / 'examples' / file)
