@@ -195,6 +195,12 @@ def test_places_beside_points_stay_where_they_are_on_the_path():
     )
 
 
+def test_a_named_lead_is_kept_ahead_and_dropped_where_the_arm_rests():
+    commands = (switch(0, 1.0, lead='valve_1'), switch(2, 0.0, lead='valve_1'))
+    left = resume(goal(io_commands=commands), at(1, 0.5), overlap=0.0).goal
+    assert left.io_commands == (switch(1, 1.0), switch(3, 0.0, lead='valve_1'))
+
+
 def test_a_place_before_the_first_point_is_ahead_of_a_goal_that_begins_anew():
     command = switch(0, 1.0, distance=-0.01)
     assert resume(goal(io_commands=(command,)), at(0, 0.5)).goal.io_commands == (command,)

@@ -22,6 +22,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     SegmentType,
     Waypoint,
 )
+from ur_cartesian_driver.motion.goal.leads import Lead
 from ur_cartesian_driver.motion.plan.primitive import SwitchOutput
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
@@ -196,6 +197,22 @@ def test_parts_become_what_the_whole_goal_is(goal, sizes):
     assert rows.time[passed] == pytest.approx(whole.reference.time[passed], abs=1e-4)
     assert part.next_goal.points == COUNT
     assert part.ending_records == 0
+
+
+def test_a_lead_of_an_appended_command_is_refused_by_its_time_or_its_name():
+    lead = Lead(name='valve', output=OutputKind.STANDARD_DIGITAL, pin=6, open=0.02, close=0.0)
+    options = replace(OPTIONS, leads=(lead,))
+    goal = moves(1)
+    first = plan(replace(goal, **of(goal, 0, 4), keep_open=True), STATE, ARM, options)
+    part = plan_first_part(first, ARM, options)
+    for name, sentence in (
+        ('valve', r'io_commands\[0\]\.offset is -0\.02 s, but a goal with keep_open has no leads'),
+        ('other', r"io_commands\[0\]\.lead is 'other', but the driver has only valve"),
+    ):
+        command = replace(outputs((0.0,))[6], lead=name)
+        points = AppendedPoints(**of(goal, 4, COUNT, io_commands=(command,)), last=True)
+        with pytest.raises(InvalidGoal, match=sentence):
+            plan_append(part.next_goal, points, ARM, options, from_rest=False)
 
 
 def test_points_are_appended_where_the_limit_of_points_is_the_largest():

@@ -6,7 +6,10 @@ import pytest
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.goal_files import GoalFileError
-from ur_cartesian_driver.ros.client import load_goal
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.goal.goal import OutputKind
+from ur_cartesian_driver.motion.goal.leads import Lead
+from ur_cartesian_driver.ros.client import apply_leads, load_goal
 
 
 def test_a_goal_reads_as_in_ros2_action_send_goal():
@@ -49,6 +52,19 @@ def test_a_text_that_yaml_chokes_on_is_one_sentence(text, sentence):
 def test_fields_that_are_not_named_keep_their_defaults():
     (point,) = load_goal('trajectory: {points: [{}]}').trajectory.points
     assert point.pose.orientation.w == 1.0
+
+
+def test_leads_become_negative_offsets():
+    goal = load_goal(
+        'io_commands: [{output: 0, pin: 2, value: 1.0, lead: valve_1}, {output: 0, pin: 2}]'
+    )
+    lead = Lead(name='valve_1', output=OutputKind.STANDARD_DIGITAL, pin=2, open=0.06, close=0.035)
+    opens, other = apply_leads(goal, (lead,), 'leads.yaml').io_commands
+    assert (opens.lead, opens.offset.sec, opens.offset.nanosec) == ('', -1, 940_000_000)
+    assert (other.lead, other.offset.sec, other.offset.nanosec) == ('', 0, 0)
+    goal.io_commands[0].lead = 'valve_2'
+    with pytest.raises(InvalidGoal, match=r'leads\.yaml has only valve_1'):
+        apply_leads(goal, (lead,), 'leads.yaml')
 
 
 @pytest.mark.parametrize('text', ['', '{}', '# nothing'])

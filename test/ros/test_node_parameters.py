@@ -105,6 +105,7 @@ def test_every_option_is_a_parameter_but_for_what_is_found_out():
         'acceleration_known',
         'dialect',
         'prelude',
+        'leads',
         'robot',
         'twin',
     }

@@ -127,6 +127,12 @@ def _add_goal(command: CommandParser, optional: bool = False) -> None:
     command.add_argument(
         '--tf-prefix', default='', help='prefix for the names of frames and joints in the file'
     )
+    command.add_argument(
+        '--lead-file',
+        metavar='FILE',
+        help='dead times of valves that the goal names, from `ur-cartesian valve`; by default the '
+        'driver knows them',
+    )
 
 
 def _add_driver(command: CommandParser) -> None:
@@ -465,6 +471,68 @@ def _add_teach(command: CommandParser) -> None:
     )
 
 
+def _add_valve(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import valve_beads, valve_command
+
+    command.set_defaults(run=valve_command.measure_valve)
+    command.add_argument('name', help='name of the valve in goals, like valve_1')
+    command.add_argument(
+        '--output',
+        nargs=2,
+        required=True,
+        metavar=('KIND', 'PIN'),
+        help='digital output that opens the valve, like standard_digital 2',
+    )
+    command.add_argument('--lead-file', default='leads.yaml', metavar='FILE', help='file to write')
+    command.add_argument(
+        '--measured',
+        type=float,
+        nargs=2,
+        metavar=('BEGINS', 'ENDS'),
+        help='how far behind the slow bead the fast one begins and ends [mm]: lay no beads',
+    )
+    command.add_argument(
+        '--ruler',
+        type=argument_types.length,
+        default='0.5mm',
+        metavar='LENGTH',
+        help='uncertainty of one reading',
+    )
+    for name, speed in (('slow', 0.02), ('fast', 0.2)):
+        command.add_argument(
+            f'--{name}',
+            type=argument_types.factor,
+            default=speed,
+            help=f'speed of the {name} bead [m/s]',
+        )
+    for name, default, text in (
+        ('length', '100mm', 'of a bead'),
+        ('beside', '10mm', 'between them'),
+    ):
+        command.add_argument(
+            f'--{name}',
+            type=argument_types.length,
+            default=default,
+            metavar='LENGTH',
+            help=text,
+        )
+    command.add_argument(
+        '--along',
+        default='x',
+        choices=valve_beads.DIRECTIONS,
+        help='axis of the tool along which the beads are laid',
+    )
+    command.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
+    add_model(command)
+    add_ports(command, 'its port', rtde=30004, primary=30001, dashboard=29999)
+    command.add_argument(
+        '--wait',
+        type=argument_types.seconds,
+        default=10.0,
+        help='until the robot must be ready [s]',
+    )
+
+
 def _add_where(command: CommandParser) -> None:
     from ur_cartesian_driver.cli import commands
 
@@ -607,6 +675,10 @@ COMMANDS: dict[str, tuple[str, Callable[[CommandParser], None]]] = {
     'teach': (
         'guide the arm by hand, take points with Enter, and write them as a goal to edit',
         _add_teach,
+    ),
+    'valve': (
+        'lay two beads, ask for two distances, and write the dead times of the valve',
+        _add_valve,
     ),
     'where': ('print the pose of the robot, as a point to paste into a goal', _add_where),
     'calibration': (

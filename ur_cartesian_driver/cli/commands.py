@@ -159,13 +159,16 @@ def _note_place(arguments: argparse.Namespace, result: Any, left: Any) -> None:
 
 
 def read_goal(arguments: argparse.Namespace) -> Any:
-    """Return the goal message of a file, an example or standard input."""
+    """Return the goal message of a file, an example or standard input, changed as options say."""
     from ur_cartesian_driver.ros import client
 
-    return client.add_tf_prefix(
-        client.load_goal(sys.stdin.read() if arguments.file == '-' else goal_file(arguments.file)),
-        arguments.tf_prefix,
-    )
+    source = sys.stdin.read() if arguments.file == '-' else goal_file(arguments.file)
+    goal = client.add_tf_prefix(client.load_goal(source), arguments.tf_prefix)
+    if arguments.lead_file:
+        from ur_cartesian_driver.goal_files.lead_file import read_leads
+
+        goal = client.apply_leads(goal, read_leads(arguments.lead_file), arguments.lead_file)
+    return goal
 
 
 def code_text(number: int) -> str:

@@ -83,7 +83,7 @@ def _value(each: GoalField, value: Any) -> Any:
         case Form.CHOICE:
             return int(value)
         case Form.DURATION:
-            return _duration(value)
+            return duration_fields(value)
         case Form.VECTOR:
             return _vector(value)
         case Form.RATES:
@@ -111,7 +111,7 @@ def _vector(values: Iterable[float]) -> Fields:
     return dict(zip('xyz', values, strict=True))
 
 
-def _duration(time: float) -> Fields:
+def duration_fields(time: float) -> Fields:
     """Return a time [s] as seconds and nanoseconds, rounded to the nearest nanosecond."""
     sec, nanosec = divmod(round(time * _NANOSECONDS), _NANOSECONDS)
     return {name: part for name, part in (('sec', sec), ('nanosec', nanosec)) if part}

@@ -51,7 +51,7 @@ class PathWithEvents(PathOfMotions):
         before: float = 0.0,
         distance: float = 0.0,
         fraction: float = 0.0,
-        lead: float = 0.0,
+        lead: float | str = 0.0,
     ) -> Self:
         """
         Set an output when the tool passes the last point, or a place before or after it.
@@ -63,22 +63,23 @@ class PathWithEvents(PathOfMotions):
         :param fraction: the same as a fraction of the segment to the point (negative), or of the
             segment that follows (positive).
         :param lead: how much ahead of the place to switch, in real time [s]: the dead time of a
-            valve.
+            valve, or the name of the valve in the driver's ``lead_file``.
         :raises InvalidGoal: there is no point, or the value, a time or the place is not possible.
         """
         if not self._points:
             raise InvalidGoal('set()', 'comes before the first point', 'add a motion first')
         index, offset = len(self) - 1, after
         where = f'set() at point {index}'
+        valve, ahead = (lead, 0.0) if isinstance(lead, str) else ('', lead)
         for name, time, most in (
             ('after', after, MAX_OUTPUT_OFFSET),
             ('before', before, MAX_OUTPUT_OFFSET),
-            ('lead', lead, MAX_OUTPUT_LEAD),
+            ('lead', ahead, MAX_OUTPUT_LEAD),
         ):
             amount(where, name, time, most, 's')
         if lead and (after or before):
             raise InvalidGoal(
-                where, f'has lead={lead:g} s and another time', 'move the place by a distance'
+                where, f'has lead={lead!r} and another time', 'move the place by a distance'
             )
         if before:
             index, offset = index - 1, self._points[-1].duration / NANOSECONDS - before
@@ -91,9 +92,10 @@ class PathWithEvents(PathOfMotions):
                 )
             offset += self._points[index].segment.dwell
         command = replace(
-            output.command(value, 0, round((offset - lead) * NANOSECONDS) / NANOSECONDS),
+            output.command(value, 0, round((offset - ahead) * NANOSECONDS) / NANOSECONDS),
             distance=float(distance),
             fraction=float(fraction),
+            lead=valve,
         )
         check_event(where, command)
         point = self._points[index]

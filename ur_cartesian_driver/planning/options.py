@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal, Protocol
 
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes
 from ur_cartesian_driver.motion.goal.field_table import Range
+from ur_cartesian_driver.motion.goal.goal import IOCommand
+from ur_cartesian_driver.motion.goal.leads import Lead, with_lead_times
 from ur_cartesian_driver.motion.goal.output_names import parse_safe_outputs
 from ur_cartesian_driver.motion.goal.parameter_fields import check_parameters, Detected
 from ur_cartesian_driver.motion.twin.laws import MotionLaws
@@ -93,6 +96,13 @@ class PlanningOptions:
     #:
     #: Example: ['standard_digital 3 0', 'standard_analog 0 0.0 current']
     safe_outputs: tuple[str, ...] = ()
+    #: YAML file with the dead times of valves, which 'ur-cartesian valve' writes. An output
+    #: command that names a valve (lead: valve_1) comes earlier by its dead time. The file is read
+    #: once, at the start. A relative path begins at the folder in which the driver was started.
+    #: Empty: no file.
+    lead_file: str = ''
+    #: The leads of lead_file, or of the owner.
+    leads: Detected[tuple[Lead, ...]] = ()
     #: Smallest angle between wrist 2 and the straight wrist on lines and arcs [rad]; 0.0: no
     #: limit. Near a singularity joints move fast or have to flip. Does not apply to joint motions,
     #: nor to an arm that starts near the singularity and moves away from it.
@@ -230,6 +240,11 @@ class PlanningOptions:
         check_parameters(self)
         parse_planes(self.workspace_planes)
         parse_safe_outputs(self.safe_outputs)
+        if self.lead_file and not self.leads:  # not read again by replace()
+            # Imported here, because most drivers have no such file.
+            from ur_cartesian_driver.goal_files.lead_file import read_leads
+
+            object.__setattr__(self, 'leads', read_leads(self.lead_file))
         if self.twin_file and self.twin is None:
             object.__setattr__(self, 'twin', _read_twin(self.twin_file))
 
@@ -247,6 +262,14 @@ class PlanningOptions:
     def laws(self) -> MotionLaws:
         """The laws by which the robot moves: measured, or else assumed."""
         return laws_of(self.used_twin, self.turn_ratio)
+
+    def lead_times(self, commands: Sequence[IOCommand]) -> tuple[IOCommand, ...]:
+        """
+        Return output commands, each earlier by the dead time of the lead that it names.
+
+        :raises InvalidGoal: a name is unknown, or its lead belongs to another output.
+        """
+        return with_lead_times(commands, self.leads, self.lead_file)
 
     def for_program(self, settings: ProgramTraits) -> PlanningOptions:
         """Return the options for the robot program of a driver."""

@@ -9,7 +9,7 @@ whose reader (rosidl_runtime_py) is missing if ROS 2 is installed as Python whee
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 import contextlib
 import os
 import signal
@@ -19,6 +19,7 @@ from types import FrameType
 from typing import Any, TypeAlias
 
 from action_msgs.msg import GoalStatus, GoalStatusArray
+from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import Vector3, Vector3Stamped
 import rclpy
 from rclpy.action.client import ActionClient
@@ -35,10 +36,11 @@ from std_msgs.msg import Header
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.goal_files.goal_file import read_goal_file
-from ur_cartesian_driver.goal_files.goal_reading import goal_from_fields
+from ur_cartesian_driver.goal_files.goal_reading import goal_from_fields, io_commands
 from ur_cartesian_driver.goal_files.goal_schema import message_of, with_defaults
-from ur_cartesian_driver.goal_files.goal_writing import fields_of_goal
+from ur_cartesian_driver.goal_files.goal_writing import duration_fields, fields_of_goal
 from ur_cartesian_driver.motion.events import Outcome, PathPlace
+from ur_cartesian_driver.motion.goal.leads import Lead, with_lead_times
 from ur_cartesian_driver.msg import DriverStatus
 from ur_cartesian_driver.path import Path, resume, ResumedGoal
 from ur_cartesian_driver.ros.goal_appender import GoalAppender
@@ -88,6 +90,22 @@ def add_tf_prefix(
         posture.posture_joint_names = [
             _prefixed(tf_prefix, name) for name in posture.posture_joint_names
         ]
+    return goal
+
+
+def apply_leads(
+    goal: FollowCartesianTrajectory.Goal, leads: Sequence[Lead], file: str
+) -> FollowCartesianTrajectory.Goal:
+    """
+    Replace the names of leads in a goal by earlier times, as a driver does; return the goal.
+
+    :param file: the file of the leads, for refusals.
+    :raises InvalidGoal: as for :func:`~ur_cartesian_driver.motion.goal.leads.with_lead_times`.
+    """
+    commands = with_lead_times(io_commands(goal), leads, file)
+    for message, command in zip(goal.io_commands, commands, strict=True):
+        message.lead = command.lead
+        message.offset = Duration(**duration_fields(command.offset))
     return goal
 
 

@@ -319,6 +319,8 @@ class IOCommand:
     #: The same as a fraction of a segment's length: of the one that ends at the waypoint if
     #: negative, of the one that begins there if positive.
     fraction: Annotated[float, Range(-1.0, 1.0)] = 0.0
+    #: Name of a lead: the command comes earlier by its dead time, see ``lead_file``; '' = none.
+    lead: str = ''
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

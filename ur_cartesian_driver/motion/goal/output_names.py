@@ -23,6 +23,30 @@ def output_name(kind: OutputKind, pin: int) -> str:
     return f'{OUTPUTS[kind][0]} {pin}'
 
 
+def output_text(kind: OutputKind, pin: int) -> str:
+    """Return an output as files and parameters name it, such as ``standard_digital 2``."""
+    return f'{kind.name.lower()} {pin}'
+
+
+def parse_output(text: str) -> tuple[OutputKind, int]:
+    """
+    Return kind and pin of a text such as ``standard_digital 2``.
+
+    :raises ValueError: the text has another form, or the robot has no such output.
+    """
+    try:
+        kind_name, pin_text = text.split()
+        kind, pin = OutputKind[kind_name.upper()], int(pin_text)
+    except (KeyError, ValueError):
+        raise ValueError(
+            f'output is {text!r:.60}, but must be "kind pin", where kind is one of '
+            f'{", ".join(kind.name.lower() for kind in OutputKind)}'
+        ) from None
+    if (fault := output_fault(kind, pin, 0.0)) is not None:
+        raise ValueError(f'output is {text!r:.60}: its {fault[0]} {fault[1]}; {fault[2]}')
+    return kind, pin
+
+
 def output_fault(kind: OutputKind, pin: int, value: float) -> tuple[str, str, str] | None:
     """Return the wrong field of an output, its fault and a remedy; None if nothing is wrong."""
     name, pins = OUTPUTS[kind]

@@ -129,6 +129,7 @@ def plan_append(
     :param from_rest: whether the ending was sent, so that the arm is or will be at rest.
     :raises GoalRefused: the points are wrong; the text numbers points from the goal's start.
     """
+    appended = replace(appended, io_commands=options.lead_times(appended.io_commands))
     cut = cut_tail(appendable, cut_time(appendable, appended), arm)
     if cut is appendable:
         return _plan_behind(appendable, appended, arm, options, from_rest=from_rest)

@@ -13,6 +13,7 @@ Refusals name fields as the ROS messages do (``trajectory.points[2].pose.orienta
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import isfinite
 from typing import TypeAlias
 
@@ -79,7 +80,7 @@ Rule: TypeAlias = Callable[[GoalTable, PlanningOptions], None]
 
 def check(goal: Goal, options: PlanningOptions) -> GoalTable:
     """
-    Refuse a goal that is wrong for every robot; otherwise return it as a table.
+    Refuse a goal that is wrong for every robot; otherwise return it as a table, without leads.
 
     :raises GoalRefused: the goal is wrong; the text names point, field, value and bound.
     """
@@ -87,6 +88,7 @@ def check(goal: Goal, options: PlanningOptions) -> GoalTable:
         table = goal_table(goal)
     except WrongType as error:
         raise InvalidGoal(error.field, error.problem) from None
+    table = replace(table, io_commands=options.lead_times(table.io_commands))
     with np.errstate(over='ignore', invalid='ignore'):  # a goal may contain any numbers
         for rule in RULES:
             rule(table, options)

@@ -81,6 +81,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
                 offset=max(round(due, _DIGITS), 0.0),
                 distance=0.0,
                 fraction=0.0,
+                lead='',  # the arm rests there, so nothing can come ahead
             )
             if due > 0.0:
                 left.append(command)

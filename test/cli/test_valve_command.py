@@ -1,0 +1,128 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The command ``valve``: dead times by hand calculation, its questions, its file, its refusals."""
+
+from math import hypot, sqrt
+
+import pytest
+
+from ur_cartesian_driver.cli import main
+from ur_cartesian_driver.cli.valve_beads import Beads, dead_times
+from ur_cartesian_driver.cli.valve_command import ask_distance
+from ur_cartesian_driver.goal_files.lead_file import read_leads
+from ur_cartesian_driver.motion.goal.goal import OutputKind
+
+SPEEDS = {'slow': 0.02, 'fast': 0.2}
+
+
+def test_the_times_are_the_distances_by_the_difference_of_the_speeds():
+    # 180 mm/s apart: 10.8 mm are 60 ms, 6.3 mm are 35 ms.
+    times = dead_times(0.0108, 0.0063, **SPEEDS, reading=0.0, cycle=0.0)
+    assert times.open == pytest.approx(0.060)
+    assert times.close == pytest.approx(0.035)
+    assert times.uncertainty == 0.0
+
+
+def test_the_uncertainty_is_that_of_two_readings_and_of_the_cycle():
+    # Two readings of 0.5 mm: 0.707 mm at 180 mm/s are 3.93 ms.
+    ruler = dead_times(0.0108, 0.0063, **SPEEDS, reading=0.0005, cycle=0.0).uncertainty
+    assert ruler == pytest.approx(0.003928, abs=1e-6)
+    # Half a cycle of 2 ms to both sides has the deviation 0.577 ms: 0.1155 and 0.01155 mm.
+    cycle = dead_times(0.0108, 0.0063, **SPEEDS, reading=0.0, cycle=0.002).uncertainty
+    assert cycle == pytest.approx(hypot(0.1155, 0.01155) / 180.0, rel=1e-3)
+    both = dead_times(0.0108, 0.0063, **SPEEDS, reading=0.0005, cycle=0.002).uncertainty
+    assert both == pytest.approx(hypot(ruler, cycle))
+
+
+def test_a_time_a_little_below_zero_is_zero_and_one_far_below_a_mistake():
+    assert dead_times(-0.001, 0.0, **SPEEDS, reading=0.0005, cycle=0.0).open == 0.0
+    limit = 3.0 * sqrt(2.0) * 0.0005  # 2.12 mm
+    with pytest.raises(ValueError, match=r'the fast bead ends 2\.2 mm before the slow one'):
+        dead_times(0.0, -limit - 0.00008, **SPEEDS, reading=0.0005, cycle=0.0)
+    with pytest.raises(ValueError, match='the fast bead begins'):
+        dead_times(float('nan'), 0.0, **SPEEDS, reading=0.0005, cycle=0.0)
+
+
+@pytest.mark.parametrize(
+    ('changes', 'words'),
+    [({'fast': 0.03}, 'at least twice as fast'), ({'length': 0.01}, '--length is 10 mm')],
+)
+def test_beads_that_tell_nothing_are_refused(changes, words):
+    fields = {'slow': 0.02, 'fast': 0.2, 'length': 0.1, 'beside': 0.01, 'along': 'x'} | changes
+    with pytest.raises(ValueError, match=words):
+        Beads(**fields)
+
+
+def test_a_distance_is_asked_for_until_it_is_a_number(capsys):
+    answers = iter(['', 'far', 'inf', '10,8 mm'])
+    asked = []
+
+    def read(question):
+        asked.append(question)
+        return next(answers)
+
+    assert ask_distance('begin', read) == 10.8
+    assert asked[0] == (
+        'How far behind the begin of the slow bead is the begin of the fast one [mm]? '
+    )
+    assert "'far' is no number; give millimetres, like 10.8" in capsys.readouterr().out
+
+
+@pytest.fixture
+def valve(tmp_path, capsys):
+    """Run the command on a file; return its status, its output and the file."""
+    file = tmp_path / 'leads.yaml'
+
+    def run(*words):
+        output = ['--output', 'standard_digital', '2']
+        status = main(['valve', 'valve_1', *output, '--lead-file', str(file), *words])
+        shown = capsys.readouterr()
+        return status, shown.out + shown.err, file
+
+    return run
+
+
+def test_measured_beads_are_written(valve):
+    status, said, file = valve('--measured', '10.8', '6.3')
+    assert status == 0
+    assert said == (
+        'valve_1 opens 60.0 ms after its output and closes 35.0 ms after it, each +/- 4.0 ms: '
+        '+/- 0.80 mm at 200 mm/s\n'
+        f'written to {file}: a driver with lead_file:={file} uses it for outputs with "lead: '
+        'valve_1"\n'
+    )
+    (lead,) = read_leads(file)
+    assert (lead.name, lead.output, lead.pin) == ('valve_1', OutputKind.STANDARD_DIGITAL, 2)
+    assert (lead.open, lead.close) == (0.06, 0.035)
+    assert len(lead.date) == len('2026-03-02')
+
+
+def test_a_better_ruler_makes_them_better(valve):
+    _, said, _ = valve('--measured', '10.8', '6.3', '--ruler', '0.05mm')
+    assert 'each +/- 0.8 ms: +/- 0.15 mm at 200 mm/s' in said
+
+
+@pytest.mark.parametrize(
+    ('words', 'said'),
+    [
+        (['--measured', '-10.8', '6.3'], 'the fast bead begins 10.8 mm before the slow one'),
+        (['--measured', '270', '6.3'], "open of 'valve_1' is 1.5 s"),
+        ([], 'valve asks before it moves the arm, so it needs a terminal'),
+        (['--fast', '0.03', '--measured', '1', '1'], 'lay one bead at least twice as fast'),
+        (['--output', 'tool_digital', '2', '--measured', '1', '1'], 'its pin is 2'),
+    ],
+)
+def test_what_cannot_be_is_refused_and_nothing_is_written(valve, words, said):
+    status, text, file = valve(*words)
+    assert status == 1
+    assert text.startswith('ur-cartesian valve: ')
+    assert said in text
+    assert not file.exists()
+
+
+def test_a_wrong_file_is_refused_first_and_kept(valve, tmp_path):
+    (tmp_path / 'leads.yaml').write_text('points: []\n', 'utf-8')
+    status, text, file = valve()
+    assert status == 1
+    assert 'has no leads' in text
+    assert file.read_text('utf-8') == 'points: []\n'

@@ -1,0 +1,145 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Two beads side by side, at two speeds, and the dead times of the valve that laid them.
+
+The output switches at the same two places of both beads. At the speed v, a valve that opens a time
+after its output begins the bead ``v * open`` behind the first place, and ends it ``v * close``
+behind the second. So the fast bead begins ``(fast - slow) * open`` behind the slow one, and ends
+``(fast - slow) * close`` behind it. Only these two distances have to be measured: the places and
+the offset of the nozzle cancel out. The lengths of the beads do not suffice: they differ by
+``(fast - slow) * (close - open)``, whatever ``open`` is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot, sqrt
+
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.path import mm, Output, Path
+
+#: Acceleration of the beads, and speed between them [m/s^2], [m/s].
+ACCELERATION, TRAVEL_SPEED = 1.0, 0.05
+#: Constant speed before and behind a bead, and height above it on the way to the next one [m].
+RUN, LIFT = mm(10), mm(20)
+#: Corner deviation at the ends of a bead, so that the arm passes them at full speed [m]: on a
+#: straight line it deviates by nothing. In a blend it would slow down.
+PASSING = mm(0.1)
+#: Direction of a bead and of the second one beside it, by name: axes of the tool.
+DIRECTIONS = {
+    'x': ((1, 0), (0, 1)),
+    '-x': ((-1, 0), (0, 1)),
+    'y': ((0, 1), (1, 0)),
+    '-y': ((0, -1), (1, 0)),
+}
+#: The points of the path to which the beads lead.
+BEAD_POINTS = (1, 8)
+#: A dead time that is negative by more standard uncertainties is a mistake of the measurement.
+_MAX_NEGATIVE = 3.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Beads:
+    """
+    The two beads.
+
+    :raises ValueError: the speeds are too close to each other, or a bead is too short.
+    """
+
+    #: Speeds [m/s].
+    slow: float
+    fast: float
+    #: Distance between the places at which the output switches, and between the beads [m].
+    length: float
+    beside: float
+    #: A key of :data:`DIRECTIONS`.
+    along: str
+
+    def __post_init__(self) -> None:
+        """Check speeds and length."""
+        if self.fast < 2.0 * self.slow:
+            raise ValueError(
+                f'--fast is {self.fast:g} m/s and --slow {self.slow:g} m/s; lay one bead at least '
+                'twice as fast as the other'
+            )
+        if self.length < 2.0 * RUN:
+            raise ValueError(f'--length is {1e3 * self.length:g} mm; lay beads of 20 mm or more')
+
+    @property
+    def run(self) -> float:
+        """The distance to gain speed before a bead, and to lose it behind the bead [m]."""
+        return self.fast**2 / (2.0 * ACCELERATION) + RUN
+
+    @property
+    def span(self) -> float:
+        """The length of the whole motion [m]."""
+        return self.length + 2.0 * self.run
+
+    def path(self, start: Pose, valve: Output) -> Path:
+        """
+        Return the path of both beads, which begins with the run-up to the slow one.
+
+        :param start: where the tool is, with its nozzle as far above the work as for a bead.
+        """
+        path = Path(start).safe(valve, False)
+        path = self._bead(path, self.slow, valve).at(speed=TRAVEL_SPEED)
+        across = [self.beside * part for part in DIRECTIONS[self.along][1]]
+        path = path.by(dz=-LIFT, of_tool=True).by(*self._ahead(-self.span), of_tool=True)
+        path = path.by(*across, of_tool=True).by(dz=LIFT, of_tool=True)
+        return self._bead(path, self.fast, valve).by(dz=-LIFT, of_tool=True, speed=TRAVEL_SPEED)
+
+    def _bead(self, path: Path, speed: float, valve: Output) -> Path:
+        return (
+            path.at(speed=speed, acceleration=ACCELERATION)
+            .by(*self._ahead(self.run), of_tool=True, corner_deviation=PASSING)
+            .set(valve, True)
+            .by(*self._ahead(self.length), of_tool=True, corner_deviation=PASSING)
+            .set(valve, False)
+            .by(*self._ahead(self.run), of_tool=True)
+        )
+
+    def _ahead(self, distance: float) -> list[float]:
+        return [distance * part for part in DIRECTIONS[self.along][0]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeadTimes:
+    """The dead times of a valve [s]; the standard uncertainty belongs to each of them."""
+
+    open: float
+    close: float
+    uncertainty: float
+
+
+def dead_times(
+    begins: float, ends: float, *, slow: float, fast: float, reading: float, cycle: float
+) -> DeadTimes:
+    """
+    Return the dead times that two beads show.
+
+    Each distance is the difference of two readings. In addition each output switches up to half a
+    cycle before or behind its place, equally likely everywhere in between, which has the standard
+    deviation ``cycle / sqrt(12)``.
+
+    :param begins: how far the fast bead begins behind the slow one [m]; ``ends``: how far it ends
+        behind that one.
+    :param slow: speed of the slow bead [m/s]; ``fast``: of the fast one.
+    :param reading: standard uncertainty of one reading of the ruler [m].
+    :param cycle: the cycle time of the controller [s].
+    :raises ValueError: the fast bead begins or ends before the slow one.
+    """
+    difference = fast - slow
+    switching = cycle / sqrt(12.0) * hypot(slow, fast)
+    uncertainty = hypot(sqrt(2.0) * reading, switching) / difference
+    times = []
+    for verb, shift in (('begins', begins), ('ends', ends)):
+        time = shift / difference
+        if not time >= -_MAX_NEGATIVE * uncertainty:  # or NaN
+            raise ValueError(
+                f'the fast bead {verb} {1e3 * abs(shift):.3g} mm before the slow one, as if the '
+                'valve knew of its output beforehand; measure behind the slow bead, in the '
+                'direction of the motion'
+            )
+        times.append(max(time, 0.0))
+    return DeadTimes(open=times[0], close=times[1], uncertainty=uncertainty)

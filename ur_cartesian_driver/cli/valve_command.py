@@ -1,0 +1,160 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""``ur-cartesian valve``: lay two beads, ask for two distances, write the dead times."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from datetime import date
+from math import isfinite
+from pathlib import Path
+import sys
+
+from ur_cartesian_driver.cli.check_robot import ask
+from ur_cartesian_driver.cli.valve_beads import BEAD_POINTS, Beads, dead_times, DeadTimes
+from ur_cartesian_driver.driver import Driver, DriverConfig
+from ur_cartesian_driver.goal_files.lead_file import read_leads, write_lead
+from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.events import Progress
+from ur_cartesian_driver.motion.goal.leads import Lead
+from ur_cartesian_driver.motion.goal.output_names import output_name, parse_output
+from ur_cartesian_driver.path import Output
+
+QUESTIONS = ('begin', 'end')
+WARNING = (
+    'The arm will move, and the valve will open. A hand on the emergency stop, nobody in reach, '
+    'the nozzle as high above a test piece as above the work.'
+)
+HOW_TO_READ = (
+    'Read where the beads have their full width: the slow one is thicker, and its round ends '
+    'reach farther.'
+)
+#: Below this part of its speed the arm was slowed down by the slider.
+_FULL_SPEED = 0.99
+
+
+def measure_valve(arguments: argparse.Namespace) -> int:
+    """Lay the beads, unless they have been measured, and write the dead times."""
+    kind, pin = parse_output(' '.join(arguments.output))
+    file = Path(arguments.lead_file)
+    if file.exists():
+        read_leads(file)  # so that a wrong file is refused before beads are laid
+    beads = Beads(
+        slow=arguments.slow,
+        fast=arguments.fast,
+        length=arguments.length,
+        beside=arguments.beside,
+        along=arguments.along,
+    )
+    if arguments.measured:
+        shifts = arguments.measured
+    elif sys.stdin.isatty():
+        config = DriverConfig(
+            robot_ip=arguments.robot_ip,
+            ur_type=arguments.ur_type,
+            headless_mode=True,
+            rtde_port=arguments.rtde_port,
+            primary_port=arguments.primary_port,
+            dashboard_port=arguments.dashboard_port,
+        )
+        with Driver(config) as driver:
+            driver.wait_ready(arguments.wait)
+            if not lay_beads(driver, beads, Output(kind, pin), ask):
+                return 1
+        print(HOW_TO_READ)
+        shifts = [ask_distance(question, input) for question in QUESTIONS]
+    else:
+        raise ValueError(
+            'valve asks before it moves the arm, so it needs a terminal; --measured takes the '
+            'figures of beads that have been laid.'
+        )
+    times = dead_times(
+        *(1e-3 * shift for shift in shifts),
+        slow=beads.slow,
+        fast=beads.fast,
+        reading=arguments.ruler,
+        cycle=robot_model(arguments.ur_type).control_cycle,
+    )
+    lead = Lead(
+        name=arguments.name,
+        output=kind,
+        pin=pin,
+        open=times.open,
+        close=times.close,
+        date=date.today().isoformat(),
+    )
+    write_lead(file, lead)
+    print(report(arguments.name, times, beads.fast))
+    print(
+        f'written to {file}: a driver with lead_file:={file.resolve()} uses it for outputs with '
+        f'"lead: {lead.name}"'
+    )
+    return 0
+
+
+def lay_beads(driver: Driver, beads: Beads, valve: Output, agrees: Callable[[str], bool]) -> bool:
+    """
+    Lay the beads from where the tool is, if the person agrees; return whether they were laid.
+
+    :raises DriverError: the path was refused or not completed, or a bead cannot have its speed.
+    :raises RobotNotReady: the robot reports no state, or did not move at full speed.
+    """
+    state = driver.rest_state
+    if state is None:
+        raise RobotNotReady('The robot does not report its state.')
+    plan = driver.plan(beads.path(state.actual_tcp_pose, valve))
+    for stretch in plan.find_slow_stretches():
+        if any(stretch.first <= point <= stretch.last for point in BEAD_POINTS):
+            raise InvalidGoal(
+                'A bead',
+                f'would be laid at {stretch.lowest:.3g} of {stretch.asked:.3g} m/s, because '
+                f'{stretch.reason}',
+                'ask for less speed',
+            )
+    question = (
+        f'{WARNING}\nTwo beads of {1e3 * beads.length:g} mm along the {beads.along} axis of the '
+        f'tool, {1e3 * beads.beside:g} mm apart, from where it is: at {1e3 * beads.slow:g} mm/s, '
+        f'then at {1e3 * beads.fast:g} mm/s. The arm needs {1e3 * beads.span:.0f} mm in that '
+        f'direction. The valve is {output_name(valve.kind, valve.pin)}.'
+    )
+    if not agrees(question):
+        return False
+    speeds: list[float] = []
+
+    def watch(progress: Progress) -> None:
+        if progress.waypoint in BEAD_POINTS:
+            speeds.append(progress.speed_scaling)
+
+    driver.start(plan, watch).result().raise_for_error()
+    if min(speeds, default=0.0) < _FULL_SPEED:
+        raise RobotNotReady(
+            f'The arm moved at {100.0 * min(speeds, default=0.0):.0f} % of its speed: set the '
+            'slider to 100 %, and lay the beads again.'
+        )
+    return True
+
+
+def ask_distance(which: str, read: Callable[[str], str]) -> float:
+    """Return how far behind the slow bead the fast one begins, or ends, as a person says [mm]."""
+    while True:
+        answer = read(
+            f'How far behind the {which} of the slow bead is the {which} of the fast one [mm]? '
+        )
+        try:
+            distance = float(answer.replace(',', '.').removesuffix('mm'))
+        except ValueError:
+            distance = float('nan')
+        if isfinite(distance):
+            return distance
+        print(f'{answer!r} is no number; give millimetres, like 10.8')
+
+
+def report(name: str, times: DeadTimes, speed: float) -> str:
+    """Return what was found, and what it means for a bead at a speed [m/s]."""
+    return (
+        f'{name} opens {1e3 * times.open:.1f} ms after its output and closes '
+        f'{1e3 * times.close:.1f} ms after it, each +/- {1e3 * times.uncertainty:.1f} ms: '
+        f'+/- {1e3 * speed * times.uncertainty:.2f} mm at {1e3 * speed:g} mm/s'
+    )
