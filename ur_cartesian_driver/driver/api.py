@@ -52,7 +52,7 @@ from ur_cartesian_driver.motion.errors import (
     LocalProtocolError,
     RobotNotReady,
 )
-from ur_cartesian_driver.motion.events import Outcome
+from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes
 from ur_cartesian_driver.motion.goal.goal import Goal
@@ -352,6 +352,12 @@ class Driver(RobotServices, InteractiveMotions):
                 'it; resume or cancel it.'
             )
 
+    @property
+    def progress(self) -> Progress | None:
+        """The newest progress report of the running motion; None = there is none."""
+        motions = self._running.handles
+        return motions[0].progress if motions else None
+
     def stop(self) -> None:
         """Cancel the running motion and return at once; nothing happens if none runs."""
         for motion in self._running.handles:
@@ -449,6 +455,7 @@ class Driver(RobotServices, InteractiveMotions):
         )
         data = pack(request)
         active = ActiveMotion(number, plan, on_progress, self._send)
+        active.motion.has_feed_override = job.feed_override is not None
         if part is not None:
             active.motion.appender = self._make_appender(active.motion, part)
         self._running.start(active, data, self.status.not_ready())

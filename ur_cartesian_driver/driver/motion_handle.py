@@ -15,6 +15,7 @@ from ur_cartesian_driver.driver.callbacks import run_callback
 from ur_cartesian_driver.driver.ipc.channel import (
     CancelMotion,
     Request,
+    SetFeedOverride,
     SetPathOffset,
     TemporaryTcpSet,
 )
@@ -47,6 +48,8 @@ class MotionHandle:
         #: The largest age of path offsets [s]; None = the goal permits no offsets. Set by the
         #: driver.
         self.offset_timeout: float | None = None
+        #: Whether a signal may slow the motion. Set by the driver.
+        self.has_feed_override = False
         #: The newest progress report; None before the first report.
         self.progress: Progress | None = None
 
@@ -139,6 +142,29 @@ class MotionHandle:
                 'age', f'is {age:.3f} s, path_offset.timeout is {self.offset_timeout:g} s'
             )
         self._send(SetPathOffset(motion=self.number, offset=vector3(offset), age=age))
+
+    def set_feed_override(self, fraction: float, *, age: float = 0.0) -> None:
+        """
+        Slow the motion from now on; ignored by a motion that has ended.
+
+        The motion runs at the fraction times the speed slider, within the bounds and at the rate
+        of ``feed_override`` of the goal. Call it again before ``feed_override.timeout`` has
+        passed: a stale or invalid fraction brings the motion to ``feed_override.minimum``.
+
+        :param fraction: of the planned speed, 0 to 1; all other numbers, and NaN, are invalid.
+        :param age: how long ago it was measured [s].
+        :raises InvalidGoal: the goal has no feed override, or a value is not a number.
+        """
+        if not self.has_feed_override:
+            raise InvalidGoal(
+                'feed_override', 'is empty in the goal that runs', 'set its minimum in the goal'
+            )
+        try:
+            fraction = with_declared_types(fraction, float, 'fraction')
+            age = with_declared_types(age, float, 'age')
+        except WrongType as error:
+            raise InvalidGoal(error.field, error.problem) from None
+        self._send(SetFeedOverride(motion=self.number, fraction=fraction, age=age))
 
     def done(self) -> bool:
         """Return whether the outcome has arrived."""

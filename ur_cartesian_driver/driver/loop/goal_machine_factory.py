@@ -28,6 +28,7 @@ from ur_cartesian_driver.execution.live.online_trajectory import OnlineTrajector
 from ur_cartesian_driver.execution.points.append_feeder import AppendFeeder
 from ur_cartesian_driver.execution.points.offset_point_feeder import OffsetPointFeeder
 from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
+from ur_cartesian_driver.execution.points.program_feed import ProgramFeed
 from ur_cartesian_driver.execution.servo.append_servo_feeder import AppendServoFeeder
 from ur_cartesian_driver.execution.servo.offset_setpoints import OffsetSetpoints
 from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
@@ -57,13 +58,16 @@ def point_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
     monitor = _monitor(request, config)
     if request.job.offset_band is not None:
         return OffsetPointFeeder(monitor, request.job.offset_band)
+    bounds = request.job.feed_override
+    feed = () if bounds is None else (ProgramFeed(bounds),)
     if not request.job.keep_open:
-        return PointFeeder(monitor)
+        return PointFeeder(monitor, *feed)
     # The last piece on the wire begins within the horizon of the feeder, and so ends within the
     # horizon of the goal. Once no more points can come in time, the ending is sent.
     horizon = (1.0 - 1.0 / PIECES_PER_HORIZON) * (request.job.replace_horizon or inf)
     return AppendFeeder(
         monitor,
+        *feed,
         horizon=min(config.keep_open_horizon, horizon),
         margin=min(config.keep_open_margin, horizon),
         timeout=config.keep_open_timeout,

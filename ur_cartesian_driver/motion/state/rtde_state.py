@@ -166,6 +166,14 @@ class RobotState:
     safe_outputs_token: Annotated[int, Rtde('output_int_register_35', optional=True)] = 0
     #: Motion version of movej and movel when our robot program connected; 0 = unknown.
     motion_version: Annotated[int, Rtde('output_int_register_36', optional=True)] = 0
+    #: Feed override of the robot program's splines, 0 to 1; by how much it has delayed them since
+    #: our robot program connected [s].
+    feed_override: Annotated[
+        float, Rtde('output_double_register_31', optional=True, monitored=False)
+    ] = 1.0
+    feed_delay: Annotated[
+        float, Rtde('output_double_register_32', optional=True, monitored=False)
+    ] = 0.0
     #: How fast the motion of the program runs, 0 to 1; :mod:`~.effective_speed` computes it from
     #: this packet and the earlier ones.
     effective_speed: Annotated[float, None] = 1.0
