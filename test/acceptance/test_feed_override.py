@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from random_cases import cases, random_of, SEED
 from recorded_goal import RecordedGoal
-from robot_cell import run_cell
+from robot_cell import CYCLE, run_cell
 
 from ur_cartesian_driver.driver.ipc.channel import SetFeedOverride
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -38,7 +38,7 @@ PERIOD = 0.02
 NOISE = 0.01
 #: For so long after a person has moved the slider, or a pause, the feed is not measured [s]: the
 #: set-points of a SERVO goal are on their way by the old setting.
-SETTLING = 0.6
+SETTLING = 0.8
 MODES = (ExecutionMode.SPLINE, ExecutionMode.SERVO)
 both_modes = pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
 
@@ -137,6 +137,27 @@ def test_without_a_signal_the_goal_takes_the_longest_time_that_its_report_says(m
 
 
 @both_modes
+def test_an_analog_input_gives_the_feed_and_a_broken_wire_the_lower_bound(mode):
+    async def scenario(cell):
+        cell.robot.controller.io.analog_in[1] = 0.012  # the middle of 4 to 20 mA
+        line = FedLine.start(cell, mode, FeedOverride(minimum=0.2, rate=2.0))
+
+        def signal(time):
+            line.send(1.0)  # no client can set the feed
+            if time > 3.0:
+                cell.robot.controller.io.analog_in[1] = 0.0
+
+        return line, await line.end(signal)
+
+    line, outcome = run_cell(scenario, feed_override_input='standard_analog 1 0.004 0.02')
+    assert outcome.code is ErrorCode.SUCCESSFUL, outcome
+    times, _, feeds = line.feeds()
+    times -= line.times[0]
+    assert feeds[(times > 1.0) & (times < 2.8)] == pytest.approx(0.5, abs=NOISE)
+    assert feeds[times > 3.5] == pytest.approx(0.2, abs=NOISE)
+
+
+@both_modes
 def test_a_signal_that_ends_slows_the_goal_at_the_rate(mode):
     bounds = FeedOverride(minimum=0.2, maximum=0.8, rate=0.5, timeout=0.1)
 
@@ -179,7 +200,13 @@ def test_an_output_switches_at_the_same_place_at_any_feed(mode, feed):
                 for way, time, speed in ((0.5 * LENGTH, 0.5 * TIME, 0.06), (LENGTH, TIME, 0.0))
             ),
             io_commands=(
-                IOCommand(waypoint=0, output=OutputKind.STANDARD_DIGITAL, pin=3, value=1.0),
+                IOCommand(
+                    waypoint=0,
+                    offset=0.0,
+                    output=OutputKind.STANDARD_DIGITAL,
+                    pin=3,
+                    value=1.0,
+                ),
             ),
         )
         digital, places = cell.robot.controller.io.digital_out, []
@@ -193,7 +220,8 @@ def test_an_output_switches_at_the_same_place_at_any_feed(mode, feed):
 
     outcome, place = run_cell(scenario)
     assert outcome.code is ErrorCode.SUCCESSFUL, outcome
-    assert place == pytest.approx(0.5 * LENGTH, abs=PERIOD * 0.06 * feed + 0.0005)
+    seen_late = 0.06 * feed * (PERIOD + 2.0 * CYCLE)
+    assert -0.0005 < place - 0.5 * LENGTH < seen_late + 0.0005
 
 
 # ---- random signals ---------------------------------------------------------------------------
@@ -229,12 +257,20 @@ class RandomSignal:
                     self.line.send(value)
 
 
+#: Where a person puts the slider. A call of servoj ends with a cycle: only at these settings, also
+#: without a feed override, do set-points pass as fast as the slider says.
+SLIDERS = {
+    ExecutionMode.SPLINE: (1.0, 0.83, 0.7, 0.5, 0.37),
+    ExecutionMode.SERVO: (1.0, 0.5, 1.0 / 3.0, 0.25),
+}
+
+
 class Person:
     """Moves the slider, and pauses the program; knows where the slider was left."""
 
-    def __init__(self, draw, cell):
-        self._draw, self._cell = draw, cell
-        self.slider = draw.choice((1.0, 0.7))
+    def __init__(self, draw, cell, sliders):
+        self._draw, self._cell, self._sliders = draw, cell, sliders
+        self.slider = draw.choice(sliders)
         cell.robot.set_speed_slider(self.slider)
         #: When it did something [s]; until when the program is paused.
         self.acts, self._play_at = [], None
@@ -246,7 +282,7 @@ class Person:
                 self._cell.robot.inject('play')
                 self.acts.append(now)
         elif self._draw.random() < 0.004:
-            self.slider = self._draw.uniform(0.3, 1.0)
+            self.slider = self._draw.choice(self._sliders)
             self._cell.robot.set_speed_slider(self.slider)
             self.acts.append(now)
         elif self._draw.random() < 0.002:
@@ -271,16 +307,16 @@ def test_any_signal_keeps_bounds_and_rate_and_leaves_the_slider_to_the_person(ca
     print(f'RANDOM_SEED={SEED}:', mode.name, end, f'{end_time:.2f} s', bounds)
 
     async def scenario(cell):
-        person = Person(draw, cell)
+        person = Person(draw, cell, SLIDERS[mode])
         await cell.sleep(0.1)
         line = FedLine.start(cell, mode, bounds)
         signal = RandomSignal(draw, line, draw.choice((1, 2)))
-        stopped = False
+        stopped = 0.0
 
         def look(time):
             nonlocal stopped
             if end != 'reached' and time > end_time and not stopped:
-                stopped = True
+                stopped = line.states[-1].timestamp
                 if end == 'cancelled':
                     cell.owner.cancel()
                 else:
@@ -295,18 +331,18 @@ def test_any_signal_keeps_bounds_and_rate_and_leaves_the_slider_to_the_person(ca
         else:
             await line.end(look)
         await cell.sleep(0.3)
-        return line, person, cell.robot.controller.speed_slider, cell.at_rest()
+        return line, person, stopped, cell.robot.controller.speed_slider, cell.at_rest()
 
-    line, person, slider, rests = run_cell(scenario)
+    line, person, stopped, slider, rests = run_cell(scenario)
     if end != 'killed':
         cancelled = end == 'cancelled' and line.motion.outcome.code is ErrorCode.CANCELLED
         assert cancelled or line.motion.outcome.code is ErrorCode.SUCCESSFUL, line.motion.outcome
     assert rests
     assert slider == pytest.approx(person.slider, abs=1e-6)
-    judge(line, bounds, person.acts, end)
+    judge(line, bounds, person.acts, stopped)
 
 
-def judge(line, bounds, acts, end):
+def judge(line, bounds, acts, stopped):
     """See that the feed keeps within its bounds and its rate wherever it can be measured."""
     times, _, feeds = line.feeds()
     if not len(times):
@@ -314,8 +350,8 @@ def judge(line, bounds, acts, end):
     quiet = np.ones(len(times), dtype=bool)
     for act in acts:
         quiet &= (times < act - 0.05) | (times > act + SETTLING)
-    if end != 'reached':
-        quiet &= times < line.times[-1] - 1.2  # the arm brakes
+    if stopped:
+        quiet &= times < stopped - 0.05  # then the arm brakes
     times, feeds = times[quiet], feeds[quiet]
     if not len(times):
         return

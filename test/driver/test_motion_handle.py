@@ -61,7 +61,7 @@ def test_an_offset_that_cannot_be_followed_is_refused(plan, values, text):
 def test_a_feed_is_sent_even_if_it_is_an_invalid_signal():
     sent: list[Any] = []
     motion = ActiveMotion(7, cast('Any', PlanWithReport()), None, sent.append).motion
-    motion.has_feed_override = True
+    motion.feed_problem = None
     motion.set_feed_override(cast('float', np.float32(0.5)), age=0.1)
     motion.set_feed_override(2)
     assert sent == [

@@ -7,6 +7,7 @@ from math import inf, nan
 import pytest
 
 from ur_cartesian_driver.execution.goal.goal_commands import LogWarning, SetFeedTarget
+from ur_cartesian_driver.execution.offsets.feed_input import FeedInput, parse_feed_input
 from ur_cartesian_driver.execution.offsets.feed_requests import FeedRequests
 from ur_cartesian_driver.execution.points.program_feed import ProgramFeed
 from ur_cartesian_driver.motion.goal.goal import FeedOverride
@@ -85,7 +86,8 @@ def test_the_delay_of_a_goal_begins_with_it():
         return feed.feed_state(
             RobotState(
                 timestamp=0.0, actual_q=(0.0,) * 6, feed_override=fraction, feed_delay=delay
-            )
+            ),
+            1.0,
         )
 
     assert state(0.3, 7.0).delay == 0.0  # of earlier goals
@@ -94,3 +96,49 @@ def test_the_delay_of_a_goal_begins_with_it():
         'feed_override: 0 values followed; the feed went down to 30%, and the goal took 0.50 s '
         'more'
     )
+
+
+@pytest.mark.parametrize(
+    ('level', 'fraction'),
+    [(2.0, 0.0), (5.0, 0.5), (8.0, 1.0), (1.9, 0.0), (8.1, 1.0), (1.7, None), (8.3, None)],
+)
+@pytest.mark.parametrize('falls', [False, True])
+def test_the_level_of_an_input_gives_the_feed_and_one_beyond_its_ends_is_invalid(
+    level, fraction, falls
+):
+    feed = ProgramFeed(BOUNDS, FeedInput(1, *((8.0, 2.0) if falls else (2.0, 8.0))))
+    state = RobotState(timestamp=0.0, actual_q=(0.0,) * 6, standard_analog_input1=level)
+    valid = feed.feed_state(state, 1.0).is_valid
+    assert valid == (fraction is not None)
+    if valid:
+        wanted = 1.0 - fraction if falls else fraction
+        assert feed.target == pytest.approx(min(max(wanted, 0.3), 0.9))
+    else:
+        assert feed.target == 0.3
+
+
+def test_an_input_that_the_robot_does_not_report_is_an_invalid_signal():
+    feed = ProgramFeed(BOUNDS, FeedInput(0, 0.004, 0.02))
+    assert not feed.feed_state(RobotState(timestamp=0.0, actual_q=(0.0,) * 6), 1.0).is_valid
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        '0',
+        'standard_analog 0 2.0',
+        'tool_analog 0 2 8',
+        'standard_analog 2 2 8',
+        'standard_analog 0 5 5',
+        'standard_analog 0 nan 5',
+        'standard_analog 0 a 5',
+    ],
+)
+def test_a_text_that_names_no_input_is_refused(text):
+    with pytest.raises(ValueError, match=f"^feed_override_input is '{text}'; write"):
+        parse_feed_input(text)
+
+
+def test_an_input_is_read_from_its_text():
+    assert parse_feed_input('standard_analog 1 0.02 0.004') == FeedInput(1, 0.02, 0.004)
+    assert parse_feed_input('') is None

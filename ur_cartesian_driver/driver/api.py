@@ -37,7 +37,12 @@ from ur_cartesian_driver.driver.live_session import (
     stationary_job,
 )
 from ur_cartesian_driver.driver.loop_connection import LoopConnection
-from ur_cartesian_driver.driver.motion_handle import ActiveMotion, MotionHandle, OnProgress
+from ur_cartesian_driver.driver.motion_handle import (
+    ActiveMotion,
+    HAS_FEED_INPUT,
+    MotionHandle,
+    OnProgress,
+)
 from ur_cartesian_driver.driver.recordings.recorder import plan_metadata
 from ur_cartesian_driver.driver.reported_robot import ReportedRobot
 from ur_cartesian_driver.driver.robot_services import RobotServices
@@ -455,7 +460,10 @@ class Driver(RobotServices, InteractiveMotions):
         )
         data = pack(request)
         active = ActiveMotion(number, plan, on_progress, self._send)
-        active.motion.has_feed_override = job.feed_override is not None
+        if job.feed_override is not None:
+            active.motion.feed_problem = (
+                HAS_FEED_INPUT if self.config.feed_override_input else None
+            )
         if part is not None:
             active.motion.appender = self._make_appender(active.motion, part)
         self._running.start(active, data, self.status.not_ready())

@@ -30,6 +30,19 @@ from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 OnProgress = Callable[[Progress], None]
 
 
+#: The goal takes no signal; an input of the robot gives it.
+NO_FEED_OVERRIDE = (
+    'feed_override',
+    'is empty in the goal that runs',
+    'set its minimum in the goal',
+)
+HAS_FEED_INPUT = (
+    'feed_override_input',
+    'names an input of the robot, which alone slows the goals',
+    "set the parameter to '' for signals of clients",
+)
+
+
 class MotionHandle:
     """A running motion; it always ends with an outcome, whatever happens to the robot."""
 
@@ -48,8 +61,9 @@ class MotionHandle:
         #: The largest age of path offsets [s]; None = the goal permits no offsets. Set by the
         #: driver.
         self.offset_timeout: float | None = None
-        #: Whether a signal may slow the motion. Set by the driver.
-        self.has_feed_override = False
+        #: Why clients cannot slow the motion: field, problem, remedy; None = they can. Set by the
+        #: driver.
+        self.feed_problem: tuple[str, str, str] | None = NO_FEED_OVERRIDE
         #: The newest progress report; None before the first report.
         self.progress: Progress | None = None
 
@@ -153,12 +167,11 @@ class MotionHandle:
 
         :param fraction: of the planned speed, 0 to 1; all other numbers, and NaN, are invalid.
         :param age: how long ago it was measured [s].
-        :raises InvalidGoal: the goal has no feed override, or a value is not a number.
+        :raises InvalidGoal: the goal has no feed override, an input of the robot gives the signal
+            (parameter ``feed_override_input``), or a value is not a number.
         """
-        if not self.has_feed_override:
-            raise InvalidGoal(
-                'feed_override', 'is empty in the goal that runs', 'set its minimum in the goal'
-            )
+        if self.feed_problem is not None:
+            raise InvalidGoal(*self.feed_problem)
         try:
             fraction = with_declared_types(fraction, float, 'fraction')
             age = with_declared_types(age, float, 'age')

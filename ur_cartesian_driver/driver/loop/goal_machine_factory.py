@@ -25,6 +25,8 @@ from ur_cartesian_driver.execution.live.freedrive import FreedriveFeeder
 from ur_cartesian_driver.execution.live.live_feeder import ANY_DEVIATION, LiveFeeder
 from ur_cartesian_driver.execution.live.live_targets import LiveTargets
 from ur_cartesian_driver.execution.live.online_trajectory import OnlineTrajectoryGenerator
+from ur_cartesian_driver.execution.offsets.feed_input import FeedInput, parse_feed_input
+from ur_cartesian_driver.execution.offsets.feed_requests import FeedRequests
 from ur_cartesian_driver.execution.points.append_feeder import AppendFeeder
 from ur_cartesian_driver.execution.points.offset_point_feeder import OffsetPointFeeder
 from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
@@ -33,11 +35,12 @@ from ur_cartesian_driver.execution.servo.append_servo_feeder import AppendServoF
 from ur_cartesian_driver.execution.servo.offset_setpoints import OffsetSetpoints
 from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
+from ur_cartesian_driver.execution.servo.setpoint_feed import SetpointFeed
 from ur_cartesian_driver.execution.servo.setpoint_source import SplineSetpoints
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal.goal import PIECES_PER_HORIZON
+from ur_cartesian_driver.motion.goal.goal import FeedOverride, PIECES_PER_HORIZON
 
 #: Makes the feeder of a motion.
 MakeFeeder: TypeAlias = Callable[[StartMotion, DriverConfig], Feeder]
@@ -45,8 +48,12 @@ MakeFeeder: TypeAlias = Callable[[StartMotion, DriverConfig], Feeder]
 
 def make_machine(request: StartMotion, config: DriverConfig) -> GoalMachine:
     """Return the machine of a motion."""
+    feeder = FEEDERS[request.job.execution](request, config)
+    if (bounds := request.job.feed_override) is not None:
+        feed_input = parse_feed_input(config.feed_override_input)
+        feeder.parts = (_feed(feeder, bounds, feed_input), *feeder.parts)
     return GoalMachine(
-        FEEDERS[request.job.execution](request, config),
+        feeder,
         feedback_period=1.0 / config.feedback_rate,
         resume_after_stop=config.on_robot_stop == 'continue',
         max_state_age=config.max_state_age,
@@ -58,16 +65,13 @@ def point_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
     monitor = _monitor(request, config)
     if request.job.offset_band is not None:
         return OffsetPointFeeder(monitor, request.job.offset_band)
-    bounds = request.job.feed_override
-    feed = () if bounds is None else (ProgramFeed(bounds),)
     if not request.job.keep_open:
-        return PointFeeder(monitor, *feed)
+        return PointFeeder(monitor)
     # The last piece on the wire begins within the horizon of the feeder, and so ends within the
     # horizon of the goal. Once no more points can come in time, the ending is sent.
     horizon = (1.0 - 1.0 / PIECES_PER_HORIZON) * (request.job.replace_horizon or inf)
     return AppendFeeder(
         monitor,
-        *feed,
         horizon=min(config.keep_open_horizon, horizon),
         margin=min(config.keep_open_margin, horizon),
         timeout=config.keep_open_timeout,
@@ -111,6 +115,13 @@ FEEDERS: Mapping[ExecutionMode, MakeFeeder] = {
     ExecutionMode.SPLINE: point_feeder,
     ExecutionMode.SERVO: servo_feeder,
 }
+
+
+def _feed(feeder: Feeder, bounds: FeedOverride, feed_input: FeedInput | None) -> FeedRequests:
+    """Return the feed override of whoever runs the motion: the driver or the robot program."""
+    if isinstance(feeder, ServoFeeder):
+        return SetpointFeed(bounds, feeder.stream, feed_input)
+    return ProgramFeed(bounds, feed_input)
 
 
 def _monitor(request: StartMotion, config: DriverConfig) -> GoalMonitor:

@@ -214,7 +214,8 @@ class MotionRunner:
 
     def set_feed_override(self, request: SetFeedOverride) -> None:
         """Give the running motion another feed; ignore a feed for another motion."""
-        if request.motion == self._number and self._machine is not None:
+        is_open = not self._config.feed_override_input
+        if is_open and request.motion == self._number and self._machine is not None:
             self._machine.can.overriding.set_feed(request.fraction, request.age, _now())
 
     def cancel(self, request: CancelMotion) -> None:

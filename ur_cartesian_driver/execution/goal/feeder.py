@@ -153,8 +153,12 @@ class Overridable:
         :param now: time of a steady clock [s].
         """
 
-    def feed_state(self, packet: RobotState) -> FeedState:
-        """Return the feed that the motion has now."""
+    def feed_state(self, packet: RobotState, now: float) -> FeedState:
+        """
+        Return the feed that the motion has now.
+
+        :param now: time of a steady clock [s].
+        """
         return FULL_FEED
 
 

@@ -18,20 +18,23 @@ from ur_cartesian_driver.execution.goal.feeder import (
     Reporting,
 )
 from ur_cartesian_driver.execution.goal.goal_commands import GoalCommand
+from ur_cartesian_driver.execution.offsets.feed_input import FeedInput
 from ur_cartesian_driver.execution.offsets.freshness import Freshness, RareWarnings
 from ur_cartesian_driver.motion.goal.goal import FeedOverride
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 
 class FeedRequests(Overridable, Ageing, Reporting):
     """Accepts the values of the signal, and knows the feed that the motion should have."""
 
-    def __init__(self, bounds: FeedOverride) -> None:
+    def __init__(self, bounds: FeedOverride, feed_input: FeedInput | None = None) -> None:
         """
         Begin with no value, at the lower bound.
 
         :param bounds: the bounds of the goal; no number is 0.
+        :param feed_input: the input that gives the values; None = clients give them.
         """
-        self.bounds = bounds
+        self.bounds, self._input = bounds, feed_input
         self._freshness, self._warnings = Freshness(bounds.timeout), RareWarnings()
         self._newest = bounds.minimum
         self._is_valid = self._is_loss_unsaid = False
@@ -46,6 +49,11 @@ class FeedRequests(Overridable, Ageing, Reporting):
         elif self._freshness.accept(age, now):
             self._newest = min(max(fraction, self.bounds.minimum), self.bounds.maximum)
             self._is_valid = True
+
+    def read_input(self, packet: RobotState, now: float) -> None:
+        """Accept the value of the input, if an input gives the values."""
+        if self._input is not None:
+            self.set_feed(self._input.fraction(packet), packet.state_age, now)
 
     def age(self, now: float) -> list[GoalCommand]:
         """Check the age of the newest value; warn, not too often, that the signal is lost."""

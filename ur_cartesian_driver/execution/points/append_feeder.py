@@ -41,26 +41,20 @@ class AppendFeeder(PointFeeder, Appendable):
     """Sends records up to the horizon, and the ending if nothing is appended in time."""
 
     def __init__(
-        self,
-        monitor: GoalMonitor,
-        *parts: object,
-        horizon: float,
-        margin: float,
-        timeout: float,
+        self, monitor: GoalMonitor, *, horizon: float, margin: float, timeout: float
     ) -> None:
         """
         Begin with the records that are known so far; nothing is sent yet.
 
-        :param parts: objects with further capabilities of this motion.
         :param horizon: how far ahead of the arm its motion is sent to the program [s].
         :param margin: the stream is closed this long before the robot program would ask for a
             missing point [s].
         :param timeout: how long the goal waits at rest for more points [s]; 0 = without limit.
         """
-        super().__init__(monitor, *parts)
+        super().__init__(monitor)
         self._horizon, self._margin, self.append_timeout = horizon, margin, timeout
         self._appended = AppendedRecords(monitor)
-        self.parts = (self._appended, *parts)
+        self.parts = (self._appended,)
         #: How many records of the goal were sent before the present stream.
         self._stream_first_record = 0
         #: Whether the length of the present stream was sent.

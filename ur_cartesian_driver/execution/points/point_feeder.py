@@ -20,14 +20,9 @@ class PointFeeder(Feeder):
     #: Whether offsets that the robot program gets through registers displace the path.
     _takes_offsets = False
 
-    def __init__(self, monitor: GoalMonitor, *parts: object) -> None:
-        """
-        Begin with no record sent.
-
-        :param parts: objects with further capabilities of this motion.
-        """
+    def __init__(self, monitor: GoalMonitor) -> None:
+        """Begin with no record sent."""
         super().__init__(monitor)
-        self.parts = parts
         self._window = SendWindow()
 
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:

@@ -9,6 +9,7 @@ from math import nan
 from ur_cartesian_driver.execution.goal.feed_state import FeedState
 from ur_cartesian_driver.execution.goal.feeder import Prepared
 from ur_cartesian_driver.execution.goal.goal_commands import GoalCommand, SetFeedTarget
+from ur_cartesian_driver.execution.offsets.feed_input import FeedInput
 from ur_cartesian_driver.execution.offsets.feed_requests import FeedRequests
 from ur_cartesian_driver.motion.goal.goal import FeedOverride
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
@@ -22,9 +23,9 @@ class ProgramFeed(FeedRequests, Prepared):
     is what the arm does.
     """
 
-    def __init__(self, bounds: FeedOverride) -> None:
-        """Begin with nothing sent."""
-        super().__init__(bounds)
+    def __init__(self, bounds: FeedOverride, feed_input: FeedInput | None = None) -> None:
+        """Begin with nothing sent; parameters as in :class:`FeedRequests`."""
+        super().__init__(bounds, feed_input)
         self._sent = nan
         #: The delay that the program reported before the goal began; None = not known yet.
         self._first_delay: float | None = None
@@ -43,8 +44,9 @@ class ProgramFeed(FeedRequests, Prepared):
         self._sent = self.target
         return [SetFeedTarget(fraction=self._sent, rate=self.bounds.rate)]
 
-    def feed_state(self, packet: RobotState) -> FeedState:
+    def feed_state(self, packet: RobotState, now: float) -> FeedState:
         """Return the feed as the robot program reports it."""
+        self.read_input(packet, now)
         if self._first_delay is None:
             self._first_delay = packet.feed_delay
         # Until the program has read START, it reports the feed of an earlier goal.

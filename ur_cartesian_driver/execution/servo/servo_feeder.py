@@ -50,7 +50,6 @@ from ur_cartesian_driver.execution.goal.outcome_codes import GoalSignal, Meaning
 from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT, NO_INPUTS
 from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoStream
-from ur_cartesian_driver.execution.servo.setpoint_feed import SetpointFeed
 from ur_cartesian_driver.execution.servo.wait_for_arm import WaitForArm
 from ur_cartesian_driver.motion.events import (
     Event,
@@ -88,8 +87,6 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         self.stream, self.parts = stream, parts
         if monitor.job.stall_timeout:
             self.parts = (WaitForArm(monitor, stream), *self.parts)
-        if monitor.job.feed_override is not None:
-            self.parts = (SetpointFeed(monitor.job.feed_override, stream), *self.parts)
         self._spline = monitor.job.spline
         self._max_servo_lag = MAX_LAG_LOOKAHEADS * stream.settings.lookahead_time
         self._last_read, self._last_answer = -1, -inf

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from enum import IntEnum, IntFlag
+from math import nan
 from types import NoneType
 from typing import Annotated, Any, get_args, get_type_hints
 
@@ -174,6 +175,13 @@ class RobotState:
     feed_delay: Annotated[
         float, Rtde('output_double_register_32', optional=True, monitored=False)
     ] = 0.0
+    #: Levels of the standard analog inputs [A] or [V], as the installation sets them up.
+    standard_analog_input0: Annotated[
+        float, Rtde('standard_analog_input0', optional=True, monitored=False)
+    ] = nan
+    standard_analog_input1: Annotated[
+        float, Rtde('standard_analog_input1', optional=True, monitored=False)
+    ] = nan
     #: How fast the motion of the program runs, 0 to 1; :mod:`~.effective_speed` computes it from
     #: this packet and the earlier ones.
     effective_speed: Annotated[float, None] = 1.0

@@ -34,5 +34,5 @@ class FeedOverrideSubscriber:
     def give(self, message: Float64) -> None:
         """Pass a fraction of the planned speed to the running motion."""
         motion = self._server.running_motion
-        if motion is not None and motion.has_feed_override:
+        if motion is not None and motion.feed_problem is None:
             motion.set_feed_override(message.data)
