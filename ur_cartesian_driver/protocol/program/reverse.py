@@ -214,7 +214,7 @@ def read_timeout_for(mode: ControlMode, requested: int, step_time: int = DEFAULT
     return max(requested, step_time) if requested else 0
 
 
-class Feed(NamedTuple):
+class FeedTarget(NamedTuple):
     """A feed override in FORWARD mode."""
 
     #: Fraction of the planned speed to go to.
@@ -228,7 +228,7 @@ class Feed(NamedTuple):
 
 
 #: No feed override: words 4 and 5 are 0, as in messages of other drivers.
-FULL_FEED = Feed(0.0, 0.0)
+NO_OVERRIDE = FeedTarget(0.0, 0.0)
 
 
 def trajectory(
@@ -238,7 +238,7 @@ def trajectory(
     step_time: int = DEFAULT_STEP_TIME,
     takes_offsets: bool = False,
     mode: ControlMode = ControlMode.FORWARD,
-    feed: Feed = FULL_FEED,
+    feed: FeedTarget = NO_OVERRIDE,
 ) -> ReverseMessage:
     """
     Return the message that starts, ends, cancels or keeps alive a trajectory.

@@ -81,7 +81,7 @@ class ProgramControl:
 
     def set_feed(self, fraction: float, rate: float) -> None:
         """Have the robot program, until the goal ends, go to a feed at a rate [1/s]."""
-        self._sockets.set_feed(reverse.Feed(fraction, rate))
+        self._sockets.set_feed(reverse.FeedTarget(fraction, rate))
 
     def send_servo(self, on: bool) -> None:
         """Make the robot program enter the buffered servo, or leave it and brake."""

@@ -70,7 +70,7 @@ class ProgramSockets:
         #: A goal runs: keepalives are then NOOP actions of its trajectory.
         self.is_executing = False
         #: The feed override of the running goal; every message of a trajectory repeats it.
-        self.feed = reverse.FULL_FEED
+        self.feed = reverse.NO_OVERRIDE
         #: The goal uses the buffered servo: keepalives then repeat the message that enters it.
         self.servo = False
         #: The program is paused and reads nothing. Keepalives pause, too, because otherwise a
@@ -186,7 +186,7 @@ class ProgramSockets:
             )
         )
 
-    def set_feed(self, feed: reverse.Feed) -> None:
+    def set_feed(self, feed: reverse.FeedTarget) -> None:
         """Send a feed override now and with every later message of the goal."""
         self.feed = feed
         self.send_control(TrajectoryAction.NOOP, 0)
