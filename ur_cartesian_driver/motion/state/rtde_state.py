@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from enum import IntEnum, IntFlag
-from math import nan
+from math import inf
 from types import NoneType
 from typing import Annotated, Any, get_args, get_type_hints
 
@@ -175,13 +175,14 @@ class RobotState:
     feed_delay: Annotated[
         float, Rtde('output_double_register_32', optional=True, monitored=False)
     ] = 0.0
-    #: Levels of the standard analog inputs [A] or [V], as the installation sets them up.
+    #: Levels of the standard analog inputs [A] or [V], as the installation sets them up; inf = not
+    #: reported.
     standard_analog_input0: Annotated[
         float, Rtde('standard_analog_input0', optional=True, monitored=False)
-    ] = nan
+    ] = inf
     standard_analog_input1: Annotated[
         float, Rtde('standard_analog_input1', optional=True, monitored=False)
-    ] = nan
+    ] = inf
     #: How fast the motion of the program runs, 0 to 1; :mod:`~.effective_speed` computes it from
     #: this packet and the earlier ones.
     effective_speed: Annotated[float, None] = 1.0
