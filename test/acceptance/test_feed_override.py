@@ -9,6 +9,8 @@ place has a time of the plan, and the feed is how fast that time passes.
 
 from dataclasses import dataclass, field, replace
 from math import nan
+from pathlib import Path
+from runpy import run_path
 
 import numpy as np
 import pytest
@@ -29,6 +31,7 @@ from ur_cartesian_driver.motion.goal.goal import (
 
 pytestmark = [pytest.mark.acceptance]
 
+EXAMPLE = Path(__file__).resolve().parents[2] / 'examples' / 'fed_bead.py'
 #: Of the planned line [m], [s].
 LENGTH, TIME = 0.12, 3.0
 #: Time between two values of a signal [s].
@@ -222,6 +225,19 @@ def test_an_output_switches_at_the_same_place_at_any_feed(mode, feed):
     assert outcome.code is ErrorCode.SUCCESSFUL, outcome
     seen_late = 0.06 * feed * (PERIOD + 2.0 * CYCLE)
     assert -0.0005 < place - 0.5 * LENGTH < seen_late + 0.0005
+
+
+@pytest.mark.skipif(not EXAMPLE.is_file(), reason='only a checkout has the examples')
+def test_the_example_is_slowed_to_80_percent():
+    async def scenario(cell):
+        path = run_path(str(EXAMPLE))['fed_bead'](cell.memory.read().actual_tcp_pose)
+        line = FedLine(cell, path.goal())
+        return line, await line.end(lambda time: line.send(0.8))
+
+    line, outcome = run_cell(scenario)
+    assert outcome.succeeded, outcome
+    speeds = [np.linalg.norm(state.target_tcp_twist[:3]) for state in line.states]
+    assert max(speeds) == pytest.approx(0.8 * 0.05, rel=0.01)
 
 
 # ---- random signals ---------------------------------------------------------------------------
