@@ -10,6 +10,7 @@ place has a time of the plan, and the feed is how fast that time passes.
 from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
+from random import Random
 from runpy import run_path
 
 import numpy as np
@@ -50,7 +51,7 @@ class FedLine(RecordedGoal):
     """A line along y whose feed a signal overrides."""
 
     @classmethod
-    def start(cls, cell, mode, bounds, **fields):
+    def begin(cls, cell, mode, bounds, **fields):
         return cls.along_y(
             cell,
             LENGTH,
@@ -112,7 +113,7 @@ def test_a_signal_scales_the_speed_and_no_time_is_missed(mode):
     bounds = FeedOverride(minimum=0.2, rate=2.0)
 
     async def scenario(cell):
-        line = FedLine.start(cell, mode, bounds)
+        line = FedLine.begin(cell, mode, bounds)
         return line, await line.end(lambda time: line.send(0.5))
 
     line, outcome = run_cell(scenario)
@@ -129,7 +130,7 @@ def test_a_signal_scales_the_speed_and_no_time_is_missed(mode):
 @both_modes
 def test_without_a_signal_the_goal_takes_the_longest_time_that_its_report_says(mode):
     async def scenario(cell):
-        line = FedLine.start(cell, mode, FeedOverride(minimum=0.4))
+        line = FedLine.begin(cell, mode, FeedOverride(minimum=0.4))
         return line, await line.end()
 
     line, outcome = run_cell(scenario)
@@ -143,7 +144,7 @@ def test_without_a_signal_the_goal_takes_the_longest_time_that_its_report_says(m
 def test_an_analog_input_gives_the_feed_and_a_broken_wire_the_lower_bound(mode):
     async def scenario(cell):
         cell.robot.controller.io.analog_in[1] = 0.012  # the middle of 4 to 20 mA
-        line = FedLine.start(cell, mode, FeedOverride(minimum=0.2, rate=2.0))
+        line = FedLine.begin(cell, mode, FeedOverride(minimum=0.2, rate=2.0))
 
         def signal(time):
             line.send(1.0)  # no client can set the feed
@@ -165,7 +166,7 @@ def test_a_signal_that_ends_slows_the_goal_at_the_rate(mode):
     bounds = FeedOverride(minimum=0.2, maximum=0.8, rate=0.5, timeout=0.1)
 
     async def scenario(cell):
-        line = FedLine.start(cell, mode, bounds)
+        line = FedLine.begin(cell, mode, bounds)
 
         def signal(time):
             if time < 2.5:
@@ -190,7 +191,7 @@ def test_an_output_switches_at_the_same_place_at_any_feed(mode, feed):
     async def scenario(cell):
         pose = cell.memory.read().actual_tcp_pose
         x, y, z = pose.position
-        line = FedLine.start(
+        line = FedLine.begin(
             cell,
             mode,
             FeedOverride(minimum=0.1),
@@ -247,7 +248,7 @@ def test_the_example_is_slowed_to_80_percent():
 class RandomSignal:
     """Values that come from one or two sources, jump, stop, are nonsense or old."""
 
-    draw: object
+    draw: Random
     line: FedLine
     sources: int
     values: list = field(default_factory=list)
@@ -325,7 +326,7 @@ def test_any_signal_keeps_bounds_and_rate_and_leaves_the_slider_to_the_person(ca
     async def scenario(cell):
         person = Person(draw, cell, SLIDERS[mode])
         await cell.sleep(0.1)
-        line = FedLine.start(cell, mode, bounds)
+        line = FedLine.begin(cell, mode, bounds)
         signal = RandomSignal(draw, line, draw.choice((1, 2)))
         stopped = 0.0
 
