@@ -16,19 +16,26 @@ from runpy import run_path
 import numpy as np
 import pytest
 from random_cases import cases, random_of, SEED
-from recorded_goal import RecordedGoal
+from recorded_goal import ARM, RecordedGoal
 from robot_cell import CYCLE, run_cell
 
+from ur_cartesian_driver.driver.appender import encode_part
 from ur_cartesian_driver.driver.ipc.channel import SetFeedOverride
+from ur_cartesian_driver.execution.goal.motion_job import AppendJob
 from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import (
     FeedOverride,
+    Goal,
     IOCommand,
     OutputKind,
     Tolerance,
     Waypoint,
 )
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
+from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 
 pytestmark = [pytest.mark.acceptance]
 
@@ -226,6 +233,44 @@ def test_an_output_switches_at_the_same_place_at_any_feed(mode, feed):
     assert outcome.code is ErrorCode.SUCCESSFUL, outcome
     seen_late = 0.06 * feed * (PERIOD + 2.0 * CYCLE)
     assert -0.0005 < place - 0.5 * LENGTH < seen_late + 0.0005
+
+
+@both_modes
+def test_points_are_appended_to_a_goal_that_a_signal_slows(mode):
+    bounds, options = FeedOverride(minimum=0.2, rate=2.0), PlanningOptions()
+
+    async def scenario(cell):
+        state = cell.memory.read()
+        (x, y, z), turned = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
+        points = tuple(
+            Waypoint(time=time, pose=Pose((x, y + way, z), turned))
+            for time, way in ((1.0, 0.04), (2.0, 0.08))
+        )
+        goal = Goal(
+            waypoints=points[:1],
+            execution=mode,
+            keep_open=True,
+            goal_time_tolerance=0.3,
+            feed_override=bounds,
+        )
+        first = plan_first_part(plan(goal, state, ARM, options), ARM, options)
+        motion = cell.owner.run(*encode_part(first))
+        added = AppendedPoints(waypoints=points[1:], last=True)
+        rest = plan_append(first.next_goal, added, ARM, options, from_rest=False)
+        records, job = encode_part(rest)
+        before = rest.records_before
+        cell.owner.append(records, AppendJob(number=1, records_before=before, job=job))
+        begin = cell.loop.time()
+        while motion.outcome is None:
+            cell.owner.send(SetFeedOverride(motion=1, fraction=0.4, age=0.0))
+            await cell.sleep(PERIOD)
+        end = cell.memory.read().target_tcp_pose.position
+        return motion.outcome, cell.loop.time() - begin, end[1] - y
+
+    outcome, took, way = run_cell(scenario)
+    assert outcome.code is ErrorCode.SUCCESSFUL, outcome
+    assert took == pytest.approx(2.0 / 0.4, abs=0.6)
+    assert way == pytest.approx(0.08, abs=5e-5)
 
 
 @pytest.mark.skipif(not EXAMPLE.is_file(), reason='only a checkout has the examples')
