@@ -40,8 +40,9 @@ from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 FOLDER = FilePath(__file__).resolve().parents[2] / 'examples'
 #: By set-points, which keep to the clock, or against a part. In virtual time they are carried out
-#: by test_path_offsets.py, test_presses.py, test_replaced_tails.py and test_stall.py.
-IN_VIRTUAL_TIME = {'tracked_seam', 'grind', 'replanned', 'stall'}
+#: by test_path_offsets.py, test_presses.py, test_replaced_tails.py, test_stall.py and
+#: test_feed_override.py.
+IN_VIRTUAL_TIME = {'tracked_seam', 'grind', 'replanned', 'stall', 'fed_bead'}
 EXAMPLES = sorted({path.stem for path in tracked_files(FOLDER, '*.py')} - {'on_robot'})
 NAMES = [name for name in EXAMPLES if name not in IN_VIRTUAL_TIME]
 

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.driver.ipc.channel import SetPathOffset
+from ur_cartesian_driver.driver.ipc.channel import SetFeedOverride, SetPathOffset
 from ur_cartesian_driver.driver.motion_handle import ActiveMotion
 from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
 from ur_cartesian_driver.motion.events import Outcome
@@ -55,6 +55,27 @@ def test_an_offset_that_cannot_be_followed_is_refused(plan, values, text):
     motion = ActiveMotion(7, plan(), None, lambda request: pytest.fail('was sent')).motion
     with pytest.raises(InvalidGoal, match=text):
         motion.set_path_offset(**values)
+
+
+def test_a_feed_is_sent_even_if_it_is_an_invalid_signal():
+    sent: list[Any] = []
+    motion = ActiveMotion(7, cast('Any', PlanWithReport()), None, sent.append).motion
+    motion.feed_problem = None
+    motion.set_feed_override(cast('float', np.float32(0.5)), age=0.1)
+    motion.set_feed_override(2)
+    assert sent == [
+        SetFeedOverride(motion=7, fraction=0.5, age=0.1),
+        SetFeedOverride(motion=7, fraction=2.0, age=0.0),
+    ]
+    assert type(sent[0].fraction) is float
+    with pytest.raises(InvalidGoal, match="fraction is 'fast'"):
+        motion.set_feed_override(cast('float', 'fast'))
+
+
+def test_a_goal_without_feed_override_takes_none():
+    motion = ActiveMotion(7, cast('Any', PlanWithReport()), None, print).motion
+    with pytest.raises(InvalidGoal, match='feed_override is empty in the goal that runs; set its'):
+        motion.set_feed_override(0.5)
 
 
 def test_a_motion_can_be_cancelled_before_the_report_of_its_plan_is_made():

@@ -14,6 +14,7 @@ from ur_cartesian_driver.motion.errors import NotAvailable
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import (
+    FeedOverride,
     Goal,
     IOCommand,
     OutputKind,
@@ -107,6 +108,11 @@ DEMANDS = (
         'path_offset is set, but robot programs of wire dialect 2.0 add no offsets to their '
         'motions; let the driver send its own robot program.',
     ),
+    (
+        {'feed_override': FeedOverride(minimum=0.3), 'execution': ExecutionMode.SPLINE},
+        'feed_override is set, but robot programs of wire dialect 2.10 take no feed while they '
+        'move the arm; let the driver send its own robot program.',
+    ),
 )
 
 
@@ -115,8 +121,9 @@ def test_each_feature_that_an_older_program_lacks_is_refused(demand, sentence):
     points = tuple(Waypoint(pose=Pose((0.1 * i, 0.0, 0.0)), time=float(i)) for i in (1, 2))
     goal = Goal(waypoints=points, **demand)
     check(goal, PlanningOptions())
+    dialect = '2.10' if 'dialect 2.10' in sentence else '2.0'
     with pytest.raises(NotAvailable) as refusal:
-        check(goal, PlanningOptions(dialect=DIALECTS['2.0']))
+        check(goal, PlanningOptions(dialect=DIALECTS[dialect]))
     assert str(refusal.value) == sentence
 
 

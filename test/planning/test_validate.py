@@ -21,6 +21,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
+    FeedOverride,
     FreeAxis,
     Goal,
     InputKind,
@@ -861,6 +862,44 @@ REFUSALS = [
         ),
         NotAvailable,
         'path_offset is set, but segments[1].type is OPTIMIZED: the robot chooses the speed',
+    ),
+    # feed override
+    *(
+        (replace(SPLINE, feed_override=FeedOverride(**fields)), InvalidGoal, text)
+        for fields, text in (
+            (
+                {'minimum': 1.1},
+                'feed_override.minimum is 1.1, but must be 0 (no override) or from 0.01 to 1',
+            ),
+            ({'minimum': nan}, 'feed_override.minimum contains nan; every number must be finite'),
+            (
+                {'minimum': 0.5, 'maximum': 1.2},
+                'feed_override.maximum is 1.2, but must be 0 (as planned) or from 0.01 to 1',
+            ),
+            (
+                {'minimum': 0.5, 'maximum': 0.4},
+                'feed_override.maximum is 0.4, less than feed_override.minimum = 0.5; raise it',
+            ),
+            (
+                {'minimum': 0.5, 'rate': 20.0},
+                'feed_override.rate is 20 1/s, but must be 0 (0.5 1/s) or from 0.01 to 10 1/s',
+            ),
+            (
+                {'minimum': 0.5, 'timeout': 0.01},
+                'feed_override.timeout is 0.01 s, but must be 0 (0.5 s) or from 0.02 to 60 s',
+            ),
+            (
+                {'maximum': 0.5},
+                'feed_override.minimum is 0, so that no signal may slow the goal; set it',
+            ),
+        )
+    ),
+    (
+        replace(PLAIN, feed_override=FeedOverride(minimum=0.3)),
+        NotAvailable,
+        'feed_override is set, but the speed of a PRIMITIVES goal is changed by the speed slider '
+        'alone, which belongs to people and would stay lowered if the driver died; set execution '
+        'to SPLINE or SERVO, with times or a corner_deviation',
     ),
 ]
 

@@ -188,6 +188,27 @@ def test_the_status_joins_connection_and_modes():
     assert message.speed_scaling == 0.75
 
 
+def test_the_status_says_who_slows_the_running_goal():
+    def slowed(slider, **progress):
+        return status_message(
+            ConnectionStatus(),
+            replace(STATE, target_speed_fraction=slider),
+            STAMP,
+            Progress(
+                waypoint=0, fraction=0.5, desired_pose=Pose(), actual_pose=Pose(), **progress
+            ),
+        )
+
+    assert slowed(1.0).slowed_by == ''
+    assert slowed(1.0).feed_override == 1.0
+    assert slowed(0.5).slowed_by == 'speed slider 50%'
+    both = slowed(0.5, feed_override=0.3, feed_is_valid=False)
+    assert both.slowed_by == 'speed slider 50%, feed override 30% (no valid signal)'
+    assert both.feed_override == 0.3
+    assert slowed(1.0, feed_override=0.8).slowed_by == 'feed override 80%'
+    assert status_message(ConnectionStatus(), STATE, STAMP).slowed_by == ''
+
+
 def test_the_status_without_a_robot_knows_no_modes():
     message = status_message(ConnectionStatus(), None, STAMP)
     assert message.robot_mode == DriverStatus.ROBOT_MODE_UNKNOWN

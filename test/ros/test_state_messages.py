@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The state of the robot as messages."""
 
+from dataclasses import fields
 from math import isnan, pi
 
 from builtin_interfaces.msg import Time
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 import pytest
 
 from ur_cartesian_driver.driver import ConnectionState, ConnectionStatus
+from ur_cartesian_driver.motion.events import Progress
 from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector, rotate
 from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
@@ -29,6 +31,7 @@ from ur_cartesian_driver.ros.messages.state_messages import (
     joint_state_message,
     robot_mode_message,
     safety_mode_message,
+    slowed_by,
     tcp_transform,
     tool_data_message,
     wrench_message,
@@ -188,4 +191,6 @@ def test_each_field_of_the_status_has_the_name_of_what_it_shows():
     known = {row.name for row in STATE_TABLE} | {
         name for name in dir(ConnectionStatus) if not name.startswith('_')
     }
+    # The running goal adds the feed, and who slows the goal follows from feed and slider.
+    known |= {field.name for field in fields(Progress)} | {slowed_by.__name__}
     assert set(DriverStatus.get_fields_and_field_types()) - {'header'} <= known

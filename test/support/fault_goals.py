@@ -26,6 +26,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import (
+    FeedOverride,
     Goal,
     InputKind,
     InputWait,
@@ -456,6 +457,34 @@ class OffsetMoveGoal(FaultGoal):
         self.cell.owner.send(SetPathOffset(motion=motion, offset=(0.0, SIDEWAYS, 0.0), age=0.0))
         x, y = self.tool_offset()
         return y > 0.5 * SIDE and abs(x) > 0.9 * SIDEWAYS
+
+
+#: The feed of a goal whose signal has ended, and how fast it changes [1/s].
+SLOW_FEED = FeedOverride(minimum=0.5, rate=2.0, timeout=0.2)
+
+
+@lru_cache
+def fed_half_circle(start, execution):
+    """Return the plan of a half circle that a signal may slow."""
+    goal = replace(half_circle_goal(start.state, execution), feed_override=SLOW_FEED)
+    return plan(goal, start.state, ARM, OPTIONS)
+
+
+class FedGoal(SplineGoal):
+    """The same half circle, slowed because its signal has ended."""
+
+    def plan_from(self, start):
+        return fed_half_circle(start, self.execution)
+
+    def is_in(self, phase):
+        assert phase == 'without signal'
+        return 0.4 < self.fraction() < 0.8
+
+
+class FedServoGoal(FedGoal, ServoGoal):
+    """The same as set-points."""
+
+    execution = ExecutionMode.SERVO
 
 
 #: Pins of the outputs switched at the second corner and after the end, and the delay of the
@@ -892,6 +921,8 @@ GOALS = {
     'Waiting for the arm': WaitingGoal,
     'Path offset': OffsetGoal,
     'Path offset, PRIMITIVES': OffsetMoveGoal,
+    'Feed override': FedGoal,
+    'Feed override, SERVO': FedServoGoal,
     'Appendable goals': AppendGoal,
     'Replaced tails': ReplacedTailGoal,
     'Outputs': OutputGoal,

@@ -380,6 +380,46 @@ PATH_OFFSET_MOVES = _mode(
     pendant=('protective stop',),
 )
 
+FEED_OVERRIDE = _mode(
+    'Feed override',
+    'The SPLINE goal with `feed_override`, at half its speed because its signal has ended. The '
+    "speed slider is nobody's but the person's at every end.",
+    {'without signal': 'between the points, at the lower bound'},
+    2.5,
+    {},
+    faults=(
+        'protective stop',
+        'emergency stop',
+        'an operator stops the program',
+        'an operator pauses the program',
+        'the speed slider is moved to 0',
+        'the network cable is cut',
+        'RTDE is cut',
+        'the reverse socket is half-open',
+        'the pose is measured 6 mm off',
+        'the node is silent',
+    ),
+    pendant=('protective stop',),
+)
+
+FEED_OVERRIDE_SERVO = _mode(
+    'Feed override, SERVO',
+    'The same by set-points.',
+    {'without signal': 'between the points, at the lower bound'},
+    2.5,
+    {},
+    faults=(
+        'protective stop',
+        'an operator pauses the program',
+        'the speed slider is moved to 0',
+        'the network cable is cut',
+        'RTDE is cut',
+        'the pose is measured 6 mm off',
+        'the node is silent',
+    ),
+    pendant=('protective stop',),
+)
+
 OUTPUTS = _mode(
     'Outputs',
     'PRIMITIVES with two blends; one output switches in the second blend, another one 0.6 s '
@@ -654,6 +694,8 @@ MODES = (
     WAITING,
     PATH_OFFSET,
     PATH_OFFSET_MOVES,
+    FEED_OVERRIDE,
+    FEED_OVERRIDE_SERVO,
     APPEND,
     REPLACED_TAILS,
     OUTPUTS,

@@ -37,7 +37,12 @@ from ur_cartesian_driver.driver.live_session import (
     stationary_job,
 )
 from ur_cartesian_driver.driver.loop_connection import LoopConnection
-from ur_cartesian_driver.driver.motion_handle import ActiveMotion, MotionHandle, OnProgress
+from ur_cartesian_driver.driver.motion_handle import (
+    ActiveMotion,
+    HAS_FEED_INPUT,
+    MotionHandle,
+    OnProgress,
+)
 from ur_cartesian_driver.driver.recordings.recorder import plan_metadata
 from ur_cartesian_driver.driver.reported_robot import ReportedRobot
 from ur_cartesian_driver.driver.robot_services import RobotServices
@@ -52,7 +57,7 @@ from ur_cartesian_driver.motion.errors import (
     LocalProtocolError,
     RobotNotReady,
 )
-from ur_cartesian_driver.motion.events import Outcome
+from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes
 from ur_cartesian_driver.motion.goal.goal import Goal
@@ -353,6 +358,12 @@ class Driver(RobotServices, InteractiveMotions):
                 'it; resume or cancel it.'
             )
 
+    @property
+    def progress(self) -> Progress | None:
+        """The newest progress report of the running motion; None = there is none."""
+        motions = self._running.handles
+        return motions[0].progress if motions else None
+
     def stop(self) -> None:
         """Cancel the running motion and return at once; nothing happens if none runs."""
         for motion in self._running.handles:
@@ -456,6 +467,10 @@ class Driver(RobotServices, InteractiveMotions):
         )
         data = pack_parts(request)
         active = ActiveMotion(number, plan, on_progress, self._send)
+        if job.feed_override is not None:
+            active.motion.feed_problem = (
+                HAS_FEED_INPUT if self.config.feed_override_input else None
+            )
         if part is not None:
             active.motion.appender = self._make_appender(active.motion, part)
         self._running.start(active, data, self.status.not_ready())

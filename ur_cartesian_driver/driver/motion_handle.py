@@ -15,6 +15,7 @@ from ur_cartesian_driver.driver.callbacks import run_callback
 from ur_cartesian_driver.driver.ipc.channel import (
     CancelMotion,
     Request,
+    SetFeedOverride,
     SetPathOffset,
     TemporaryTcpSet,
 )
@@ -27,6 +28,19 @@ from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 
 OnProgress = Callable[[Progress], None]
+
+
+#: The goal takes no signal; an input of the robot gives it.
+NO_FEED_OVERRIDE = (
+    'feed_override',
+    'is empty in the goal that runs',
+    'set its minimum in the goal',
+)
+HAS_FEED_INPUT = (
+    'feed_override_input',
+    'names an input of the robot, which alone slows the goals',
+    "set the parameter to '' for signals of clients",
+)
 
 
 class MotionHandle:
@@ -47,6 +61,9 @@ class MotionHandle:
         #: The largest age of path offsets [s]; None = the goal permits no offsets. Set by the
         #: driver.
         self.offset_timeout: float | None = None
+        #: Why clients cannot slow the motion: field, problem, remedy; None = they can. Set by the
+        #: driver.
+        self.feed_problem: tuple[str, str, str] | None = NO_FEED_OVERRIDE
         #: The newest progress report; None before the first report.
         self.progress: Progress | None = None
 
@@ -139,6 +156,28 @@ class MotionHandle:
                 'age', f'is {age:.3f} s, path_offset.timeout is {self.offset_timeout:g} s'
             )
         self._send(SetPathOffset(motion=self.number, offset=vector3(offset), age=age))
+
+    def set_feed_override(self, fraction: float, *, age: float = 0.0) -> None:
+        """
+        Slow the motion from now on; ignored by a motion that has ended.
+
+        The motion runs at the fraction times the speed slider, within the bounds and at the rate
+        of ``feed_override`` of the goal. Call it again before ``feed_override.timeout`` has
+        passed: a stale or invalid fraction brings the motion to ``feed_override.minimum``.
+
+        :param fraction: of the planned speed, 0 to 1; all other numbers, and NaN, are invalid.
+        :param age: how long ago it was measured [s].
+        :raises InvalidGoal: the goal has no feed override, an input of the robot gives the signal
+            (parameter ``feed_override_input``), or a value is not a number.
+        """
+        if self.feed_problem is not None:
+            raise InvalidGoal(*self.feed_problem)
+        try:
+            fraction = with_declared_types(fraction, float, 'fraction')
+            age = with_declared_types(age, float, 'age')
+        except WrongType as error:
+            raise InvalidGoal(error.field, error.problem) from None
+        self._send(SetFeedOverride(motion=self.number, fraction=fraction, age=age))
 
     def done(self) -> bool:
         """Return whether the outcome has arrived."""

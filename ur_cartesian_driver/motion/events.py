@@ -170,6 +170,9 @@ class Progress:
     awaiting_points: bool = False
     #: Displacement of the tool by path offsets: along, across, normal [m].
     path_offset: Vector3 = ZERO3
+    #: What a feed override leaves of the planned speed, 0 to 1; whether a valid signal says so.
+    feed_override: float = 1.0
+    feed_is_valid: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

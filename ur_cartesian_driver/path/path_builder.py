@@ -30,6 +30,7 @@ from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import (
     CORNER_ANGLE,
     CORNER_DEVIATION,
+    FeedOverride,
     Goal,
     OnPathTolerance,
     PathOffset,
@@ -196,6 +197,24 @@ class Path(PathWithEvents):
             on_stale=on_stale,
         )
         return self._with(_settings=replace(self._settings, path_offset=offset))
+
+    def feed_override(
+        self, minimum: float, *, maximum: float = 1.0, rate: float = 0.0, timeout: float = 0.0
+    ) -> Path:
+        """
+        Allow a signal to slow the motion while the arm moves, in SPLINE or SERVO.
+
+        The signal is set by ``set_feed_override`` of the running motion, or on the topic
+        ``~/feed_override``.
+
+        :param minimum: smallest fraction of the planned speed, 0.01 to 1; also before the first
+            signal, and while the signal is stale or invalid.
+        :param maximum: largest fraction of the planned speed.
+        :param rate: largest change of the fraction [1/s]; 0 = 0.5.
+        :param timeout: age from which the signal is stale [s]; 0 = 0.5.
+        """
+        bounds = FeedOverride(minimum=minimum, maximum=maximum, rate=rate, timeout=timeout)
+        return self._with(_settings=replace(self._settings, feed_override=bounds))
 
     def keep_open(self, replace_horizon: float = 0.0) -> Path:
         """

@@ -78,6 +78,7 @@ from ur_cartesian_driver.planning.request.controlled_frame import (
     tool_tips,
 )
 from ur_cartesian_driver.planning.request.default_tolerances import apply_default_tolerances
+from ur_cartesian_driver.planning.request.feed_override import feed_remark
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_rounded,
     is_timed,
@@ -163,7 +164,9 @@ def _plan_fixed(
     table = add_safe_outputs(apply_default_tolerances(table, options), options)
     retargeted = retarget_to_tcp(table, at_set_point(state, arm), options)
     planner = GoalPlanner(retargeted, state.T_flange_tcp, arm, options, running)
-    return PLANNERS[planner.mode](planner)
+    plan = PLANNERS[planner.mode](planner)
+    remark = feed_remark(table.feed_override, plan.duration)
+    return replace(plan, remarks=(*plan.remarks, remark)) if remark else plan
 
 
 def _plan_free(table: GoalTable, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:

@@ -375,6 +375,7 @@ def _register_constants(settings: ProgramSettings) -> Iterator[str]:
         ('SERVO_OUT', registers.OutputDouble),
         ('OFFSET_IN', registers.OffsetInput),
         ('OFFSET_OUT', registers.OffsetOutput),
+        ('FEED_OUT', registers.FeedOutput),
     ):
         yield from _enum(prefix, members, offset=shift)
 

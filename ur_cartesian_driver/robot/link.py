@@ -39,6 +39,7 @@ from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.state_age import explain_age, StaleStates
 from ur_cartesian_driver.program import PROGRAM_NAME
 from ur_cartesian_driver.protocol.client_interfaces.primary_state import ConfigurationData
+from ur_cartesian_driver.protocol.program.reverse import NO_OVERRIDE
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.connection_status import (
     ConnectionStatus,
@@ -200,6 +201,7 @@ class RobotLink:
     def set_executing(self, busy: bool) -> None:
         """Set whether a goal runs, which determines the status and the kind of keepalive."""
         self.program.is_executing = busy
+        self.program.feed = NO_OVERRIDE
         if busy:
             self._status.apply(ConnectionEvent.GOAL_STARTED)
         else:

@@ -32,7 +32,7 @@ from rclpy.qos import (
     QoSProfile,
 )
 from rclpy.task import Future
-from std_msgs.msg import Header
+from std_msgs.msg import Float64, Header
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.goal_files.goal_file import read_goal_file
@@ -167,6 +167,7 @@ class GoalClient:
             node = rclpy.create_node(node_name, context=self._own_context)
         self._node = node
         self._offsets: Any = None
+        self._feeds: Any = None
         self._append_service: Any = None
         #: The appender of the running goal; None = no goal runs, or it has no keep_open.
         self._appender: GoalAppender | None = None
@@ -309,6 +310,19 @@ class GoalClient:
         header = Header(stamp=self._node.get_clock().now().to_msg())
         vector = Vector3(x=along, y=across, z=normal)
         self._offsets.publish(Vector3Stamped(header=header, vector=vector))
+
+    def set_feed_override(self, fraction: float) -> None:
+        """
+        Slow the running goal from now on, if it permits a feed override.
+
+        This can be called from anywhere while the goal runs, also in the callback of :meth:`send`;
+        call it again before the ``feed_override.timeout`` of the goal has passed.
+
+        :param fraction: of the planned speed, 0 to 1.
+        """
+        if self._feeds is None:
+            self._feeds = self._node.create_publisher(Float64, f'{self._driver}/feed_override', 1)
+        self._feeds.publish(Float64(data=fraction))
 
     def append(
         self,

@@ -26,6 +26,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.ros.goals.action_server import GoalServer
+from ur_cartesian_driver.ros.goals.feed_override_subscriber import FeedOverrideSubscriber
 from ur_cartesian_driver.ros.goals.path_offset_subscriber import PathOffsetSubscriber
 from ur_cartesian_driver.ros.live.freedrive_service import FreedriveService
 from ur_cartesian_driver.ros.live.live_target_subscriber import LiveTargetSubscriber
@@ -111,6 +112,7 @@ class CartesianDriverNode(Node):
         self._components.append(self.action_server)
         self._components.append(AppendService(self, self.action_server))
         self.path_offsets = PathOffsetSubscriber(self, self.action_server)
+        self.feed_overrides = FeedOverrideSubscriber(self, self.action_server)
         arbiter = self.action_server.arbiter
         if settings.node.servo_state_rate > 0.0:
             self._servo_state_publisher = ServoStatePublisher(

@@ -146,6 +146,17 @@ class SetPathOffset:
     age: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetFeedOverride:
+    """Give a new feed to a motion that accepts a feed override."""
+
+    motion: int
+    #: Fraction of the planned speed; anything but 0 to 1 is an invalid signal.
+    fraction: float
+    #: How old the fraction is [s].
+    age: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AppendToMotion:
     """Append records (84 bytes each) to a motion with keep_open; always answered."""
@@ -276,6 +287,7 @@ Request: TypeAlias = (
     | AppendToMotion
     | SetLiveTarget
     | SetPathOffset
+    | SetFeedOverride
     | CancelMotion
     | ResendProgram
     | CallRobot

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from ur_cartesian_driver.execution.goal.goal_monitor import MAX_PLAN_DEVIATION
+from ur_cartesian_driver.execution.offsets.feed_input import parse_feed_input
 from ur_cartesian_driver.motion.goal.field_table import Range
 from ur_cartesian_driver.robot.link_settings import LinkSettings, Port
 
@@ -33,6 +34,12 @@ class DriverConfig(LinkSettings):
     #: never resumes, whoever unlocks the robot. continue: the goal continues when a person unlocks
     #: the robot and plays its program.
     on_robot_stop: Literal['abort', 'continue'] = 'abort'
+    #: Analog input that gives the signal of goals with feed_override, in place of ~/feed_override:
+    #: 'standard_analog PIN ZERO FULL', with the levels [A] or [V] that mean 0 and 1 of the planned
+    #: speed. A level beyond them by more than 3 % of their range is invalid. Empty: no input.
+    #:
+    #: Example: 'standard_analog 0 2.0 8.0'
+    feed_override_input: str = ''
     #: Goals with keep_open: planned motion time that the robot is given ahead [s]; at least twice
     #: keep_open_margin.
     keep_open_horizon: Annotated[float, Range(0.1, 60.0)] = 1.0
@@ -70,6 +77,7 @@ class DriverConfig(LinkSettings):
         :raises ValueError: a value is outside its bounds; the text names the field and the bound.
         """
         LinkSettings.__post_init__(self)  # super() does not work in a class with slots
+        parse_feed_input(self.feed_override_input)
         if not self.keep_open_horizon >= 2.0 * self.keep_open_margin:
             raise ValueError(
                 f'keep_open_horizon is {self.keep_open_horizon}, it has to be at least '

@@ -25,18 +25,22 @@ from ur_cartesian_driver.execution.live.freedrive import FreedriveFeeder
 from ur_cartesian_driver.execution.live.live_feeder import ANY_DEVIATION, LiveFeeder
 from ur_cartesian_driver.execution.live.live_targets import LiveTargets
 from ur_cartesian_driver.execution.live.online_trajectory import OnlineTrajectoryGenerator
+from ur_cartesian_driver.execution.offsets.feed_input import FeedInput, parse_feed_input
+from ur_cartesian_driver.execution.offsets.feed_requests import FeedRequests
 from ur_cartesian_driver.execution.points.append_feeder import AppendFeeder
 from ur_cartesian_driver.execution.points.offset_point_feeder import OffsetPointFeeder
 from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
+from ur_cartesian_driver.execution.points.program_feed import ProgramFeed
 from ur_cartesian_driver.execution.servo.append_servo_feeder import AppendServoFeeder
 from ur_cartesian_driver.execution.servo.offset_setpoints import OffsetSetpoints
 from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
+from ur_cartesian_driver.execution.servo.setpoint_feed import SetpointFeed
 from ur_cartesian_driver.execution.servo.setpoint_source import SplineSetpoints
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal.goal import PIECES_PER_HORIZON
+from ur_cartesian_driver.motion.goal.goal import FeedOverride, PIECES_PER_HORIZON
 
 #: Makes the feeder of a motion.
 MakeFeeder: TypeAlias = Callable[[StartMotion, DriverConfig], Feeder]
@@ -44,8 +48,12 @@ MakeFeeder: TypeAlias = Callable[[StartMotion, DriverConfig], Feeder]
 
 def make_machine(request: StartMotion, config: DriverConfig) -> GoalMachine:
     """Return the machine of a motion."""
+    feeder = FEEDERS[request.job.execution](request, config)
+    if (bounds := request.job.feed_override) is not None:
+        feed_input = parse_feed_input(config.feed_override_input)
+        feeder.parts = (_feed(feeder, bounds, feed_input), *feeder.parts)
     return GoalMachine(
-        FEEDERS[request.job.execution](request, config),
+        feeder,
         feedback_period=1.0 / config.feedback_rate,
         resume_after_stop=config.on_robot_stop == 'continue',
         max_state_age=config.max_state_age,
@@ -107,6 +115,13 @@ FEEDERS: Mapping[ExecutionMode, MakeFeeder] = {
     ExecutionMode.SPLINE: point_feeder,
     ExecutionMode.SERVO: servo_feeder,
 }
+
+
+def _feed(feeder: Feeder, bounds: FeedOverride, feed_input: FeedInput | None) -> FeedRequests:
+    """Return the feed override of whoever runs the motion: the driver or the robot program."""
+    if isinstance(feeder, ServoFeeder):
+        return SetpointFeed(bounds, feeder.stream, feed_input)
+    return ProgramFeed(bounds, feed_input)
 
 
 def _monitor(request: StartMotion, config: DriverConfig) -> GoalMonitor:

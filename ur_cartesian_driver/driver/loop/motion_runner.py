@@ -19,6 +19,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
     MotionEnded,
     MotionProgress,
     ServoProgress,
+    SetFeedOverride,
     SetLiveTarget,
     SetPathOffset,
     StartMotion,
@@ -52,6 +53,7 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     SendControl,
     SendPoints,
     SendSafeOutputs,
+    SetFeedTarget,
     SetTemporaryTcp,
     StopProgram,
     WriteInputs,
@@ -210,6 +212,12 @@ class MotionRunner:
         if request.motion == self._number and self._machine is not None:
             self._machine.can.displacing.set_offset(request.offset, request.age, _now())
 
+    def set_feed_override(self, request: SetFeedOverride) -> None:
+        """Give the running motion another feed; ignore a feed for another motion."""
+        is_open = not self._config.feed_override_input
+        if is_open and request.motion == self._number and self._machine is not None:
+            self._machine.can.overriding.set_feed(request.fraction, request.age, _now())
+
     def cancel(self, request: CancelMotion) -> None:
         """Stop the requested motion, if it is running."""
         by = request.preempted_by
@@ -254,6 +262,8 @@ class MotionRunner:
             match command:
                 case SendControl(action=action, count=count, takes_offsets=takes_offsets):
                     self._link.control.send_control(action, count, takes_offsets=takes_offsets)
+                case SetFeedTarget(fraction=fraction, rate=rate):
+                    self._link.control.set_feed(fraction, rate)
                 case SendPoints(first=first, end=end):
                     self._link.program.send_points(self._points.take(first, end))
                 case SetTemporaryTcp(T_flange_tcp=T_flange_tcp):

@@ -33,6 +33,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
     refusal_of,
     Request,
     ResendProgram,
+    SetFeedOverride,
     SetLiveTarget,
     SetPathOffset,
     Shutdown,
@@ -171,6 +172,8 @@ class RobotLoop:
                 self._motion.set_live_target(request)
             case SetPathOffset():
                 self._motion.set_path_offset(request)
+            case SetFeedOverride():
+                self._motion.set_feed_override(request)
             case CancelMotion():
                 self._motion.cancel(request)
             case ResendProgram():

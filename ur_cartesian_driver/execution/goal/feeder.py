@@ -24,6 +24,7 @@ from abc import ABC, abstractmethod
 from math import nan
 from typing import TypeVar
 
+from ur_cartesian_driver.execution.goal.feed_state import FeedState, FULL_FEED
 from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend, GoalCommand
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
 from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
@@ -140,6 +141,27 @@ class Displaced:
         return NO_OFFSET
 
 
+class Overridable:
+    """A signal overrides the feed of the motion while the arm moves (feed_override)."""
+
+    def set_feed(self, fraction: float, age: float, now: float) -> None:
+        """
+        Accept a value of the signal.
+
+        :param fraction: of the planned speed.
+        :param age: how old the value is on arrival [s].
+        :param now: time of a steady clock [s].
+        """
+
+    def feed_state(self, packet: RobotState, now: float) -> FeedState:
+        """
+        Return the feed that the motion has now.
+
+        :param now: time of a steady clock [s].
+        """
+        return FULL_FEED
+
+
 class Ageing:
     """Values from clients grow old, or warnings become due, while the motion goes on."""
 
@@ -241,6 +263,7 @@ class Capabilities:
         self.steering = one_of(Steerable)
         self.displacing = one_of(Displaceable)
         self.displacement = one_of(Displaced)
+        self.overriding = one_of(Overridable)
         self.stalling = one_of(Stallable)
         self.interpretation = one_of(Interpreting)
         self.streaming = one_of(Streaming)

@@ -31,6 +31,16 @@ class SendControl(GoalCommand):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SetFeedTarget(GoalCommand):
+    """Have the robot program go to a feed, for the rest of the goal or until the next one."""
+
+    #: Fraction of the planned speed, 0 to 1.
+    fraction: float
+    #: How fast the feed changes [1/s].
+    rate: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SendPoints(GoalCommand):
     """Send the records ``first`` up to, not including, ``end`` on the trajectory socket."""
 

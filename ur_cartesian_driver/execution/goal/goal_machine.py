@@ -196,6 +196,7 @@ class GoalMachine:
             behind,
             moving=self.state in RUNNING_STATES,
             applied_offset=self.can.displacement.applied_offset(packet),
+            feed=self.can.overriding.feed_state(packet, now),
         )
         if self.state is GoalState.SETTLING:  # its deadlines run on the controller's clock
             self._deadline += self._monitor.held_time

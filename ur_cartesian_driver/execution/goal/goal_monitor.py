@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from math import inf
 
+from ur_cartesian_driver.execution.goal.feed_state import FeedState, FULL_FEED
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.goal.outcome_codes import Fault, GoalSignal
 from ur_cartesian_driver.execution.goal.wire_records import WireRecords
@@ -72,7 +73,7 @@ class GoalMonitor:
         self._running_time, self._running = 0.0, 0
         #: The newest packet; None before the first packet.
         self.latest: RobotState | None = None
-        self._applied_offset = NO_OFFSET
+        self._applied_offset, self._feed = NO_OFFSET, FULL_FEED
         #: Whether a watch beside the goal stops the arm at contact, and moves it back.
         self.contact_is_watched = False
         #: Scaled time: time since the start, as the controller's clock ran [s]; the part of that
@@ -97,7 +98,8 @@ class GoalMonitor:
         self._stale_begun, self._awaits_count = stale_begun, True
         self._motions_begun = self._motions_before = self.records.motions_before(sent)
         self._standstill.restart()
-        self.scaled_time = self._tracker.time()  # the wait at rest is no delay of the motion
+        # What was late before is past, and the wait at rest is no delay of the motion.
+        self.scaled_time, self.start_delay = self._tracker.time(), 0.0
 
     def update(
         self,
@@ -107,6 +109,7 @@ class GoalMonitor:
         *,
         moving: bool,
         applied_offset: AppliedOffset = NO_OFFSET,
+        feed: FeedState = FULL_FEED,
     ) -> None:
         """
         Process a packet; while the goal moves the arm, also advance time and path position.
@@ -114,9 +117,13 @@ class GoalMonitor:
         :param begun: how many motions the robot reports as begun; None = it gives no count.
         :param behind: by how many motions the controller's target may lag behind that count.
         :param applied_offset: the offset that displaces the path at the controller's target.
+        :param feed: the feed override of the motion.
         """
         before, self.latest = self.latest, state
         self._applied_offset = applied_offset
+        # The time of the goal passes as slowly as its feed says: that is no delay.
+        self.start_delay += feed.delay - self._feed.delay
+        self._feed = feed
         passed = 0.0 if before is None else max(0.0, state.timestamp - before.timestamp)
         playing = state.runtime_state is RuntimeState.PLAYING
         self.held_time = passed * (1.0 - state.target_speed_fraction * playing)
@@ -134,8 +141,8 @@ class GoalMonitor:
         elapsed = passed * self.rate
         self.scaled_time += elapsed
         if waits:
-            self._tracker.wait(elapsed)
-        self._standstill.update(before, state, passed)
+            self._tracker.wait(elapsed * feed.value)
+        self._standstill.update(before, state, passed, feed.value)
 
     def _count(self, begun: int | None) -> None:
         """Accept the reported count of motions, unless it may be the previous goal's."""
@@ -258,6 +265,8 @@ class GoalMonitor:
             timestamp=state.timestamp,
             awaiting_points=waits,
             path_offset=self._applied_offset.offset,
+            feed_override=self._feed.value,
+            feed_is_valid=self._feed.is_valid,
         )
 
     def success_text(self) -> str:

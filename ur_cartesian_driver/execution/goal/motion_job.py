@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import count
 from math import inf
 from typing import Any
@@ -20,8 +20,10 @@ from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import (
     ContactEnd,
+    DEFAULT_FEED_MOTION,
     DEFAULT_STALL_TIMEOUT,
     DEFAULT_YIELDS,
+    FeedOverride,
     OnPathTolerance,
     PRESS_AXES,
     PressFrame,
@@ -122,6 +124,8 @@ class MotionJob:
     following_outputs: frozenset[int] = frozenset()
     #: The band within which offsets may displace the path; None = no offsets.
     offset_band: OffsetBand | None = None
+    #: The bounds within which a signal may slow the motion, all given; None = no signal may.
+    feed_override: FeedOverride | None = None
     #: For SERVO: the joint positions over time, and where they are held, in order.
     spline: JointSpline | None = None
     holds: tuple[Hold, ...] = ()
@@ -157,6 +161,8 @@ class MotionJob:
             return 'outputs that have to be safe (safe_outputs)'
         if self.offset_band is not None and not self.execution.traits.streams_setpoints:
             return 'offsets of its path (path_offset)'
+        if self.feed_override is not None and not self.execution.traits.streams_setpoints:
+            return 'a signal that slows it (feed_override)'
         return '' if self.T_flange_tcp is None else 'another TCP than the robot has'
 
 
@@ -221,6 +227,7 @@ def job_from_plan(
         replace_horizon=goal.replace_horizon,
         presses=tuple(_press_windows(plan)),
         offset_band=plan.offset_band,
+        feed_override=_feed_override(goal.feed_override),
         safe_outputs=goal.safe_outputs,
         following_outputs=frozenset(output.pin for output in goal.proportional_outputs),
         stall_timeout=(goal.stall_timeout or DEFAULT_STALL_TIMEOUT) if stalls else 0.0,
@@ -301,6 +308,20 @@ def _press_windows(plan: Plan) -> Iterator[PressWindow]:
             ),
             ends_at_contact=press.contact != ContactEnd.NONE,
         )
+
+
+def _feed_override(wanted: FeedOverride) -> FeedOverride | None:
+    """Return the bounds of a feed override with the defaults filled in; None = no override."""
+    rate, timeout = DEFAULT_FEED_MOTION
+    return (
+        wanted
+        and replace(
+            wanted,
+            maximum=wanted.maximum or 1.0,
+            rate=wanted.rate or rate,
+            timeout=wanted.timeout or timeout,
+        )
+    ) or None
 
 
 def _longest_delay(rows: PlannedRows, row: int) -> float:

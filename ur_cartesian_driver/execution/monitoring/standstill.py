@@ -47,11 +47,14 @@ class Standstill:
         self._time = self._scaled_time = 0.0
         self.is_long = False
 
-    def update(self, before: RobotState | None, state: RobotState, passed: float) -> None:
+    def update(
+        self, before: RobotState | None, state: RobotState, passed: float, feed: float
+    ) -> None:
         """
         Compare a packet with the previous one.
 
         :param passed: time between the packets, by the controller's clock [s].
+        :param feed: what a feed override leaves of the planned speed, 0 to 1.
         """
         if (
             before is not None
@@ -61,8 +64,8 @@ class Standstill:
             and state.runtime_state is RuntimeState.PLAYING
         ):
             self._time += passed
-            # At rest the speed scaling is 0: only the slider says how fast a planned wait passes.
-            self._scaled_time += passed * state.target_speed_fraction
+            # At rest the speed scaling is 0: slider and feed say how fast a planned wait passes.
+            self._scaled_time += passed * state.target_speed_fraction * feed
             self.is_long = self._time >= STANDSTILL_TIMEOUT and self._scaled_time >= self._timeout
         else:
             self.restart()

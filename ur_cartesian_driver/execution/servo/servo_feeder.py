@@ -86,7 +86,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         super().__init__(monitor)
         self.stream, self.parts = stream, parts
         if monitor.job.stall_timeout:
-            self.parts = (WaitForArm(monitor, stream), *parts)
+            self.parts = (WaitForArm(monitor, stream), *self.parts)
         self._spline = monitor.job.spline
         self._max_servo_lag = MAX_LAG_LOOKAHEADS * stream.settings.lookahead_time
         self._last_read, self._last_answer = -1, -inf

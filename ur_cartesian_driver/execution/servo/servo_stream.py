@@ -217,6 +217,10 @@ class ServoStream:
         self.next_hold, self.held_time = inf, 0.0
         #: Time of the motion [s]: that of the source without the rests that were left out.
         self._moved_time = 0.0
+        #: What a feed override leaves of the motion's rate, 0 to 1; where it goes, and how fast
+        #: [1/s]; by how much it has delayed the motion in total [s].
+        self.feed = self.feed_target = 1.0
+        self.feed_rate = self.feed_delay = 0.0
         self._recovers = False
         self._last_write = -inf
         self._sent = self._underruns = 0
@@ -383,6 +387,8 @@ class ServoStream:
         if self.phase in STREAMING:
             speed = feedback.effective_speed if feedback.playing else 0.0
             self._clock.advance(passed, speed, self.in_flight)
+        step = self.feed_rate * passed
+        self.feed += min(max(self.feed_target - self.feed, -step), step)
         if self.phase is not ServoPhase.SERVOING:
             return
         if self.is_stalled:
@@ -398,6 +404,8 @@ class ServoStream:
         passed = self._motion_rate * time if moves else 0.0
         if self._recovers:
             self.stalled_time += time - passed
+        self.feed_delay += (1.0 - self.feed) * passed
+        passed *= self.feed
         if self.source_time + passed >= self.next_hold:
             reached = max(0.0, self.next_hold - self.source_time)
             self.held_time += passed - reached

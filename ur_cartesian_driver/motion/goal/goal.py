@@ -154,6 +154,11 @@ class StaleOffset(IntEnum):
 #: Speed [m/s], acceleration [m/s^2] and timeout [s] of path offsets, unless the goal gives them.
 DEFAULT_OFFSET_MOTION = (0.02, 0.2, 0.5)
 
+#: Rate of change [1/s] and timeout [s] of a feed override, unless the goal gives them.
+DEFAULT_FEED_MOTION = (0.5, 0.5)
+#: The smallest fraction to which a feed override slows the motion.
+MIN_FEED = 0.01
+
 #: How much later than planned a goal may end, unless the goal specifies it [s]; also the longest
 #: time from the program's SUCCESS until the arm rests inside the goal tolerance.
 DEFAULT_GOAL_TIME_TOLERANCE = 1.0
@@ -477,6 +482,24 @@ class PathOffset:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FeedOverride:
+    """The bounds of a feed override: a signal that slows the motion while the arm moves."""
+
+    #: Smallest fraction of the planned speed, also without a valid signal; 0 = no override.
+    minimum: Annotated[float, Range(MIN_FEED, 1.0, zero='no override')] = 0.0
+    #: Largest fraction of the planned speed; 0 = 1.
+    maximum: Annotated[float, Range(MIN_FEED, 1.0, zero='as planned')] = 0.0
+    #: How fast the fraction changes at most [1/s]; 0 = the default.
+    rate: Annotated[float, Range(0.01, 10.0, '1/s', zero=f'{DEFAULT_FEED_MOTION[0]:g} 1/s')] = 0.0
+    #: The age at which the signal is stale [s]; 0 = the default.
+    timeout: Annotated[float, Range(0.02, 60.0, 's', zero=f'{DEFAULT_FEED_MOTION[1]:g} s')] = 0.0
+
+    def __bool__(self) -> bool:
+        """Return whether a signal may slow the motion."""
+        return self.minimum > 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Goal:
     """A Cartesian trajectory and how to execute it."""
 
@@ -524,3 +547,4 @@ class Goal:
     corner_deviation: Annotated[float, CORNER_DEVIATION] = 0.0
     #: Largest turn of the tool from its programmed orientation there [rad]; 0 = the default.
     corner_angle: Annotated[float, CORNER_ANGLE] = 0.0
+    feed_override: FeedOverride = FeedOverride()

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from enum import IntEnum, IntFlag
+from math import inf
 from types import NoneType
 from typing import Annotated, Any, get_args, get_type_hints
 
@@ -166,6 +167,22 @@ class RobotState:
     safe_outputs_token: Annotated[int, Rtde('output_int_register_35', optional=True)] = 0
     #: Motion version of movej and movel when our robot program connected; 0 = unknown.
     motion_version: Annotated[int, Rtde('output_int_register_36', optional=True)] = 0
+    #: Feed override of the robot program's splines, 0 to 1; by how much it has delayed them since
+    #: our robot program connected [s].
+    feed_override: Annotated[
+        float, Rtde('output_double_register_31', optional=True, monitored=False)
+    ] = 1.0
+    feed_delay: Annotated[
+        float, Rtde('output_double_register_32', optional=True, monitored=False)
+    ] = 0.0
+    #: Levels of the standard analog inputs [A] or [V], as the installation sets them up; inf = not
+    #: reported.
+    standard_analog_input0: Annotated[
+        float, Rtde('standard_analog_input0', optional=True, monitored=False)
+    ] = inf
+    standard_analog_input1: Annotated[
+        float, Rtde('standard_analog_input1', optional=True, monitored=False)
+    ] = inf
     #: How fast the motion of the program runs, 0 to 1; :mod:`~.effective_speed` computes it from
     #: this packet and the earlier ones.
     effective_speed: Annotated[float, None] = 1.0

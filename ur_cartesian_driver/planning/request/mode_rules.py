@@ -48,6 +48,13 @@ GOAL_RULES = {
             'is set, but in a {mode} goal the robot program leads the joints along their spline, '
             'and would bring an offset back at once',
         ),
+        ModeRule(
+            'feed_override',
+            lambda traits: traits.is_spline,
+            'is set, but the speed of a {mode} goal is changed by the speed slider alone, which '
+            'belongs to people and would stay lowered if the driver died',
+            ', with times or a corner_deviation',
+        ),
     )
 }
 

@@ -128,6 +128,11 @@ FEATURES = (
         'is set, but robot programs of {dialect} add no offsets to their motions',
         'let the driver send its own robot program',
     ),
+    Feature(
+        'feed_override',
+        'is set, but robot programs of {dialect} take no feed while they move the arm',
+        'let the driver send its own robot program',
+    ),
 )
 
 

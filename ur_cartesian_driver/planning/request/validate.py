@@ -48,6 +48,7 @@ from ur_cartesian_driver.planning.request.default_tolerances import (
     apply_default_tolerances,
     named_tolerances,
 )
+from ur_cartesian_driver.planning.request.feed_override import check_feed_override
 from ur_cartesian_driver.planning.request.field_rules import (
     check_fields,
     check_finite,
@@ -291,6 +292,7 @@ RULES: tuple[Rule, ...] = (
     check_blends,
     check_stops,
     check_path_offset,
+    check_feed_override,
     _motions,
 )
 

@@ -25,6 +25,8 @@ from the program   int         25         last sequence number that the program 
 from the program   int         26         points of the running trajectory that have begun
 from the program   double      24         lag: motion time in the buffer [s]
 from the program   double      25 - 30    present path offset (:class:`OffsetOutput`)
+from the program   double      31         feed override of splines, 0 to 1
+from the program   double      32         by how much it has delayed them, in total [s]
 from the program   int         27         set-points carried out
 from the program   int         28         set-points repeated because the arm was not near them
 from the program   int         29         sequence numbers skipped
@@ -97,6 +99,15 @@ class OutputDouble(IntEnum):
     LAG_TIME = 24
 
 
+class FeedOutput(IntEnum):
+    """Double registers that the robot program writes when a feed override slows a spline."""
+
+    #: Present fraction of the planned speed, 0 to 1.
+    FRACTION = 31
+    #: Delay by all feed overrides since the program connected [s].
+    DELAY = 32
+
+
 class OffsetInput(IntEnum):
     """Double registers that the driver writes during a trajectory with path offsets."""
 
@@ -150,10 +161,16 @@ class ExternalError(IntEnum):
 
 
 #: Incremented when the robot program gains a feature that the driver relies on.
-PROGRAM_VERSION = 3
+PROGRAM_VERSION = 4
 
 Register: TypeAlias = (
-    InputInteger | InputDouble | OutputInteger | OutputDouble | OffsetInput | OffsetOutput
+    InputInteger
+    | InputDouble
+    | OutputInteger
+    | OutputDouble
+    | OffsetInput
+    | OffsetOutput
+    | FeedOutput
 )
 
 #: See :class:`OutputInteger`.

@@ -16,6 +16,8 @@ index  mode          meaning
 1 - 6  TORQUE        joint torques [Nm] x S
 1, 2   FORWARD       trajectory action, number of points, both unscaled
 3      FORWARD       START: 1 = the path accepts offsets (:mod:`~.registers`)
+4, 5   FORWARD       feed override: fraction of the planned speed of splines x S, and its largest
+                     rate of change [1/s] x S; 0 = no override
 1, 2   BUFFERED_     trajectory action, number of points: what is done along the set-points
        SERVO
 1      FREEDRIVE     freedrive action, unscaled
@@ -37,7 +39,8 @@ The sender must
 
 ``BUFFERED_SERVO`` is a mode of our own robot program. The pieces of its trajectories are not run,
 but awaited: the set-points lead the arm along them.
-Word 3 of START exists only in our own program, too; URCL leaves it 0.
+Word 3 of START and words 4 and 5 exist only in our own program, too; URCL leaves them 0. Every
+FORWARD message of a goal has words 4 and 5.
 Streams came with URCL 2.14; older programs ignore them. All other words have had the same place
 and scale since URCL 2.0.
 """
@@ -47,12 +50,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 import struct
-from typing import cast, TypeAlias
+from typing import cast, NamedTuple, TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.protocol.framing import (
     checked_int32,
     checked_size,
+    FIXED_POINT,
     hex_text,
     INT32_MAX,
     INT32_MIN,
@@ -210,6 +214,23 @@ def read_timeout_for(mode: ControlMode, requested: int, step_time: int = DEFAULT
     return max(requested, step_time) if requested else 0
 
 
+class FeedTarget(NamedTuple):
+    """A feed override in FORWARD mode."""
+
+    #: Fraction of the planned speed to go to.
+    fraction: float
+    #: How fast the feed goes there [1/s].
+    rate: float
+
+    def encode(self) -> tuple[int, int]:
+        """Return words 4 and 5."""
+        return round(self.fraction * FIXED_POINT), round(self.rate * FIXED_POINT)
+
+
+#: No feed override: words 4 and 5 are 0, as in messages of other drivers.
+NO_OVERRIDE = FeedTarget(0.0, 0.0)
+
+
 def trajectory(
     action: TrajectoryAction,
     count: int = 0,
@@ -217,6 +238,7 @@ def trajectory(
     step_time: int = DEFAULT_STEP_TIME,
     takes_offsets: bool = False,
     mode: ControlMode = ControlMode.FORWARD,
+    feed: FeedTarget = NO_OVERRIDE,
 ) -> ReverseMessage:
     """
     Return the message that starts, ends, cancels or keeps alive a trajectory.
@@ -224,11 +246,12 @@ def trajectory(
     :param count: number of points, for START, STREAM_END, and CANCEL of a stream.
     :param takes_offsets: for START: whether the path accepts offsets, through registers.
     :param mode: BUFFERED_SERVO for a trajectory along which set-points lead the arm.
+    :param feed: the feed override of the goal.
     """
     return ReverseMessage(
         read_timeout=read_timeout_for(mode, read_timeout, step_time),
         mode=mode,
-        payload=(action, count, TAKES_OFFSETS * takes_offsets, 0, 0, 0),
+        payload=(action, count, TAKES_OFFSETS * takes_offsets, *feed.encode(), 0),
     )
 
 

@@ -10,6 +10,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.program import wrap_in_program
 from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
+from ur_cartesian_driver.protocol.program import reverse
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 from ur_cartesian_driver.robot.connection_status import has_ended, is_stopped
 from ur_cartesian_driver.robot.event_log import EventLog
@@ -77,6 +78,10 @@ class ProgramControl:
         self._sockets.send_control(action, count, takes_offsets=takes_offsets)
         if action is TrajectoryAction.CANCEL:
             self._event_log.note('the driver sent CANCEL')
+
+    def set_feed(self, fraction: float, rate: float) -> None:
+        """Have the robot program, until the goal ends, go to a feed at a rate [1/s]."""
+        self._sockets.set_feed(reverse.FeedTarget(fraction, rate))
 
     def send_servo(self, on: bool) -> None:
         """Make the robot program enter the buffered servo, or leave it and brake."""

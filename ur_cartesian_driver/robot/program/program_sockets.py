@@ -69,6 +69,8 @@ class ProgramSockets:
         self.program_number = 1 + secrets.randbelow(INT32_MAX)
         #: A goal runs: keepalives are then NOOP actions of its trajectory.
         self.is_executing = False
+        #: The feed override of the running goal; every message of a trajectory repeats it.
+        self.feed = reverse.NO_OVERRIDE
         #: The goal uses the buffered servo: keepalives then repeat the message that enters it.
         self.servo = False
         #: The program is paused and reads nothing. Keepalives pause, too, because otherwise a
@@ -175,9 +177,19 @@ class ProgramSockets:
         mode = ControlMode.BUFFERED_SERVO if self.servo else ControlMode.FORWARD
         self._send(
             reverse.trajectory(
-                action, count, self._read_timeout, takes_offsets=takes_offsets, mode=mode
+                action,
+                count,
+                self._read_timeout,
+                takes_offsets=takes_offsets,
+                mode=mode,
+                feed=self.feed,
             )
         )
+
+    def set_feed(self, feed: reverse.FeedTarget) -> None:
+        """Send a feed override now and with every later message of the goal."""
+        self.feed = feed
+        self.send_control(TrajectoryAction.NOOP, 0)
 
     def send_points(self, data: bytes) -> None:
         """Send trajectory points."""

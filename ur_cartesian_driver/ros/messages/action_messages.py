@@ -74,6 +74,7 @@ def feedback_message(
     message.buffered = duration_message(progress.buffered)
     message.lag = progress.lag
     message.path_offset = vector_message(progress.path_offset)
+    message.feed_override = progress.feed_override
     return message
 
 

@@ -9,7 +9,7 @@ The fields of ``DriverStatus`` are filled by name, so that a new field of
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from enum import IntEnum
 from math import nan
@@ -24,6 +24,7 @@ from std_msgs.msg import Header
 from ur_cartesian_driver.driver import ConnectionStatus
 from ur_cartesian_driver.kinematics.link_shapes import LinkFrames
 from ur_cartesian_driver.kinematics.robot_description import LINK_NAMES
+from ur_cartesian_driver.motion.events import Progress
 from ur_cartesian_driver.motion.geometry.pose import conjugate, Pose, pose_from_row, rotate
 from ur_cartesian_driver.motion.goal.known_frames import (
     BASE,
@@ -120,14 +121,20 @@ def _transform(pose: Pose, parent: str, child: str, stamp: Time) -> TransformSta
 
 
 def status_message(
-    connection: ConnectionStatus, state: RobotState | None, stamp: Time
+    connection: ConnectionStatus,
+    state: RobotState | None,
+    stamp: Time,
+    progress: Progress | None = None,
 ) -> DriverStatus:
     """
     Return the state of the connection and the modes of the robot.
 
     Each field has the value of the same name in the connection status or in the robot's state;
-    only ``speed_scaling`` has the value of ``effective_speed``. The topic is published when the
-    connection or a mode changes, and at least once a second.
+    only ``speed_scaling`` has the value of ``effective_speed``, and what concerns the running goal
+    comes from its progress. The topic is published when the connection, a mode or who slows the
+    goal changes, and at least once a second.
+
+    :param progress: of the running goal; None = no goal runs.
     """
     message = DriverStatus()
     for name in message.get_fields_and_field_types():
@@ -139,7 +146,24 @@ def status_message(
                 value = _unknown(name, getattr(message, name))
             setattr(message, name, int(value) if isinstance(value, IntEnum) else value)
     message.header.stamp = stamp
+    message.feed_override = 1.0 if progress is None else progress.feed_override
+    message.slowed_by = ', '.join(
+        f'{who} {fraction:.0%}{why}' for who, fraction, why in slowed_by(state, progress)
+    )
     return message
+
+
+def slowed_by(
+    state: RobotState | None, progress: Progress | None
+) -> Iterator[tuple[str, float, str]]:
+    """Yield who slows the running goal, to which fraction of the speed, and a reason or ''."""
+    if state is None or progress is None:
+        return
+    if state.target_speed_fraction < 1.0:
+        yield 'speed slider', state.target_speed_fraction, ''
+    if progress.feed_override < 1.0:
+        why = '' if progress.feed_is_valid else ' (no valid signal)'
+        yield 'feed override', progress.feed_override, why
 
 
 def _unknown(name: str, value: Any) -> Any:

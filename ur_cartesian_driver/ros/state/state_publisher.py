@@ -40,6 +40,7 @@ from ur_cartesian_driver.ros.messages.state_messages import (
     link_transforms,
     robot_mode_message,
     safety_mode_message,
+    slowed_by,
     status_message,
     tcp_pose_message,
     tcp_transform,
@@ -203,10 +204,12 @@ class _StatusTopics:
         connection = driver.status
         robot_mode = None if state is None else state.robot_mode
         safety_mode = None if state is None else state.safety_mode
+        progress = driver.progress
+        slowed = [(who, why) for who, _, why in slowed_by(state, progress)]
         overdue = now - self._last_status_time >= STATUS_PERIOD
-        if self._is_new(self._status, (connection, robot_mode, safety_mode)) or overdue:
+        if self._is_new(self._status, (connection, robot_mode, safety_mode, slowed)) or overdue:
             self._last_status_time = now
-            self._status.publish(status_message(connection, state, stamp))
+            self._status.publish(status_message(connection, state, stamp, progress))
         if self._is_new(self._robot_mode, robot_mode):
             self._robot_mode.publish(robot_mode_message(state))
         if self._is_new(self._safety_mode, safety_mode):

@@ -1,0 +1,38 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""``~/feed_override``: a signal that slows a running goal that takes one."""
+
+from __future__ import annotations
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+from std_msgs.msg import Float64
+
+from ur_cartesian_driver.ros.goals.action_server import GoalServer
+from ur_cartesian_driver.ros.goals.path_offset_subscriber import OFFSET_QOS
+
+
+class FeedOverrideSubscriber:
+    """
+    Passes the signal to the running motion; the node destroys the subscription.
+
+    A sensor publishes all the time, so its values between goals, and during goals without feed
+    override, are no fault.
+    """
+
+    def __init__(self, node: Node, server: GoalServer) -> None:
+        """Subscribe."""
+        self._server = server
+        self._subscription = node.create_subscription(
+            Float64,
+            '~/feed_override',
+            self.give,
+            OFFSET_QOS,
+            callback_group=MutuallyExclusiveCallbackGroup(),
+        )
+
+    def give(self, message: Float64) -> None:
+        """Pass a fraction of the planned speed to the running motion."""
+        motion = self._server.running_motion
+        if motion is not None and motion.feed_problem is None:
+            motion.set_feed_override(message.data)
