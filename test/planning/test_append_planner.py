@@ -206,7 +206,10 @@ def test_a_lead_of_an_appended_command_is_refused_by_its_time_or_its_name():
     first = plan(replace(goal, **of(goal, 0, 4), keep_open=True), STATE, ARM, options)
     part = plan_first_part(first, ARM, options)
     for name, sentence in (
-        ('valve', r'io_commands\[0\]\.offset is -0\.02 s, but a goal with keep_open has no leads'),
+        (
+            'valve',
+            r'io_commands\[0\]\.offset is -0\.02, but a goal with keep_open switches outputs at ',
+        ),
         ('other', r"io_commands\[0\]\.lead is 'other', but the driver has only valve"),
     ):
         command = replace(outputs((0.0,))[6], lead=name)
