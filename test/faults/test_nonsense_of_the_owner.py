@@ -72,7 +72,7 @@ def test_nonsense_leaves_the_loop_ready_for_goals(name):
     async def scenario(cell):
         cell.owner.motions[1] = motion = CellMotion()
         request = NONSENSE[name]
-        write_body(cell, pickle.dumps(None) + pickle.dumps(request))
+        write_body(cell, pickle.dumps(None) + pickle.dumps([]) + pickle.dumps(request))
         await cell.sleep(0.1)
         if isinstance(request, channel.StartMotion):
             assert motion.outcome.code is ErrorCode.EXECUTION_FAILED

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 
 #: An arm that is held off its path is not where the next goal could begin, one that rests at a
 #: point does not move, nor does one in a function, one that presses stops as PRIMITIVES do, and
-#: one whose path has given way as without.
+#: one whose path has given way, or whose feed is slowed, as without.
 KINDS = {'PRIMITIVES': BlendGoal, **GOALS}
 LEFT_OUT = (
     'Waiting for the arm',
@@ -28,6 +28,8 @@ LEFT_OUT = (
     'Path offset, PRIMITIVES',
     'Replaced tails',
     'Rounded corners',
+    'Feed override',
+    'Feed override, SERVO',
 )
 for left_out in LEFT_OUT:
     del KINDS[left_out]

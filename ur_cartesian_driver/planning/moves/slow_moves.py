@@ -133,7 +133,7 @@ class _SlowMoves:
 
     def stretches(self) -> SlowStretches:
         """Return the stretches in the order of the path."""
-        groups = [*self._at_points(), self._cruises(), self._blends()]
+        groups = [*self._at_points(), self._cruises(), *self._blends()]
         columns = {
             name: np.concatenate([getattr(group, name) for group in groups])
             for name in SlowStretches.__dataclass_fields__
@@ -302,8 +302,8 @@ class _SlowMoves:
 
     # -- in blends -------------------------------------------------------------------------------
 
-    def _blends(self) -> SlowStretches:
-        """Return the blends in which the planned path is slower than requested."""
+    def _blends(self) -> Iterator[SlowStretches]:
+        """Yield the blends in which the planned path is slower than requested."""
         path, times, reference = self._geometries.path, self._timings.chain.times, self._reference
         ratio, options = self._ratio, self._timings.options
         law = f'as {blend_law(options)}'
@@ -312,6 +312,8 @@ class _SlowMoves:
         rows = np.flatnonzero(path.has_blend_after)
         carries = np.append(self._carries, False)
         rows = rows[carries[rows] | carries[rows + 1]]
+        if not len(rows):
+            return
         end = times.begins[rows + 1]
         begin = end - times.blend_time[rows + 1]
         steps = np.linalg.norm(np.diff(reference.poses[:, :3], axis=0), axis=1)
@@ -330,7 +332,7 @@ class _SlowMoves:
         part = np.where(path.fillet[rows], 1.0, _CHORD_PART)
         slow = lowest < (1.0 - part * self._slower_by) * asked
         rows = rows[slow]
-        return self._stretches(
+        yield self._stretches(
             (rows, path.u_leave[rows], rows + 1, path.u_join[rows + 1]),
             lowest[slow],
             SlowCause.IN_BLEND,
