@@ -149,7 +149,7 @@ def test_a_tool_may_go_back_farther_than_max_plan_deviation(begins_later):
         await cell.until(answer)
         assert answer().ok
         assert max(places) - place(cell) > 0.002
-        assert place(cell) == pytest.approx(wall, abs=3e-3)  # two cycles at this speed
+        assert place(cell) == pytest.approx(wall, abs=4e-3)  # three cycles at this speed
 
     run_cell(scenario)
 

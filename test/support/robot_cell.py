@@ -65,6 +65,8 @@ OWNER_PORT = 1
 REST_SPEED = 1e-4
 REVERSE, SENDER, TRAJECTORY, COMMANDS = 50001, 50002, 50003, 50004
 RTDE, PRIMARY, DASHBOARD = 30004, 30001, 29999
+#: Longest program that the External Control node takes here [B].
+MAX_PROGRAM = 1 << 20
 #: The ports of the cable between robot and driver.
 CABLE = (REVERSE, SENDER, TRAJECTORY, COMMANDS, RTDE, PRIMARY, DASHBOARD)
 #: Program on the pendant that contains the External Control node.
@@ -264,7 +266,7 @@ class RobotCell:
 
     async def fetch_program(self):
         """Be the External Control node: return the program of the driver, as it is played."""
-        reader, writer = await asyncio.open_connection(HOST, SENDER)
+        reader, writer = await asyncio.open_connection(HOST, SENDER, limit=MAX_PROGRAM)
         writer.write(REQUEST)
         text = await reader.readuntil(b'# NODE_CONTROL_LOOP_ENDS\n')
         writer.close()
