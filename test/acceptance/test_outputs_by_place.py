@@ -151,11 +151,12 @@ class PathTime:
         return speeds[max(k - 3, 0) : k + 2].min() < 0.2 * speeds.max()
 
 
-def misses(run, path_time, bound=1.5):
+def misses(run, path_time, bound=1.6):
     """
     Return by how many cycles each output was late or early, if by more than ``bound``.
 
-    An edge beside the cycle in which the output is due is at most one and a half away.
+    An edge beside the cycle in which the output is due is at most one and a half away; the time of
+    the path is known to a tenth of a cycle.
 
     Near a rest the speed tells little of the slider, and the tool makes little way: there the
     bound is wider.
@@ -328,32 +329,47 @@ def test_more_leads_than_the_program_follows_are_refused():
         Run(RobotInMemory('ur5e'), by_kind('stops', many))
 
 
+def drawn(number):
+    """Return the goal of a random case, a function of its first pose; its kind, its slider."""
+    random = random_of('places', number)
+    kind = random.choice(['stops', 'blends', 'rounded', 'spline'])
+    speed = random.uniform(0.05, 0.25)
+    slider = SLIDERS[random.choice(list(SLIDERS))]
+    commands = []
+    for pin in range(8):
+        place = random.choice(
+            [
+                {'distance': random.uniform(-0.03, 0.03)},
+                {'fraction': random.uniform(-0.9, 0.9)},
+                {},
+            ]
+        )
+        lead = random.choice([0.0, random.uniform(0.002, 0.2)])
+        commands.append(command(random.randint(1, 3), pin, lead=lead, **place))
+    return by_kind(kind, commands, speed), kind, slider
+
+
+def is_accepted(robot, goal_of):
+    state = robot.place(HOME, Pose((0.0, 0.02, 0.12)))
+    try:
+        plan(goal_of(state.actual_tcp_pose), state, ARM, OPTIONS)
+    except InvalidGoal:
+        return False
+    return True
+
+
 @pytest.mark.random
-def test_random_places_and_leads():
-    robot, accepted = RobotInMemory('ur5e'), 0
-    for number in range(cases(200)):
-        random = random_of('places', number)
-        kind = random.choice(['stops', 'blends', 'rounded', 'spline'])
-        speed = random.uniform(0.05, 0.25)
-        slider = SLIDERS[random.choice(list(SLIDERS))]
-        commands = []
-        for pin in range(8):
-            place = random.choice(
-                [
-                    {'distance': random.uniform(-0.03, 0.03)},
-                    {'fraction': random.uniform(-0.9, 0.9)},
-                    {},
-                ]
-            )
-            lead = random.choice([0.0, random.uniform(0.002, 0.2)])
-            commands.append(command(random.randint(1, 3), pin, lead=lead, **place))
-        try:
-            run = Run(robot, by_kind(kind, commands, speed), slider)
-        except InvalidGoal:
-            continue
-        accepted += 1
-        path_time = path_time_of(robot, by_kind(kind, commands, speed))
+@pytest.mark.parametrize('number', range(cases(200)))
+def test_random_places_and_leads(number):
+    goal_of, kind, slider = drawn(number)
+    robot = RobotInMemory('ur5e')
+    if is_accepted(robot, goal_of):
         # How long the controller takes in a blend is known less well.
-        bound = 2.5 if kind == 'blends' else 1.5
-        assert misses(run, path_time, bound) == {}, f'case {number}: {kind} at {speed:.3f} m/s'
-    assert accepted > 0.3 * cases(200)
+        bound = 2.5 if kind == 'blends' else 1.6
+        assert misses(Run(robot, goal_of, slider), path_time_of(robot, goal_of), bound) == {}
+
+
+@pytest.mark.random
+def test_many_random_places_and_leads_are_possible():
+    robot, count = RobotInMemory('ur5e'), cases(200)
+    assert sum(is_accepted(robot, drawn(i)[0]) for i in range(count)) > 0.3 * count
