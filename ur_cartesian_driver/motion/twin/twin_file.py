@@ -34,12 +34,13 @@ from difflib import get_close_matches
 from pathlib import Path
 import re
 from textwrap import indent
-from typing import Any, NoReturn
-
-import yaml
+from typing import Any, NoReturn, TYPE_CHECKING
 
 from ur_cartesian_driver.motion.twin.laws import Law, LAWS
 from ur_cartesian_driver.motion.twin.twin import ArmIdentity, Estimate, Twin
+
+if TYPE_CHECKING:
+    import yaml  # else with the first file: a simulator without one needs only numpy
 
 #: The version of the format, with which a file begins.
 FORMAT = 1
@@ -123,6 +124,8 @@ def _entry(law: Law, estimate: Estimate) -> dict[str, Any]:
 
 def _dumped(content: dict[str, Any]) -> str:
     """Return fields as YAML; lists, and mappings in fields, take one line."""
+    import yaml
+
     is_nested = any(isinstance(value, list | dict) for value in content.values())
     text: str = yaml.safe_dump(
         content,
@@ -176,6 +179,8 @@ class _Reader:
     def _root(self, text: str) -> yaml.Node:
         if len(text) > _MAX_LENGTH:
             raise TwinFileError(f'{self._name} is no twin: it is longer than 1 MB.')
+        import yaml
+
         try:
             root = yaml.compose(text, Loader=yaml.SafeLoader)
         except yaml.YAMLError as error:
@@ -193,7 +198,7 @@ class _Reader:
         self, node: yaml.Node, where: str, known: tuple[str, ...]
     ) -> dict[str, yaml.Node]:
         """Return the values of a mapping by name; each name is known and occurs once."""
-        if not isinstance(node, yaml.MappingNode):
+        if _kind(node) != 'mapping':
             self._refuse(node, f'{where} must have fields, NAME: VALUE')
         found: dict[str, yaml.Node] = {}
         for key, value in self._pairs(node, where):
@@ -207,11 +212,9 @@ class _Reader:
             found[key.value] = value
         return found
 
-    def _pairs(
-        self, node: yaml.MappingNode, where: str
-    ) -> Iterator[tuple[yaml.ScalarNode, yaml.Node]]:
+    def _pairs(self, node: yaml.Node, where: str) -> Iterator[tuple[yaml.Node, yaml.Node]]:
         for key, value in node.value:
-            if not isinstance(key, yaml.ScalarNode):
+            if _kind(key) != 'scalar':
                 self._refuse(key, f'a field of {where} has no name')
             yield key, value
 
@@ -254,7 +257,7 @@ class _Reader:
         return value
 
     def _interval(self, law: Law, node: yaml.Node) -> tuple[float, float]:
-        if not isinstance(node, yaml.SequenceNode) or len(node.value) != 2:
+        if _kind(node) != 'sequence' or len(node.value) != 2:
             self._refuse(node, f'the interval of {law.name} must be two numbers, [LOW, HIGH]')
         low, high = (self._number(item, f'interval of {law.name}') for item in node.value)
         return low, high
@@ -290,7 +293,7 @@ class _Reader:
     def _files(self, node: yaml.Node | None) -> tuple[str, ...]:
         if node is None:
             return ()
-        if not isinstance(node, yaml.SequenceNode):
+        if _kind(node) != 'sequence':
             self._refuse(node, 'files must be a list of names')
         return tuple(self._text(item, 'a name in files') for item in node.value)
 
@@ -302,9 +305,14 @@ class _Reader:
             self._refuse(node, f'the {what} is {text[:60]}, which is no number')
 
     def _text(self, node: yaml.Node, what: str) -> str:
-        if not isinstance(node, yaml.ScalarNode):
+        if _kind(node) != 'scalar':
             self._refuse(node, f'{what} must be one value')
         return ' '.join(str(node.value).split())
 
     def _refuse(self, node: yaml.Node, fault: str) -> NoReturn:
         raise TwinFileError(f'{self._name}, line {node.start_mark.line + 1}: {fault}.')
+
+
+def _kind(node: yaml.Node) -> str:
+    """Return whether a node is a scalar, a sequence or a mapping."""
+    return str(getattr(node, 'id', ''))
