@@ -343,6 +343,18 @@ def test_a_weave_swings_evenly_along_a_line_and_an_arc():
             'set() at point 0 has before=0.1 s, but no motion with a duration',
         ),
         (
+            lambda: START.by(dx=0.1, duration=1).set(TORCH, True, before=0.1, fraction=-0.5),
+            'set() at point 0 has before=0.1 s and a place beside the point',
+        ),
+        (
+            lambda: START.by(dx=0.1).set(TORCH, True, distance='8mm'),  # type: ignore[arg-type]
+            "set() at point 0 has the distance '8mm'; give a number",
+        ),
+        (
+            lambda: START.by(dx=0.1).set(TORCH, True, lead=None),
+            'set() at point 0 has the lead None; give a number',
+        ),
+        (
             lambda: START.by(dx=0.1, posture={'elbow_joint': 90}),
             'point 0 (line): posture has elbow_joint = 90 rad, more than a joint turns',
         ),

@@ -25,7 +25,13 @@ from ur_cartesian_driver.motion.goal.goal import (
 )
 from ur_cartesian_driver.path.outputs import Input, Output
 from ur_cartesian_driver.path.path_motions import PathOfMotions
-from ur_cartesian_driver.path.path_numbers import amount, NANOSECONDS, to_nanoseconds, vector
+from ur_cartesian_driver.path.path_numbers import (
+    amount,
+    any_number,
+    NANOSECONDS,
+    to_nanoseconds,
+    vector,
+)
 from ur_cartesian_driver.path.path_points import PathPoint
 from ur_cartesian_driver.planning.request.point_events.payload_changes import MAX_OFFSET
 from ur_cartesian_driver.planning.request.point_events.registry import check_event
@@ -70,20 +76,31 @@ class PathWithEvents(PathOfMotions):
             raise InvalidGoal('set()', 'comes before the first point', 'add a motion first')
         index, offset = len(self) - 1, after
         where = f'set() at point {index}'
-        valve, ahead = (lead, 0.0) if isinstance(lead, str) else ('', lead)
+        distance = any_number(where, 'distance', distance)
+        fraction = any_number(where, 'fraction', fraction)
+        valve, ahead = (
+            (lead, 0.0) if isinstance(lead, str) else ('', any_number(where, 'lead', lead))
+        )
+        after, before = any_number(where, 'after', after), any_number(where, 'before', before)
         for name, time, most in (
             ('after', after, MAX_OUTPUT_OFFSET),
             ('before', before, MAX_OUTPUT_OFFSET),
             ('lead', ahead, MAX_OUTPUT_LEAD),
         ):
             amount(where, name, time, most, 's')
+        if before and (distance or fraction):
+            raise InvalidGoal(
+                where,
+                f'has before={before:g} s and a place beside the point',
+                'give the place alone: a distance or fraction below 0 lies before the point',
+            )
         if lead and (after or before):
             raise InvalidGoal(
                 where, f'has lead={lead!r} and another time', 'move the place by a distance'
             )
         if before:
             index, offset = index - 1, self._points[-1].duration / NANOSECONDS - before
-            if not self._points[-1].duration or offset < 0.0 or index < 0 or after or distance:
+            if not self._points[-1].duration or offset < 0.0 or index < 0 or after:
                 raise InvalidGoal(
                     where,
                     f'has before={before:g} s, but no motion with a duration of that time leads '
@@ -93,8 +110,8 @@ class PathWithEvents(PathOfMotions):
             offset += self._points[index].segment.dwell
         command = replace(
             output.command(value, 0, round((offset - ahead) * NANOSECONDS) / NANOSECONDS),
-            distance=float(distance),
-            fraction=float(fraction),
+            distance=distance,
+            fraction=fraction,
             lead=valve,
         )
         check_event(where, command)
