@@ -195,6 +195,17 @@ def test_places_beside_points_stay_where_they_are_on_the_path():
     )
 
 
+@pytest.mark.parametrize(
+    ('waypoint', 'distance'),
+    [(0, 0.03), (1, -0.07)],
+)
+def test_an_offset_counts_from_the_place_beside_a_point(waypoint, distance):
+    """The arm was 2 cm behind the place, 0.2 s at 0.1 m/s."""
+    commands = (switch(waypoint, 1.0, distance=distance, offset=0.3),)
+    left = resume(goal(io_commands=commands), at(1, 0.5), overlap=0.0).goal
+    assert left.io_commands == (switch(1, 1.0, offset=0.1),)
+
+
 def test_a_named_lead_is_kept_ahead_and_dropped_where_the_arm_rests():
     commands = (switch(0, 1.0, lead='valve_1'), switch(2, 0.0, lead='valve_1'))
     left = resume(goal(io_commands=commands), at(1, 0.5), overlap=0.0).goal

@@ -367,30 +367,34 @@ class _Resumption:
 
     # -- events ----------------------------------------------------------------------------------
 
-    def _time_since(self, waypoint: int, field: str, offset: float) -> float:
-        """Return the time from a waypoint to the place [s]; 0 if the offset is not positive."""
+    def _time_since(self, place: float, field: str, offset: float) -> float:
+        """Return the time from a place to the one of the resumption [s]; 0 = offset <= 0."""
         if offset <= 0.0:
             return 0.0
         if self.timed:
-            k = min(floor(self.begin), len(self.points) - 1)
-            before = self.points[k - 1].time if k else 0.0
-            now = before + (self.begin - k) * (self.points[k].time - before)
-            return now - self.points[waypoint].time
+            return self._time(self.begin) - self._time(place)
         elapsed = 0.0
-        for k in range(waypoint + 1, len(self.points)):
-            part = min(1.0, self.begin - k)
-            if part <= 0.0:
+        for k in range(floor(place), len(self.points)):
+            if self.begin <= k:
                 break
+            if place <= k and k > 0:
+                elapsed += self.segments[k - 1].dwell
             if not self.segments[k].velocity:
                 raise InvalidGoal(
                     field,
-                    f'is {offset:g} s after points[{waypoint}], but when the arm was there is not '
-                    f'known: segments[{k}] has no velocity',
+                    f'is {offset:g} s after its place, but when the arm was there is not known: '
+                    f'segments[{k}] has no velocity',
                     'give it one, or switch the output at a point',
                 )
+            part = min(1.0, self.begin - k) - max(0.0, place - k)
             elapsed += part * self._length(k) / self.segments[k].velocity
-            elapsed += self.segments[k - 1].dwell
         return elapsed
+
+    def _time(self, place: float) -> float:
+        """Return the time of a place of a timed goal [s], evenly between points."""
+        k = min(floor(place), len(self.points) - 1)
+        before = self.points[k - 1].time if k else 0.0
+        return before + (place - k) * (self.points[k].time - before)
 
 
 class _Spline:

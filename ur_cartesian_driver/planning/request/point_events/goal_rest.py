@@ -30,9 +30,9 @@ class GoalRest:
     stopped: float
     #: Places of the points of the resumed goal.
     places: Sequence[float]
-    #: Function that returns the time from a waypoint to ``begin`` [s]; 0 for an offset <= 0. Its
-    #: other arguments are the name and value of the time offset of an event at the waypoint.
-    time_since: Callable[[int, str, float], float]
+    #: Function that returns the time from a place to ``begin`` [s]; 0 for an offset <= 0. Its
+    #: other arguments are the name and value of the time offset of an event at the place.
+    time_since: Callable[[float, str, float], float]
     #: Function that returns the way from one place to another along the path [m].
     distance: Callable[[float, float], float]
     #: Function that returns the place that is some way [m] behind another one.

@@ -74,7 +74,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
                 left.append(_ahead(command, place, rest))
                 continue
             field, offset = f'io_commands[{i}].offset', command.offset
-            due = offset - rest.time_since(command.waypoint, field, offset)
+            due = offset - rest.time_since(place, field, offset)
             command = replace(
                 command,
                 waypoint=rest.first,
