@@ -18,6 +18,7 @@ from ur_cartesian_driver.goal_files.lead_file import read_leads, write_lead
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.events import Progress
+from ur_cartesian_driver.motion.goal.goal import OutputKind
 from ur_cartesian_driver.motion.goal.leads import Lead
 from ur_cartesian_driver.motion.goal.output_names import output_name, parse_output
 from ur_cartesian_driver.path import Output
@@ -38,6 +39,8 @@ _FULL_SPEED = 0.99
 def measure_valve(arguments: argparse.Namespace) -> int:
     """Lay the beads, unless they have been measured, and write the dead times."""
     kind, pin = parse_output(' '.join(arguments.output))
+    if kind is OutputKind.STANDARD_ANALOG:
+        raise ValueError('output is analog, but valve switches the output; name a digital one.')
     file = Path(arguments.lead_file)
     if file.exists():
         read_leads(file)  # so that a wrong file is refused before beads are laid
@@ -62,6 +65,7 @@ def measure_valve(arguments: argparse.Namespace) -> int:
         with Driver(config) as driver:
             driver.wait_ready(arguments.wait)
             if not lay_beads(driver, beads, Output(kind, pin), ask):
+                print('No bead was laid.')
                 return 1
         print(HOW_TO_READ)
         shifts = [ask_distance(question, input) for question in QUESTIONS]
@@ -85,8 +89,9 @@ def measure_valve(arguments: argparse.Namespace) -> int:
         close=times.close,
         date=date.today().isoformat(),
     )
-    write_lead(file, lead)
+    # Before the file, which may be one that cannot be written.
     print(report(arguments.name, times, beads.fast))
+    write_lead(file, lead)
     print(
         f'written to {file}: a driver with lead_file:={file.resolve()} uses it for outputs with '
         f'"lead: {lead.name}"'
