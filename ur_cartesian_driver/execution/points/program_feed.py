@@ -14,6 +14,10 @@ from ur_cartesian_driver.execution.offsets.feed_requests import FeedRequests
 from ur_cartesian_driver.motion.goal.goal import FeedOverride
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
+#: Smaller changes are sent only to an end of the range: else the noise of an analog input would be
+#: a message to the robot program in each packet, and CANCEL would wait behind them.
+MIN_CHANGE = 0.005
+
 
 class ProgramFeed(FeedRequests, Prepared):
     """
@@ -39,7 +43,9 @@ class ProgramFeed(FeedRequests, Prepared):
         return super().age(now) + self._send()
 
     def _send(self) -> list[GoalCommand]:
-        if self._sent == self.target:
+        change = abs(self.target - self._sent)  # NaN at first
+        is_at_end = self.target in (self.bounds.minimum, self.bounds.maximum)
+        if change == 0.0 or (change < MIN_CHANGE and not is_at_end):
             return []
         self._sent = self.target
         return [SetFeedTarget(fraction=self._sent, rate=self.bounds.rate)]
