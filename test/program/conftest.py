@@ -60,5 +60,7 @@ def widened(monkeypatch):
     monkeypatch.setattr(compiler._FunctionCompiler, '_assign', checked)
     interpreter = 'ur_cartesian_driver.urscript.running.script_interpreter'
     monkeypatch.setattr(f'{interpreter}.operations', with_checks)
+    # Code without the checks is kept for other interpreters, and this one is not.
     monkeypatch.setattr(program_runner, '_compiled', {})
+    monkeypatch.setattr(compiler, '_functions', {})
     return found

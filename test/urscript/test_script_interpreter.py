@@ -547,10 +547,10 @@ def test_an_endless_loop_ends_at_its_budget_however_threads_take_turns() -> None
     assert running.error.text == BUDGET_EXCEEDED
 
 
-# A scope that is used again
+# Code that is used again
 
 
-def test_programs_with_one_scope_share_neither_variables_nor_lines() -> None:
+def test_interpreters_of_one_code_share_neither_variables_nor_lines() -> None:
     program, builtins = (
         parse('def f():\ncount = 0\ncount = count + 1\nsync()\nend\n'),
         {'sync': sync},
@@ -564,3 +564,17 @@ def test_programs_with_one_scope_share_neither_variables_nor_lines() -> None:
     assert first.variables == second.variables == {'count': 1}
     with pytest.raises(CompileError):
         second.lines.compile('count = added')
+
+
+def test_a_function_with_a_constant_of_another_type_is_another_one() -> None:
+    for number in ('1', '1.0', 'True', '0', '0.0'):
+        running = machine(f'def value():\nreturn {number}\nend\nx = value()')
+        running.step()
+        assert repr(running.variables['x']) == number
+
+
+def test_loops_nested_deeper_than_python_has_them_are_refused_with_a_place() -> None:
+    deep = 'while True:\n' * 25 + 'break\n' + 'end\n' * 25
+    with pytest.raises(CompileError, match='nested') as caught:
+        machine(f'def f():\n{deep}end\nf()')
+    assert caught.value.line > 0

@@ -10,7 +10,7 @@ parser makes the nodes; name resolution (`scopes`) and the compiler read them.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 import re
 from typing import Literal as OneOf
 
@@ -46,6 +46,11 @@ class ConstantExpression(Expression):
     """A number, a string, True, False or None."""
 
     value: int | float | str | bool | None
+    #: The type of the value: 1, 1.0 and True are equal in Python, but not the same constant.
+    kind: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, 'kind', type(self.value).__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
