@@ -163,14 +163,24 @@ def test_times_ask_for_their_mean_and_twists_for_less():
     assert set(causes(asked)) == {SlowCause.RAMP}
 
 
-def test_a_short_report_has_the_first_and_last_lines_and_counts_the_others():
+def test_a_short_report_has_all_remarks_and_counts_what_it_leaves_out():
     made = planned(goal(*(at(y=0.002 * i) for i in range(1, 41)), segment=Segment()))
-    whole, slow = made.report, made.find_slow_stretches()
-    assert 10 < len(slow) < len(whole) // 2
-    assert made.short_report(len(whole)) == whole
-    for limit in (20, len(whole) - 2):
-        short = made.short_report(limit)
-        half = limit // 2
-        assert short[:half] == whole[:half]
-        assert short[half + 1 :] == whole[-half:]
-        assert short[half] == f'({len(whole) - 2 * half} lines are left out here)'
+    whole, slow = made.report, [each.line for each in made.find_slow_stretches()]
+    lines, remarks = list(whole[:40]), list(made.remarks)
+    assert whole == (*lines, *remarks, *slow)
+    assert len(slow) == 40
+    assert made.short_report(80) == whole
+    assert list(made.short_report(20)) == [
+        *lines[:10],
+        '(segments left out here: 30)',
+        *remarks,
+        *slow[:10],
+        '(slow stretches left out here: 30)',
+    ]
+    assert list(made.short_report(78)) == [
+        *lines[:39],
+        '(segments left out here: 1)',
+        *remarks,
+        *slow[:39],
+        '(slow stretches left out here: 1)',
+    ]

@@ -19,7 +19,6 @@ from ur_cartesian_driver.ros.message_fields import duration_message, seconds
 from ur_cartesian_driver.ros.messages.action_messages import (
     feedback_message,
     FeedbackFrame,
-    MAX_REPORT_LINES,
     result_message,
 )
 from ur_cartesian_driver.ros.messages.state_messages import (
@@ -224,13 +223,3 @@ def test_the_motion_version_is_that_of_the_program_that_is_ours():
         (ConnectionStatus(program_is_own=True, motion_version=2), 2),
     ):
         assert status_message(connection, left_behind, STAMP).motion_version == shown
-
-
-@pytest.mark.parametrize('more', [0, 1, 90_000])
-def test_the_middle_of_a_long_report_is_left_out(more):
-    lines = tuple(map(str, range(MAX_REPORT_LINES + more)))
-    report = result_message(Outcome(code=ErrorCode.SUCCESSFUL, text='', report=lines)).report
-    assert len(report) == MAX_REPORT_LINES + (more > 0)
-    assert (report[0], report[-1]) == (lines[0], lines[-1])
-    left_out = [line for line in report if 'left out' in line]
-    assert left_out == ([f'({more} lines are left out here)'] if more else [])

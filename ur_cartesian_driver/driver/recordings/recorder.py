@@ -45,8 +45,8 @@ MAX_PENDING_JOBS = 1000
 #: Pause of the finisher after each small part of a file [s]: if a thread never pauses, the other
 #: threads wait 5 ms and more for the interpreter.
 YIELD_PAUSE = 0.0002
-#: Largest number of lines of a plan's report that are kept.
-MAX_REPORT_LINES = 1000
+#: Segments and slow stretches that have a line in the report that is kept.
+MAX_RECORDED_LINES = 1000
 MEGABYTE = 1_000_000
 
 
@@ -54,7 +54,7 @@ def plan_metadata(plan: Plan, options: PlanningOptions) -> str:
     """Return the metadata that only the planning process has, as JSON: report and options."""
     return json.dumps(
         {
-            'report': plan.short_report(MAX_REPORT_LINES),
+            'report': plan.short_report(MAX_RECORDED_LINES),
             'frame_id': plan.goal.frame_id,
             'controlled_frame': plan.goal.controlled_frame,
             'planning': _parameters(options),

@@ -93,7 +93,7 @@ class BlendEntry(NamedTuple):
     half: float
 
 
-#: Segments and remarks with a line in a short report; lines that are made at once.
+#: Segments and slow stretches with a line in a short report; lines that are made at once.
 MAX_REPORT_LINES, _LINES_AT_ONCE = 10_000, 1000
 _NO_BLEND = BlendEntry(0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -291,24 +291,34 @@ class Plan:
     @property
     def report(self) -> tuple[str, ...]:
         """One line for each segment, the remarks, and one line for each slow stretch."""
-        return (*self._segment_lines(range(len(self.segments))), *self._last_lines())
+        stretches = self.find_slow_stretches()
+        return (
+            *self._segment_lines(range(len(self.segments))),
+            *self.remarks,
+            *(stretch.line for stretch in stretches),
+        )
 
     def short_report(self, limit: int = MAX_REPORT_LINES) -> tuple[str, ...]:
-        """Return the report; if it has more lines than a limit, only the first and last ones."""
-        count, last = len(self.segments), self._last_lines()
-        total = count + len(last)
-        if total <= limit:
+        """
+        Return the report, with all remarks; if it is long, the first and last segments only.
+
+        :param limit: number of segments and slow stretches that have lines.
+        """
+        count, stretches = len(self.segments), self.find_slow_stretches()
+        if count + len(stretches) <= limit:
             return self.report
         half = limit // 2
-        last = last[-half:]
         first = range(min(half, count))
-        end = range(max(len(first), count + len(last) - half), count)
-        left_out = total - len(first) - len(end) - len(last)
+        shown = stretches[:half]
+        end = range(max(len(first), count + len(shown) - half), count)
+        segments, left_out = count - len(first) - len(end), len(stretches) - len(shown)
         return (
             *self._segment_lines(first),
-            f'({left_out} lines are left out here)',
+            *([f'(segments left out here: {segments})'] if segments else []),
             *self._segment_lines(end),
-            *last,
+            *self.remarks,
+            *(stretch.line for stretch in shown),
+            *([f'(slow stretches left out here: {left_out})'] if left_out else []),
         )
 
     def _segment_lines(self, rows: range) -> tuple[str, ...]:
@@ -321,9 +331,6 @@ class Plan:
             for line in (lines + planned.notes.get(row, '')).split('\n')
             if line
         )
-
-    def _last_lines(self) -> tuple[str, ...]:
-        return (*self.remarks, *(stretch.line for stretch in self.find_slow_stretches()))
 
     @property
     def joint_spline(self) -> JointSpline:

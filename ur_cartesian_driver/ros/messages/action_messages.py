@@ -9,7 +9,6 @@ values that are not known: the jerk, and the acceleration if the robot does not 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan, nan
 
@@ -25,9 +24,6 @@ from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 from ur_cartesian_driver.ros.message_fields import duration_message, pose_message, vector_message
 
 _NAN6: Vector6 = (nan,) * 6
-
-#: Largest number of report lines in a result; rclpy and DDS keep each result for a minute.
-MAX_REPORT_LINES = 10_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +80,7 @@ def result_message(outcome: Outcome) -> FollowCartesianTrajectory.Result:
     return FollowCartesianTrajectory.Result(
         error_code=int(outcome.code),
         error_string=outcome.text,
-        report=_report(outcome.report),
+        report=list(outcome.report),
         stopped_point=stopped.point if stopped else 0,
         stopped_fraction=stopped.fraction if stopped else nan,
     )
@@ -121,12 +117,3 @@ def _rotate(T_frame_base: Pose, twist: Vector6) -> Vector6:
     """Return a twist (or acceleration) in the axes of the goal's frame, which does not move."""
     q = T_frame_base.quaternion
     return (*rotate(q, twist[:3]), *rotate(q, twist[3:]))
-
-
-def _report(lines: Sequence[str]) -> list[str]:
-    """Return the lines of a report; if there are too many, only the first and the last ones."""
-    left_out = len(lines) - MAX_REPORT_LINES
-    if left_out <= 0:
-        return list(lines)
-    half = MAX_REPORT_LINES // 2
-    return [*lines[:half], f'({left_out} lines are left out here)', *lines[-half:]]
