@@ -273,8 +273,8 @@ class ProgramRunner:
             code=code,
         )
         if code is None:
-            while len(_compiled) >= MAX_COMPILED:
-                _compiled.pop(next(iter(_compiled)), None)
+            if len(_compiled) >= MAX_COMPILED:
+                _compiled.clear()
             _compiled[key] = program, interpreter.code
         return interpreter
 

@@ -37,7 +37,7 @@ from ur_cartesian_driver.urscript.script_errors import CompileError
 MAX_NODES = 400
 
 
-#: The code of the functions that were compiled last, see :func:`_function_code`.
+#: The code of the functions compiled lately, see :func:`_function_code`.
 _functions: dict[Hashable, FunctionCode] = {}
 MAX_FUNCTIONS = 2000
 
@@ -92,8 +92,8 @@ def _function_code(scope: Scope, shared: Shared, names: Hashable) -> FunctionCod
     if found is None:
         found = _FunctionCompiler(scope, shared).code()
         if names and scope.definition:
-            while len(_functions) >= MAX_FUNCTIONS:
-                _functions.pop(next(iter(_functions)), None)
+            if len(_functions) >= MAX_FUNCTIONS:
+                _functions.clear()
             _functions[key] = found
     return found
 
