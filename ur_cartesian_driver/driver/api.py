@@ -158,7 +158,7 @@ class Driver(RobotServices, InteractiveMotions):
             LOG.warning('%s', remark)
         if functions := self.config.prelude.functions:
             LOG.info(
-                'The robot program has functions of %s, outside all checks of the driver: %s.',
+                'The robot program has functions of %s, which the driver does not check: %s.',
                 self.config.prelude.file,
                 ', '.join(function.name for function in functions),
             )
@@ -473,7 +473,7 @@ class Driver(RobotServices, InteractiveMotions):
             )
         if part is not None:
             active.motion.appender = self._make_appender(active.motion, part)
-        self._running.start(active, data, self.status.not_ready())
+        self._running.start(active, data, lambda: self.status.not_ready())
         return active.motion
 
     def _make_appender(self, motion: MotionHandle, part: AppendPlan) -> Appender:

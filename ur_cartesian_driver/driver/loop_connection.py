@@ -21,7 +21,7 @@ from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.loop import loop_host as host
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
-#: Pause before a lost robot loop is replaced [s]: what ended it may end the next loop too.
+#: Pause before a lost robot loop is replaced [s]: the cause may end the next loop, too.
 RESTART_PAUSE = 0.5
 
 
@@ -46,8 +46,7 @@ class LoopConnection:
         self._config, self._auto_heartbeat = config, auto_heartbeat
         self._on_notification, self._on_lost = on_notification, on_lost
         self._reconfigure = reconfigure
-        #: Guards the pipe (several threads send), opening and closing, and the data that callers
-        #: have to change together with these.
+        #: Guards the pipe, opening and closing, and the data of callers that changes with them.
         self.lock = threading.RLock()
         self.host: host.LoopHost | None = None
         self._closed = threading.Event()
@@ -140,7 +139,7 @@ class LoopConnection:
         try:
             self._on_notification(notification)
         except Exception:
-            LOG.exception('a %s of the robot loop was not handled', type(notification).__name__)
+            LOG.exception('handling a %s of the robot loop failed', type(notification).__name__)
 
     def _restart(self) -> None:
         """
@@ -148,14 +147,18 @@ class LoopConnection:
 
         The robot program stops the arm, because its sockets were closed or silent for too long.
         """
-        LOG.error('the robot loop ended unexpectedly, or hangs, and is started again')
+        LOG.error('the robot loop ended unexpectedly or hangs; it is restarted')
         self._on_lost()
-        if self._closed.wait(RESTART_PAUSE):
-            return
-        with self.lock:
-            if self.host is None or self._closed.is_set():
+        while not self._closed.wait(RESTART_PAUSE):
+            with self.lock:
+                if self.host is None or self._closed.is_set():
+                    return
+                configure = self._reconfigure()
+                self.host.join()
+                try:
+                    self.host = host.start(self._config.robot_loop)
+                except OSError as error:  # no process, memory or file descriptor is left
+                    LOG.error('the robot loop cannot be restarted: %s; trying again', error)
+                    continue
+                self.send(configure)
                 return
-            configure = self._reconfigure()
-            self.host.join()
-            self.host = host.start(self._config.robot_loop)
-            self.send(configure)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 import itertools
 
@@ -29,7 +29,7 @@ from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, Serv
 
 class RunningMotions:
     """
-    Motions and calls by their numbers; thread-safe.
+    The running motion and the pending service calls, by their numbers; thread-safe.
 
     At most one motion runs at a time. Each motion ends with one outcome and each call with one
     answer, whatever happens to the loop.
@@ -42,19 +42,22 @@ class RunningMotions:
         self._motions: dict[int, ActiveMotion] = {}
         self._calls: dict[int, Future[ServiceAnswer]] = {}
 
-    def start(self, active: ActiveMotion, request: Sequence[Buffer], not_ready: str) -> None:
+    def start(
+        self, active: ActiveMotion, request: Sequence[Buffer], explain_not_ready: Callable[[], str]
+    ) -> None:
         """
         Send the request that starts a motion.
 
         :param request: the packed request.
-        :param not_ready: why the robot accepts no motion; '' = it accepts one.
+        :param explain_not_ready: returns why the robot accepts no motion; '' = it accepts one.
         :raises RobotNotReady: the robot accepts no motion, or another motion runs.
         """
         with self._loop.lock:
             if self._motions:
                 raise RobotNotReady('A motion is running; wait for its end or cancel it.')
-            if not_ready:
-                raise RobotNotReady(not_ready)
+            # Asked under the lock: a loop that is lost from now on aborts this motion, too.
+            if reason := explain_not_ready():
+                raise RobotNotReady(reason)
             self._motions[active.motion.number] = active
             # The request is sent under the lock: another thread may find the motion and cancel
             # it, and the cancel has to arrive after the start.
@@ -81,14 +84,15 @@ class RunningMotions:
             return [active.motion for active in self._motions.values()]
 
     def runs(self, number: int) -> bool:
-        """Return whether the motion with a number runs."""
+        """Return whether motion ``number`` is running."""
         return number in self._motions
 
     def temporary_tcp(self, unrestored: TemporaryTcpSet | None) -> TemporaryTcpSet | None:
         """
         Return the temporary TCP of the running motion; None = it sets no TCP.
 
-        :param unrestored: the temporary TCP to return if no motion runs.
+        :param unrestored: the result if no motion runs: the last goal's TCP, if it still has to be
+            restored.
         """
         with self._loop.lock:
             active = next(iter(self._motions.values()), None)
