@@ -170,8 +170,8 @@ def test_when_a_producer_stops_the_arm_decelerates_and_the_producer_may_continue
         assert cell.at_rest()
         points, segments = KINDS[kind][1](home, 7, 5, False)
         answer = await motion.append(points, segments)
-        assert 'had come to rest before them' in answer.text
-        assert ('later than their times say' in answer.text) == (kind == 'spline')
+        assert 'had come to rest before these points' in answer.text
+        assert ('later than their times' in answer.text) == (kind == 'spline')
         assert await motion.until(lambda: not motion.progress.awaiting_points)
         points, segments = KINDS[kind][1](home, 12, 5, True)
         answer = await motion.append(points, segments, last=True)
@@ -191,7 +191,7 @@ def test_last_without_points_ends_a_goal_at_its_last_point():
         home = cell.memory.read().actual_tcp_pose
         moving = AppendMotion(cell, goal('spline', home, 6))
         answer = await moving.append(last=True)
-        assert answer.text == 'The goal ends with the 6 points that it has.'
+        assert answer.text == 'No point follows: the goal has 6 in all.'
         with pytest.raises(GoalRefused, match=r'closed by an earlier request with last: true\.$'):
             await moving.append(circle(home, 7, 1))
         assert (await moving.ended()).succeeded

@@ -151,7 +151,7 @@ def test_a_goal_that_has_run_out_goes_on_from_rest(mode):
         assert np.abs(cell.robot.controller.motion.qd).max() < 1e-3
         time = motion.progress.time + 0.2
         answer = await motion.append(planner.chunk(time), replace_from_time=time)
-        assert 'had come to rest before them' in answer.text
+        assert 'had come to rest before these points' in answer.text
         assert await motion.until(lambda: not motion.progress.awaiting_points)
         await motion.append(last=True)
         end = await motion.ended()

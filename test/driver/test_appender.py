@@ -3,6 +3,7 @@
 """Who appends points gets an answer, whatever becomes of the robot loop."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from math import pi
 import queue
 
@@ -12,8 +13,9 @@ from ur_cartesian_driver.driver.appender import Appender
 from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.errors import RobotNotReady
+from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
@@ -93,6 +95,35 @@ def test_the_end_of_the_goal_answers_who_waits_and_all_who_come_later(goal, sent
         with pytest.raises(RobotNotReady, match='The goal has ended'):
             ended.result(20.0)
     assert sent.empty(), 'nobody is asked any more'
+
+
+def test_points_that_are_replaced_do_not_count_as_ahead_of_the_arm(sent, elsewhere):
+    options = replace(OPTIONS, max_points=3)
+    opened = Goal(
+        waypoints=tuple(replace(point(k), time=1.0 * k) for k in (1, 2, 3)),
+        execution=ExecutionMode.SPLINE,
+        keep_open=True,
+    )
+    appender = Appender(
+        1,
+        plan_first_part(plan(opened, STATE, ARM, options), ARM, options),
+        planning_inputs=lambda: (ARM, options),
+        send=sent.put,
+        progress=lambda: None,
+        timeout=20.0,
+    )
+    later = tuple(replace(point(k), time=1.0 * k) for k in (4, 5, 6))
+    first = elsewhere.submit(appender.append, AppendedPoints(waypoints=later))
+    appender.answer(AnswerAppend(number=number(sent)))
+    assert first.result(20.0).points == 6
+    with pytest.raises(InvalidGoal, match=r'would put 7 points ahead of the arm; the limit is 6'):
+        appender.append(AppendedPoints(waypoints=(replace(point(7), time=7.0),)))
+    tail = AppendedPoints(
+        waypoints=tuple(replace(point(k), time=1.0 * k) for k in (4, 5, 7)), replace_from_point=3
+    )
+    second = elsewhere.submit(appender.append, tail)
+    appender.answer(AnswerAppend(number=number(sent)))
+    assert second.result(20.0).points == 6
 
 
 def test_a_robot_loop_that_does_not_answer_is_not_asked_again(goal, sent):

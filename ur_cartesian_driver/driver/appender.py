@@ -3,9 +3,9 @@
 """
 Append points to an open goal while it runs (keep_open).
 
-Points are planned here, in the thread that appends them, and offered to the robot loop. The loop
-accepts all of them or none, because it alone knows whether the ending was sent meanwhile. If the
-ending was sent, the points are planned again, from rest.
+Points are planned here, in the thread that appends them, and offered to the robot loop. Only the
+loop knows whether the ending has been sent meanwhile, so the loop decides: it accepts all points
+or none. If the ending has been sent, the points are planned again, from rest.
 """
 
 from __future__ import annotations
@@ -32,14 +32,16 @@ from ur_cartesian_driver.planning.append.appendable_goal import AppendableGoal, 
 from ur_cartesian_driver.planning.append.replaced_tail import (
     cut_time,
     first_replaceable,
+    points_before,
     without_passed,
 )
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_plan
 
-#: How long the robot loop may take to answer [s]; the arm is stopped if the loop hangs this long.
+#: How long the robot loop may take to answer [s]. A loop that is silent for this long is replaced,
+#: which stops the arm (:data:`~.loop.loop_host.SILENCE_TIMEOUT`).
 ANSWER_TIMEOUT = 5.0
 #: How many points may be ahead of the arm, as a multiple of ``max_points``.
-MESSAGES_AHEAD = 2
+MAX_AHEAD = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +68,7 @@ def encode_part(part: AppendPlan) -> tuple[bytes, MotionJob]:
         ending_records=part.ending_records,
         spline=part.spline,
     )
-    # If the robot loop makes set-points of the plan, no records go to the robot.
+    # A plan that is streamed as set-points needs no records.
     points = b'' if plan.execution.traits.streams_setpoints else encode_plan(plan)
     return points, replace(job, due=part.end_time)
 
@@ -99,7 +101,7 @@ class Appender:
         self._is_open = True
         # Requests run one after the other, because each begins where the previous one ends.
         self._append_lock = threading.Lock()
-        # Guards the attributes below.
+        # Guards the pending answers and the end.
         self._lock = threading.Lock()
         self._pending_answers: dict[int, Future[AnswerAppend]] = {}
         #: Why nothing can be appended any more; empty = more points are possible.
@@ -115,7 +117,8 @@ class Appender:
         """
         Plan points, and have all or none of them accepted; blocks until the answer has come.
 
-        :raises GoalRefused: the points are not accepted, and the goal stays as it was.
+        :raises GoalRefused: the points are not accepted, and the goal stays as it was; or the loop
+            did not answer, and whether it has accepted them is unknown.
         """
         with self._append_lock:
             offers = self.offers(new_points)
@@ -129,7 +132,7 @@ class Appender:
 
     def offers(self, new_points: AppendedPoints) -> Offers:
         """
-        Yield the offers to the robot loop, one by one.
+        Yield the offers to the robot loop, one by one; not thread-safe.
 
         The caller sends each offer to the loop, and sends the answer into the generator.
 
@@ -148,7 +151,9 @@ class Appender:
         return appended
 
     def _close(self, new_points: AppendedPoints) -> Offers:
-        if not new_points.last or new_points.replaces:
+        if new_points.replaces:
+            raise InvalidGoal('points', 'is empty, so nothing replaces the tail', 'give a point')
+        if not new_points.last:
             raise InvalidGoal('points', 'is empty', 'give at least one point, or set last')
         answer = yield self._offer(None, b'', 0)
         if answer.refusal:
@@ -156,14 +161,15 @@ class Appender:
         return AppendResult(
             points=self.points,
             first=self.points,
-            text=(f'The goal ends with the {self.points} points that it has.'),
+            text=f'No point follows: the goal has {self.points} in all.',
         )
 
     def _append(self, new_points: AppendedPoints) -> Offers:
         arm, options = self._arm_and_options()
         before = self._forget_passed(new_points)
         self._check_ahead(before, new_points, options)
-        for from_rest in (False, True) if not self._is_at_rest() else (True,):
+        attempts = (True,) if self._is_at_rest() else (False, True)
+        for from_rest in attempts:
             part = plan_append(before, new_points, arm, options, from_rest=from_rest)
             points, job = encode_part(part)
             answer = yield self._offer(job, points, part.records_before, part.cut_time)
@@ -183,7 +189,7 @@ class Appender:
 
     def _forget_passed(self, new_points: AppendedPoints) -> AppendableGoal:
         """
-        Return the goal without the points that the arm has passed.
+        Forget the points that the arm has passed, and return the goal.
 
         :raises GoalRefused: the points to replace were passed, or do not exist.
         """
@@ -191,7 +197,7 @@ class Appender:
         if progress is not None:
             self._goal = without_passed(self._goal, progress.time)
             if cut_time(self._goal, new_points) < progress.time:
-                # Motion that was sent and not yet carried out cannot be replaced either.
+                # Motion that was sent but has not run yet cannot be replaced either.
                 ahead = progress.buffered if isnan(progress.lag) else progress.lag
                 raise AlreadySent(*first_replaceable(self._goal, progress.time + ahead))
         return self._goal
@@ -208,15 +214,17 @@ class Appender:
     def _check_ahead(
         self, before: AppendableGoal, new_points: AppendedPoints, options: PlanningOptions
     ) -> None:
-        progress, count = self._progress(), len(new_points.waypoints)
-        ahead = before.points - (progress.waypoint if progress is not None else 0)
-        max_ahead = MESSAGES_AHEAD * options.max_points
-        if ahead + count > max_ahead:
+        progress = self._progress()
+        reached = progress.waypoint if progress is not None else 0
+        kept = points_before(before, cut_time(before, new_points))
+        ahead = kept - reached + len(new_points.waypoints)
+        max_ahead = MAX_AHEAD * options.max_points
+        if ahead > max_ahead:
             raise InvalidGoal(
                 'points',
-                f'would make {ahead + count} points that the arm has not reached, more '
-                f'than {max_ahead} = {MESSAGES_AHEAD} max_points',
-                'append them when it has come further (feedback: point_index)',
+                f'would put {ahead} points ahead of the arm; the limit is {max_ahead} '
+                f'({MAX_AHEAD} times max_points)',
+                'append them once the arm has advanced (feedback: point_index)',
             )
 
     def _offer(
@@ -277,5 +285,5 @@ def _from_rest(timed: bool) -> str:
 
     It does not say by how much the points are late: the arm may have waited, or may still wait.
     """
-    clause = ', later than their times say' if timed else ''
-    return f' The motion had come to rest before them, and goes on from there{clause}.'
+    clause = ', later than their times' if timed else ''
+    return f' The arm had come to rest before these points; it goes on from there{clause}.'

@@ -86,6 +86,12 @@ def first_replaceable(before: AppendableGoal, time: float) -> tuple[int, float]:
     return point + passed, round(client_time, _TIME_DIGITS)
 
 
+def points_before(before: AppendableGoal, time: float) -> int:
+    """Return the number of points that a cut at a time [s] leaves; infinite = no cut."""
+    part = None if time == inf else _part_at(before, time)
+    return before.points if part is None else int(part.waypoints[part.row_at(time)])
+
+
 def cut_tail(before: AppendableGoal, time: float, arm: Arm) -> AppendableGoal:
     """
     Return a goal without its motion after a time [s]; ``before`` itself if nothing is cut off.
