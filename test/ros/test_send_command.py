@@ -90,9 +90,15 @@ def test_a_signal_ends_the_sender_after_its_goal(senders, number):
 
 def test_a_goal_that_was_stopped_is_resumed(senders, tmp_path):
     process = senders.start()
+    goal, note = tmp_path / 'goal.yaml', tmp_path / 'goal.yaml.stopped'
+    whole = goal.read_text()
+    goal.write_text('# edited while the arm moves')
     process.send_signal(signal.SIGINT)
     output, _ = process.communicate(timeout=10.0)
-    goal, note = tmp_path / 'goal.yaml', tmp_path / 'goal.yaml.stopped'
+    edited = senders.command(goal, '--resume')
+    _, errors = edited.communicate(timeout=60.0)
+    assert 'the file has changed since the goal was stopped' in errors
+    goal.write_text(whole)
     line = output.splitlines()[-2]
     assert line.startswith('stopped on the way to point 0, at '), output
     assert line.endswith(f'"ur-cartesian send --resume {goal}" goes on from there')

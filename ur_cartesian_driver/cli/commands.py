@@ -14,7 +14,7 @@ import sys
 from time import monotonic
 from typing import Any, BinaryIO
 
-from ur_cartesian_driver.cli.stopped_place import read_place, write_place
+from ur_cartesian_driver.cli.stopped_place import digest, read_place, write_place
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
 from ur_cartesian_driver.motion.events import PathPlace
@@ -50,7 +50,9 @@ def send(arguments: argparse.Namespace) -> int:
     """Send a goal, show its progress, and wait for its result."""
     from ur_cartesian_driver.ros import client
 
-    goal = read_goal(arguments)
+    # Before the motion: the file may be edited or removed while the arm moves.
+    sent_file = '' if arguments.file == '-' else digest(goal_file(arguments.file))
+    goal = whole = read_goal(arguments)
     validate_only = goal.validate_only or arguments.validate_only
     left = None
     if arguments.resume:
@@ -77,8 +79,8 @@ def send(arguments: argparse.Namespace) -> int:
         print(*result.report, sep='\n')
     if result.error_code:
         status += f', {code_text(result.error_code)}'
-    if arguments.file != '-' and not validate_only:
-        _note_place(arguments, result, left)
+    if sent_file and not validate_only:
+        _note_place(arguments, result, whole, left, sent_file)
     print(f'{status}: {result.error_string}')
     if status == 'SUCCEEDED':
         return 0
@@ -130,8 +132,16 @@ def _resumed(goal: Any, place: PathPlace, arguments: argparse.Namespace) -> tupl
     return client.resumed_goal(goal, place, overlap=overlap, approach=approach)
 
 
-def _note_place(arguments: argparse.Namespace, result: Any, left: Any) -> None:
-    """Note where a goal was stopped, and print how to resume it."""
+def _note_place(
+    arguments: argparse.Namespace, result: Any, whole: Any, left: Any, sent_file: str
+) -> None:
+    """
+    Note where a goal was stopped, and print how to resume it.
+
+    :param whole: the goal of the file.
+    :param left: the resumed goal that was sent; None = the whole goal was.
+    :param sent_file: the digest of the file.
+    """
     from ur_cartesian_driver.ros.messages.action_messages import outcome_of
 
     outcome = outcome_of(result)
@@ -142,12 +152,12 @@ def _note_place(arguments: argparse.Namespace, result: Any, left: Any) -> None:
         place = left.original(place)
     if place is not None:
         try:
-            _resumed(read_goal(arguments), place, arguments)
+            _resumed(whole, place, arguments)
         except InvalidGoal as refusal:
             print(f'it cannot be resumed: {refusal}')
             place = None
     try:
-        written = write_place(_named_file(arguments), place)
+        written = write_place(_named_file(arguments), place, sent_file)
     except OSError as error:
         print(f'where it was stopped cannot be noted: {error}', file=sys.stderr)
         return

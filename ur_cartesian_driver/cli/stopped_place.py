@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The note of the place where a goal was stopped, for ``ur-cartesian send --resume``.
+Remembers where a goal was stopped, for ``ur-cartesian send --resume``.
 
 The note for ``seam.yaml`` is the file ``seam.yaml.stopped`` in the same folder. It holds the place
 and a hash of ``seam.yaml``. If the goal is an example of the package, or its folder is read-only,
@@ -22,12 +22,12 @@ from ur_cartesian_driver.resources import share_path
 _SUFFIX = '.stopped'
 
 
-def write_place(goal_file: Path, place: PathPlace | None) -> Path | None:
+def write_place(goal_file: Path, place: PathPlace | None, digest: str) -> Path | None:
     """
     Note the place where a goal was stopped.
 
-    :param place: the place; None = nothing is left to resume, so an earlier note is removed.
-
+    :param place: the place; None = nothing can be resumed, so an earlier note is removed.
+    :param digest: the :func:`digest` of the file when the goal was sent.
     :returns: the written file; None if no file was written.
     :raises OSError: the file cannot be written.
     """
@@ -35,7 +35,7 @@ def write_place(goal_file: Path, place: PathPlace | None) -> Path | None:
     if place is None:
         file.unlink(missing_ok=True)
         return None
-    noted = {'point': place.point, 'fraction': place.fraction, 'goal': _hash(goal_file)}
+    noted = {'point': place.point, 'fraction': place.fraction, 'goal': digest}
     file.write_text(yaml.safe_dump(noted, sort_keys=False), encoding='utf-8')
     return file
 
@@ -53,15 +53,15 @@ def read_place(goal_file: Path) -> PathPlace:
         goal = noted['goal']
     except FileNotFoundError:
         raise ValueError(
-            f'{goal_file} cannot be resumed: there is no {file}, which "send" writes where '
-            'a goal ends on its way'
+            f'{goal_file} cannot be resumed: {file} is missing; "send" writes it when a goal '
+            'is stopped before its end'
         ) from None
     except (yaml.YAMLError, KeyError, TypeError, ValueError):
         raise ValueError(f'{file} does not say where a goal was stopped; remove it') from None
-    if goal != _hash(goal_file):
+    if goal != digest(goal_file):
         raise ValueError(
-            f'{goal_file} cannot be resumed: it is not the goal any more that was stopped; '
-            f'send what is left by hand, or remove {file}'
+            f'{goal_file} cannot be resumed: the file has changed since the goal was stopped; '
+            f'make a goal of the remaining points, or remove {file}'
         )
     return place
 
@@ -73,5 +73,6 @@ def _file(goal_file: Path) -> Path:
     return folder / (goal_file.name + _SUFFIX)
 
 
-def _hash(goal_file: Path) -> str:
+def digest(goal_file: Path) -> str:
+    """Return the hash by which a goal file is recognised."""
     return sha256(goal_file.read_bytes()).hexdigest()
