@@ -158,4 +158,6 @@ def test_the_command_refuses_what_is_too_much_or_contradicts(capsys):
         main(['sweep', 'square', '--x', '1,2'])
     assert main(['sweep', 'square', '--x', '0,1,1000', '--y', '0,1,1000']) == 1
     assert '1000000 variants' in capsys.readouterr().err
+    assert main(['sweep', 'square', '--monte-carlo', '2', '--calibration-seed', '1']) == 1
+    assert 'draws calibrations of its own' in capsys.readouterr().err
     assert PlanningOptions() == VARIANT.options

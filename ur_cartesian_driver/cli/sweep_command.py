@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""``ur-cartesian sweep``: plan one goal for other places, other robots, other calibrations."""
+"""``ur-cartesian sweep``: plan one goal at many places, on several models and calibrations."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ from ur_cartesian_driver.sweep import (
     Variant,
 )
 
-#: The quantities that a map can show.
+#: Quantities that a map can show.
 MARGINS = tuple(COLUMNS)
 
 
 def sweep_goal(arguments: argparse.Namespace) -> int:
-    """Print the result of each variant; the status is 0 if all of them pass."""
+    """Print the results of all variants, or write them; the status is 0 if all of them pass."""
     variants = variants_of(arguments)
     count = arguments.processes
     with counted('variants', len(variants)) as one_done:
@@ -69,7 +69,8 @@ def variants_of(arguments: argparse.Namespace) -> list[Variant]:
     """
     Return the variants of a command line.
 
-    :raises ValueError: there are too many variants, or one calibration for several models.
+    :raises ValueError: there are too many variants; or a calibration is given for several models,
+        or with --monte-carlo.
     """
     from ur_cartesian_driver.ros.parameters.parameter_files import read_settings
 
@@ -79,8 +80,14 @@ def variants_of(arguments: argparse.Namespace) -> list[Variant]:
     count = prod(map(len, offsets.values())) * len(models) * max(1, arguments.monte_carlo)
     if count > MAX_VARIANTS:
         raise ValueError(f'the sweep has {count} variants; give {MAX_VARIANTS} at most')
-    if len(models) > 1 and (arguments.calibration or arguments.calibration_seed is not None):
-        raise ValueError('a calibration is that of one arm; give one model')
+    if arguments.calibration or arguments.calibration_seed is not None:
+        if len(models) > 1:
+            raise ValueError('a calibration belongs to one arm; give one model')
+        if arguments.monte_carlo:
+            raise ValueError(
+                '--monte-carlo draws calibrations of its own; leave --calibration and '
+                '--calibration-seed out'
+            )
     model = robot_model(models[0])
     variant = Variant(
         goal=Path.from_message(read_goal(arguments)),
