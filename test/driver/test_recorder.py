@@ -249,7 +249,7 @@ def test_a_directory_that_cannot_be_written_is_said_once_not_with_each_motion(tm
 
 def test_a_motion_that_takes_more_than_half_of_the_room_is_recorded_as_far_as_that(tmp_path):
     warnings = record(tmp_path, [packet(i) for i in range(1500)], max_size=0.5)
-    assert ['half of record_max_size = 0.5 MB' in text for text in warnings] == [True]
+    assert ['half of record_max_size (0.5 MB)' in text for text in warnings] == [True]
     found = Recording.load(only_file(tmp_path))
     assert found.metadata['trouble'] == warnings[0]
     assert found.metadata['outcome']['name'] == 'SUCCESSFUL'

@@ -10,6 +10,7 @@ import json
 from math import isnan, nan
 import re
 import sys
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -279,6 +280,22 @@ def test_without_the_library_one_sentence_says_what_to_install(
     assert [path.name for path in tmp_path.iterdir()] == ['made']
 
 
+def test_a_library_that_is_installed_but_broken_is_not_called_missing(
+    recording, tmp_path, monkeypatch, capsys
+):
+    pytest.importorskip('mcap_ros2')
+    monkeypatch.delitem(sys.modules, 'mcap_ros2.writer', raising=False)
+    monkeypatch.setitem(sys.modules, 'mcap_ros2._dynamic', broken := ModuleType('broken'))
+    monkeypatch.setattr(broken, '__getattr__', _needs_another, raising=False)
+    text = refused(capsys, recording, '-o', tmp_path / 'a.mcap')
+    assert "No module named 'lz4'" in text
+    assert 'not installed' not in text
+
+
+def _needs_another(name):
+    raise ModuleNotFoundError("No module named 'lz4'", name='lz4')
+
+
 def test_a_message_that_is_not_installed_is_named(recording, tmp_path, monkeypatch, capsys):
     pytest.importorskip('mcap_ros2')
     monkeypatch.setattr(message_definitions, 'installed_share', lambda package: None)
@@ -290,7 +307,7 @@ def test_a_message_that_is_not_installed_is_named(recording, tmp_path, monkeypat
     ('members', 'part'),
     [
         ({'metadata': np.array('{}')}, "'created'"),
-        ({'time': np.full(50, nan)}, 'a time is no finite number'),
+        ({'time': np.full(50, nan)}, 'a time is not finite'),
         ({'actual_q': np.zeros((50, 3))}, 'actual_q has rows of'),
         ({'slider': np.full(50, 'a')}, 'slider has rows of'),
         ({'planned_pose': np.zeros((3, 7))}, 'planned_time has|planned_pose has'),

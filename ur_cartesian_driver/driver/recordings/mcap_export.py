@@ -3,8 +3,8 @@
 """
 A recording as MCAP with messages of ROS 2, for Foxglove, PlotJuggler, rosbag2 and others.
 
-Topics that the node publishes too have the same names and types here, so one layout fits both.
-The time of a message is the date and time at which the recording began plus its packet's time.
+Topics keep the names and types that the node uses, so one layout fits both. A message's time is
+the start of the recording plus the time of its packet or event.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.goal.known_frames import BASE, TCP
 
 #: Name of the node, and prefix of its topics.
 NODE = '/ur_cartesian_driver'
-#: Prefix of the topics of single numbers, which no node publishes.
+#: Prefix of single-number topics, which exist only in recordings.
 NUMBERS = f'{NODE}/recording'
 _NUMBER_COLUMNS = (
     'speed_scaling',
@@ -60,10 +60,12 @@ def write_mcap(recording: Recording, file: BinaryIO, options: ExportOptions) -> 
     """
     try:
         from mcap_ros2.writer import Writer
-    except ImportError:
+    except ModuleNotFoundError as error:
+        if (error.name or '').partition('.')[0] not in ('mcap', 'mcap_ros2'):
+            raise  # these are installed, but one of their own packages is not
         raise ImportError(
-            'MCAP needs mcap and mcap-ros2-support, which are not installed; install them by pip '
-            "install mcap-ros2-support, or the extra 'export' of this package"
+            'MCAP needs mcap and mcap-ros2-support, which are not installed; run "pip install '
+            "mcap-ros2-support\", or install this package with its extra 'export'"
         ) from None
     messages = _Messages(recording, options.tf_prefix)
     schemas: dict[str, Any] = {}
@@ -109,7 +111,7 @@ class _Messages:
 
     def _nanoseconds(self, seconds: Floats) -> list[int]:
         if not np.isfinite(seconds).all():
-            raise ValueError('the recording is damaged: a time is no finite number')
+            raise ValueError('the recording is damaged: a time is not finite')
         found: list[int] = (self._start + np.rint(1e9 * seconds).astype(np.int64)).tolist()
         return found
 
@@ -141,7 +143,7 @@ class _Messages:
             )
 
     def numbers(self) -> Iterator[_Record]:
-        """Yield the columns of single numbers, without repetitions of the same number."""
+        """Yield the columns of single numbers, without runs of the same number."""
         found = self._recording
         deviation = found.deviation()
         columns: dict[str, NDArray[Any]] = {

@@ -38,7 +38,7 @@ def recording_name(metadata: dict[str, Any]) -> str:
 
 
 class RecordingFolder:
-    """Writes the recording of one motion; after a failure, nothing more is written."""
+    """Writes the recording of one motion; after a failure, :meth:`run_guarded` does nothing."""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class RecordingFolder:
         self._directory, self._metadata = directory, metadata
         self._max_size, self._warn = max_size, warn
         self._is_broken = False
-        #: The planned times of the samples that were written last [s].
+        #: Times of the samples that the last :meth:`write_plan` has written [s].
         self._last_times: Floats = np.empty(0)
         #: How many rows were lost because the disk was too slow.
         self.lost_rows = 0
@@ -80,8 +80,8 @@ class RecordingFolder:
             return
         if (self._rows.count + 1) * disk.EXECUTED_STRUCT.size > self._max_size / 2.0:
             self._metadata['trouble'] = (
-                f'The recording of this motion ends after {self._rows.count} packets, half of '
-                f'record_max_size = {self._max_size / 1e6:g} MB.'
+                f'The recording of this motion stops after {self._rows.count} packets: it has '
+                f'used half of record_max_size ({self._max_size / 1e6:g} MB).'
             )
             self._warn(self._metadata['trouble'])
             return
@@ -89,9 +89,9 @@ class RecordingFolder:
 
     def write_plan(self, rows: NDArray[np.void], since: float) -> None:
         """
-        Append samples of the planned path, which replace all samples after a time [s].
+        Append samples of the planned path, in place of all samples after ``since`` [s].
 
-        Only samples of the previous call can be replaced, such as a dropped ending (keep_open).
+        Only samples of the previous call can be replaced, such as the ending of an open goal.
         """
         kept_samples = int(np.searchsorted(self._last_times, since + SAME_TIME, side='right'))
         rows = rows[np.searchsorted(rows['time'], since + SAME_TIME, side='right') :]
@@ -111,7 +111,7 @@ class RecordingFolder:
 
     def finish(self, yield_cpu: Callable[[], None]) -> None:
         """
-        Make one file of the folder, and remove the oldest recordings.
+        Turn the folder into one file, then remove the oldest recordings beyond the quota.
 
         :param yield_cpu: called often, so that other threads can run.
         """
@@ -132,7 +132,7 @@ class RecordingFolder:
         except (OSError, ValueError) as error:
             self._is_broken = True
             self._close_files()
-            reason = error.strerror if isinstance(error, OSError) else error
+            reason = getattr(error, 'strerror', None) or error
             self._warn(
                 f'The recording of a motion failed: {reason} ({self._directory}); check '
                 'record_directory.'
@@ -159,7 +159,7 @@ def _new(path: Path) -> Path:
     raise FileExistsError(f'there are too many recordings named {path.stem} already')
 
 
-# ---- files that exist ------------------------------------------------------------------
+# ---- existing recordings ------------------------------------------------------------------
 
 
 def enforce_quota(
