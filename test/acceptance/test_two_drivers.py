@@ -19,7 +19,7 @@ def test_a_second_driver_is_refused_and_the_first_goes_on(driver, make_driver, h
     motion = driver.start(driver.plan(Goal(waypoints=(Waypoint(pose=home(y=0.1), time=2.0),))))
     second = make_driver()
     wait_for(lambda: second.status.state is ConnectionState.CONNECTED)
-    wait_for(lambda: 'maybe that of another driver' in second.status.message)
+    wait_for(lambda: "possibly another driver's" in second.status.message)
     second.resend_robot_program()
     answer = second.recover()
     assert not answer.ok

@@ -171,7 +171,7 @@ def _needed_to_start(headless_mode: bool, foreign_program: bool) -> str:
             else 'play a program whose External Control node calls this computer'
         )
         return (
-            'Another program runs on the robot, maybe that of another driver. Let it end, or '
+            "Another program runs on the robot, possibly another driver's. Let it end, or "
             f'stop it; then {remedy}.'
         )
     if headless_mode:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Start, stop and command the robot program, over a connection that can do so now."""
+"""Start, stop and command the robot program."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class ProgramControl:
     """
     Commands to the robot program and to the controller that runs it.
 
-    A connected program reads the reverse socket. If the program is paused, stuck or gone, commands
-    go to the primary interface, which accepts whole programs and a few commands.
+    A connected program reads the reverse socket. The primary interface takes whole programs and a
+    few commands, also while the program is paused, stuck or gone.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class ProgramControl:
             warn=warn,
             power_up=lambda: self.send_primary(
                 primary.PrimaryCommand.RUN,
-                lambda: (robot := self._robot()) is not None and not is_stopped(robot),
+                lambda: (state := self._robot()) is not None and not is_stopped(state),
             ),
         )
 
@@ -75,45 +75,51 @@ class ProgramControl:
         self, action: TrajectoryAction, count: int, *, takes_offsets: bool = False
     ) -> None:
         """Send a trajectory action to the robot program."""
-        self._sockets.send_control(action, count, takes_offsets=takes_offsets)
         if action is TrajectoryAction.CANCEL:
-            self._event_log.note('the driver sent CANCEL')
+            self._note('sent CANCEL')
+        self._sockets.send_control(action, count, takes_offsets=takes_offsets)
 
     def set_feed(self, fraction: float, rate: float) -> None:
-        """Have the robot program, until the goal ends, go to a feed at a rate [1/s]."""
+        """Ramp the feed to ``fraction`` at ``rate`` [1/s]; it applies until the goal ends."""
         self._sockets.set_feed(reverse.FeedTarget(fraction, rate))
 
     def send_servo(self, on: bool) -> None:
         """Make the robot program enter the buffered servo, or leave it and brake."""
+        self._note('entered the servo' if on else 'left the servo')
         self._sockets.send_servo(on)
-        self._event_log.note('the driver entered the servo' if on else 'the driver left the servo')
+
+    def _note(self, done: str) -> None:
+        """Note a message to the robot program, if a program is connected that gets it."""
+        if self._sockets.connected:
+            self._event_log.note(f'the driver {done}')
 
     def send_primary(self, command: primary.PrimaryCommand, is_wanted: Callable[[], bool]) -> bool:
         """
         Send a command to the primary interface; return False if there is no connection.
 
-        :param is_wanted: returns whether to send the command again if the connection was
-            read-only.
+        :param is_wanted: asked before the command is sent again, because the first connection was
+            read-only: returns whether the command is still wanted.
         """
         return self._primary.send(primary.encode_command(command), is_wanted)
 
     def send_script(self, data: bytes, is_wanted: Callable[[], bool]) -> bool:
-        """Send a user's script, as :meth:`send_primary` sends commands."""
-        self._event_log.note('the driver sent a script of others')
-        return self._primary.send(data, is_wanted)
+        """Send a user's script; parameter and result are as in :meth:`send_primary`."""
+        is_sent = self._primary.send(data, is_wanted)
+        self._event_log.note(f'the driver {"sent" if is_sent else "could not send"} a user script')
+        return is_sent
 
     # ---- the program as a whole ---------------------------------------------------------------
 
     def upload(self) -> None:
         """Upload the robot program; it may replace our running program, but no foreign one."""
         if refusal := self.upload_refusal():
-            self._warn(f'the robot program is not sent: {refusal}')
+            self._warn(f'the robot program was not sent: {refusal}')
         elif not self._primary.send(
             primary.encode_program(wrap_in_program(self._sockets.text)),
             lambda: not self.upload_refusal(),
         ):
             self._warn(
-                'the robot program is not sent: there is no connection to the primary '
+                'the robot program was not sent: there is no connection to the primary '
                 'interface of the robot'
             )
         else:
@@ -127,15 +133,15 @@ class ProgramControl:
             return 'a goal is running; cancel it first'
         if self.tracker.foreign_program_runs(self._robot()):
             return (
-                'another program runs on the robot, maybe that of another driver; let it end, '
-                'or stop it'
+                "another program runs on the robot, possibly another driver's; let it end, or "
+                'stop it'
             )
         return '' if self._sockets.text else HAS_OLDER_PROGRAM
 
     def stop(self, reason: str) -> None:
         """End the robot program, so that its motion cannot resume."""
         self._warn(f'the robot program is stopped: {reason}')
-        self._event_log.note('the driver ended the robot program')
+        self._note('ended the robot program')
         self.tracker.is_ending = self._sockets.connected
         self.send_primary(primary.PrimaryCommand.STOP_PROGRAM, self._runs_our_program)
         self._sockets.send_stop()
