@@ -81,19 +81,21 @@ def test_a_program_is_downloaded_unchanged(name):
 @pytest.mark.parametrize(
     ('call', 'status', 'remedy'),
     [
-        (UploadProgramCall(program=PROGRAM), 400, 'Replace that one instead'),
+        (UploadProgramCall(program=PROGRAM), 400, 'has a program of this name, replace it'),
+        (UploadProgramCall(program=PROGRAM, replaces=True), 400, 'log of the robot'),
         (UploadProgramCall(program=PROGRAM), 403, 'switch it to remote control'),
         (UploadProgramCall(program=PROGRAM), 422, 'the content of a .urpx file'),
         (UploadProgramCall(program=PROGRAM, replaces=True), 404, 'Ask for the list'),
         (UploadProgramCall(program=PROGRAM, replaces=True), 409, 'load another one first'),
         (DownloadProgramCall(program_name='weld'), 404, 'Ask for the list'),
+        (ListProgramsCall(), 404, 'log of the robot'),
         (ListProgramsCall(), 500, 'log of the robot'),
     ],
 )
 def test_a_refusal_has_the_words_of_the_robot_and_a_remedy(call, status, remedy):
     answer, _ = carry_out(call, status, {'message': 'No.', 'details': 'Because.'})
     assert not answer.ok
-    assert answer.text.startswith(f'The robot refuses this and says: HTTP {status} No: Because. ')
+    assert answer.text.startswith(f'The robot refused: HTTP {status} No: Because. ')
     assert remedy in answer.text
 
 
@@ -101,8 +103,15 @@ def test_a_refusal_has_the_words_of_the_robot_and_a_remedy(call, status, remedy)
 def test_other_software_is_not_asked(version):
     answer, robot = carry_out(ListProgramsCall(), version=version)
     assert not answer.ok
-    assert f'from software 10.12 on, but the robot runs {version[0]}.{version[1]}' in answer.text
+    assert (
+        f'PolyScope X 10.12 or newer, but the robot runs {version[0]}.{version[1]}' in answer.text
+    )
     assert not robot.requests
+
+
+def test_a_downloaded_program_that_is_no_text_is_refused():
+    answer, _ = carry_out(DownloadProgramCall(program_name='weld'), answer=b'{"a": "\xff"}')
+    assert (answer.ok, 'damaged' in answer.text) == (False, True)
 
 
 def test_a_program_that_is_too_long_is_refused_in_both_directions(monkeypatch):

@@ -3,8 +3,8 @@
 """
 The programs of a robot with PolyScope X: list, upload, update, download.
 
-A call contains a program as text, the content of a `.urpx` file, and never names a file: whoever
-may call a service may not read or write the files of this computer.
+A call contains a program as text, the content of a `.urpx` file, and never a path, so that callers
+of the service gain no access to the files of this computer.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from ur_cartesian_driver.robot.services.service_calls import (
     UploadProgramCall,
 )
 
-#: What to do about a refusal, by its status.
+_LIST = 'Ask for the list of its programs.'
+_LOG = 'Look at the log of the robot.'
+#: What to do about the refusal of any call, by its status.
 REMEDIES: Mapping[int, str] = {
-    400: 'Does it have a program of this name? Replace that one instead.',
     403: 'It is in local control: switch it to remote control on the pendant.',
-    404: 'Ask for the list of its programs.',
     409: 'The program is loaded: load another one first.',
     422: 'Is this the content of a .urpx file?',
 }
@@ -64,9 +64,10 @@ class ProgramFiles:
         if version is None:
             return failed(self._link.status.message)
         if (version.major, version.minor) < LIST_PROGRAMS.since:
+            since = '.'.join(map(str, LIST_PROGRAMS.since))
             return failed(
-                'Programs are sent and listed by the Robot API of PolyScope X, from software '
-                f'10.12 on, but the robot runs {version}; use the pendant.'
+                f'This needs the Robot API of PolyScope X {since} or newer, but the robot runs '
+                f'{version}; use the pendant.'
             )
         api = RobotApiConnection(self._host, self._port, version)
         match call:
@@ -81,12 +82,23 @@ class ProgramFiles:
                 status, body = await api.get(DOWNLOAD_PROGRAM, name)
         if not 200 <= status < 300:
             said = refusal_text(status, body)
-            remedy = REMEDIES.get(status, 'Look at the log of the robot.')
-            return failed(f'The robot refuses this and says: {said.rstrip(".")}. {remedy}')
+            return failed(f'The robot refused: {said.rstrip(".")}. {_remedy(call, status)}')
         match call:
             case ListProgramsCall():
                 return succeeded('\n'.join(parse_program_names(body)))
             case UploadProgramCall():
                 return succeeded(parse_program_name(body))
             case DownloadProgramCall():
-                return succeeded(body.decode(errors='replace'))
+                try:
+                    return succeeded(body.decode())
+                except UnicodeDecodeError:
+                    return failed('The program that the robot sent is damaged: it is not text.')
+
+
+def _remedy(call: ListProgramsCall | UploadProgramCall | DownloadProgramCall, status: int) -> str:
+    match call, status:
+        case UploadProgramCall(replaces=False), 400:
+            return 'If the robot already has a program of this name, replace it.'
+        case ((UploadProgramCall(replaces=True) | DownloadProgramCall()), 404):
+            return _LIST
+    return REMEDIES.get(status, _LOG)
