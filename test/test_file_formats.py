@@ -124,7 +124,7 @@ def test_the_command_reads_a_format_of_others(folder, arguments):
     status, goal, said = command(folder, 'import', *arguments)
     assert status == 0
     assert positions(goal) == [[0.1, 0.2, 0.3], [0.4, 0.2, 0.3]]
-    assert said.endswith('2 points to standard output\n')
+    assert said.endswith('wrote 2 points to standard output\n')
 
 
 @pytest.mark.slow

@@ -189,6 +189,6 @@ def test_a_calibration_far_from_the_model_is_warned_of(make_driver, bound, warns
     warned = [
         record
         for record in caplog.records
-        if 'up to 20.0 mm from where the model ur5e' in record.getMessage()
+        if 'up to 20.0 mm from the nominal ur5e' in record.getMessage()
     ]
     assert bool(warned) is warns

@@ -517,16 +517,19 @@ def test_a_frame_that_changes_is_refused(tmp_path):
         (lambda text: text.replace('x: 0.2', 'x:'), "line 29: x is '', but must be a finite"),
         (lambda text: text.replace('x: 0.2', "x: '0.2'"), "line 29: x is '0.2', but must be"),
         (lambda text: text.replace('x: 0.2', 'y: 0.2'), "line 30: the field 'y' stands twice."),
-        (lambda text: text.replace('x: 0.2', 'x: *x'), 'line 29: a reference (*) is no part'),
+        (lambda text: text.replace('x: 0.2', 'x: *x'), 'line 29: a message has no references (*)'),
         (
             lambda text: text.replace('x: 0.2', 'x: &a 0.2\n      k: *a'),
-            'line 30: a reference (*)',
+            'line 30: a message has no references (*)',
         ),
         (
             lambda text: text.replace('  position:\n', '  position:\n\t'),
-            'line 14: it begins with a',
+            'line 14: the line is indented with a tab',
         ),
-        (lambda text: text.replace('x: 0.2', 'x: \x07'), "line 29: the character '\\x07' is none"),
+        (
+            lambda text: text.replace('x: 0.2', 'x: \x07'),
+            "line 29: the character '\\x07' is not allowed",
+        ),
         (
             lambda text: text.replace('x: 0.2', 'x: [1]'),
             'line 29: x is none, but must be a finite',
@@ -534,7 +537,7 @@ def test_a_frame_that_changes_is_refused(tmp_path):
         (lambda text: text[: text.index('orientation')], 'line 13: the field orientation is'),
         (
             lambda text: text[: text.index('orientation') + 5],
-            'line 17: this is no message as ros2',
+            'line 17: the text is not output of ros2',
         ),
         (
             lambda text: text.replace(' sec: 2', ' sec: two'),
@@ -554,7 +557,8 @@ def test_a_frame_that_changes_is_refused(tmp_path):
             lambda text: 'header: 5\nposes: []\n',
             'line 1: a mapping of stamp, frame_id is missing.',
         ),
-        (lambda text: '\n\n5\n', 'line 3: this is no message: it has no fields.'),
+        (lambda text: '\n\n5\n', 'line 3: the text is not a message: it has no fields.'),
+        (lambda text: 'a: 1\n--- {b: 2}\n', 'line 1: two messages follow each other'),
         (lambda text: '---\n---\n', 'the file is empty; ros2 topic echo prints messages into it.'),
     ],
 )
@@ -646,8 +650,8 @@ def is_number(text):
     ('text', 'line', 'part'),
     [
         ('', 0, 'the file is empty'),
-        ('- 1\n', 1, 'no message'),
-        ('a: [1\nb: 2\n', 2, 'as ros2 topic echo prints it, or is cut off'),
+        ('- 1\n', 1, 'not a message'),
+        ('a: [1\nb: 2\n', 2, 'not output of ros2 topic echo, or is cut off'),
         ('a: 1\n', 1, 'neither a Path'),
         (PATH.replace('x: 0.2', 'x: far'), 29, "'far'"),
         (PATH.replace('      z: 0.0\n    or', '    or', 1), 14, 'field z is missing'),

@@ -29,7 +29,7 @@ MANY_POINTS = 200
 
 
 def import_goal(arguments: argparse.Namespace) -> int:
-    """Write the goal of a file, and print what was left out of the file."""
+    """Convert a file to a goal, and print the remarks."""
     try:
         with timed('importing'):
             imported = import_file(arguments.file, options_of(arguments), arguments.format)
@@ -45,7 +45,7 @@ def import_goal(arguments: argparse.Namespace) -> int:
         print(remark.text(), file=sys.stderr)
     count = len(goal.waypoints)
     target = arguments.output or 'standard output'
-    print(f'{count} point{"s" * (count != 1)} to {target}', file=sys.stderr)
+    print(f'wrote {count} point{"s" * (count != 1)} to {target}', file=sys.stderr)
     return 0
 
 

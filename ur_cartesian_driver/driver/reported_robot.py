@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The robot as its loop reports it to the owner: status, arm, signals, temporary TCP."""
+"""The newest status, arm, signals and temporary TCP, as the robot loop reports them."""
 
 from __future__ import annotations
 
@@ -38,7 +38,9 @@ from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
 class ReportedRobot:
     """
-    The newest reports of a robot loop; the driver's reader thread writes them, all threads read.
+    The newest reports of a robot loop.
+
+    The driver's reader thread writes them, or the thread that closes the driver; all threads read.
 
     :raises ValueError: ``ur_type`` is unknown.
     """
@@ -96,26 +98,26 @@ class ReportedRobot:
             run_callback(listener, status)
 
     def _update_limits(self, limits: JointLimits) -> None:
-        """From now on, plan within those reported limits that are tighter than the model's."""
+        """Tighten the joint limits for planning to those that the robot reports."""
         model = robot_model(self._config.ur_type).limited_to(limits)
         self.arm = Arm(model, self.arm.geometry)
         for k in sorted(model.reported_ranges):
-            LOG.info('%s turns within %s', JOINT_NAMES[k], model.range_text(k))
+            LOG.info('range of %s: %s', JOINT_NAMES[k], model.range_text(k))
         for k in sorted(model.reported_speeds):
             speed, source = model.max_joint_speed[k], model.speed_source(k)
-            LOG.info('%s turns at up to %.3f rad/s%s', JOINT_NAMES[k], speed, source)
+            LOG.info('maximum speed of %s: %.3f rad/s%s', JOINT_NAMES[k], speed, source)
 
     def _update_geometry(self, geometry: DhTable) -> None:
-        """From now on, plan with the calibrated arm; warn if it differs much from the nominal."""
+        """Plan with the calibrated arm from now on; warn if it is far from the nominal one."""
         model = self.arm.model
         self.arm = Arm(model, geometry)
         deviation = self.arm.max_flange_distance(Arm(model))
         limit = self._config.max_calibration_difference
         if 0.0 < limit < deviation:
             LOG.warning(
-                'the calibration of the robot moves the flange by up to %.1f mm from where the '
-                'model %s has it; max_calibration_difference is %.1f mm: check ur_type, and '
-                'whether the arm was repaired and calibrated again',
+                "the robot's calibration displaces the flange by up to %.1f mm from the nominal "
+                '%s; max_calibration_difference is %.1f mm. Check ur_type, and whether the arm '
+                'was repaired or calibrated again.',
                 1e3 * deviation,
                 model.name,
                 1e3 * limit,
@@ -123,20 +125,13 @@ class ReportedRobot:
 
     def _warn_of_unchecked_cell(self) -> None:
         """Warn once about the parts of the cell that no check covers."""
-        unknown = [
-            text
-            for text, is_unknown in (
-                (
-                    'workspace_planes is empty, so no table, wall or ceiling is checked',
-                    not self._options.workspace_planes,
-                ),
-                (
-                    'tool_radius is 0, so the tool is not checked',
-                    self._options.tool_radius == 0.0,
-                ),
-            )
-            if is_unknown
-        ]
-        if unknown and not self._has_warned_of_cell:
-            LOG.warning('%s; goals may lead the arm into what is there', ', and '.join(unknown))
+        if self._has_warned_of_cell:
+            return
         self._has_warned_of_cell = True
+        unchecked = []
+        if not self._options.workspace_planes:
+            unchecked.append('workspace_planes is empty, so no table, wall or ceiling is checked')
+        if self._options.tool_radius == 0.0:
+            unchecked.append('tool_radius is 0, so the tool is not checked')
+        if unchecked:
+            LOG.warning('%s: goals may cause collisions', ', and '.join(unchecked))

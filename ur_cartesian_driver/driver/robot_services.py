@@ -37,10 +37,11 @@ from ur_cartesian_driver.robot.services.service_calls import (
 
 class RobotServices(ABC):
     """
-    Service calls; each method waits for the answer: at most 40 s, for a recovery 120 s.
+    Service calls to the robot.
 
-    For a script, its ``timeout`` is added to the 40 s; :meth:`watch_contact` returns at once. A
-    refusal is an answer too. A value that cannot be sent raises
+    Methods wait for the answer: at most 40 s, :meth:`recover` 120 s, :meth:`run_script` 40 s more
+    than its ``timeout``. :meth:`call` and :meth:`watch_contact` return a future at once. A refusal
+    is an answer, too. A value that cannot be sent raises
     :class:`~ur_cartesian_driver.motion.errors.LocalProtocolError`.
     """
 
@@ -64,8 +65,8 @@ class RobotServices(ABC):
         """
         Send a program to the robot, and return its name there; PolyScope X only.
 
-        :param program: the content of a ``.urpx`` file, which also names the program.
-        :param replaces: the program takes the place of one that the robot has.
+        :param program: the content of a ``.urpx`` file; the program's name is inside it.
+        :param replaces: whether to replace the robot's program of that name.
         """
         return self.call(UploadProgramCall(program=program, replaces=replaces)).result()
 
@@ -90,7 +91,7 @@ class RobotServices(ABC):
 
         :param inertia: xx, yy, zz, xy, xz, yz about that point, along the axes of the flange
             [kg m^2]; empty = a point mass.
-        :param transition_time: how long the controller takes to go over to this load [s].
+        :param transition_time: time over which the controller changes to this load [s].
         """
         call = SetPayloadCall(
             mass=mass, cog=cog, inertia=tuple(inertia), transition_time=transition_time
@@ -102,21 +103,21 @@ class RobotServices(ABC):
         return self.call(SetGravityCall(gravity=gravity)).result()
 
     def zero_ftsensor(self) -> ServiceAnswer:
-        """Zero the force-torque sensor at the force and torque that it measures now."""
+        """Zero the force-torque sensor at its present reading."""
         return self.call(ZeroFtSensorCall()).result()
 
     def watch_contact(self) -> Future[ServiceAnswer]:
         """
-        Stop every motion, also one that is started later, where the tool touches.
+        Stop the current or any later motion as soon as the tool touches something.
 
-        The arm goes back to where the tool did not touch yet; then the answer comes. A motion that
-        ran ends with ``EXECUTION_FAILED``, unless it was to end at contact itself. The watch also
-        ends, without success, by :meth:`end_contact_watch` and with the robot program.
+        The arm then retracts until the tool is free, and the answer comes. The motion ends with
+        ``EXECUTION_FAILED``, unless its own goal was to end at contact. The watch fails if
+        :meth:`end_contact_watch` is called or the robot program ends.
         """
         return self.call(WatchContactCall())
 
     def end_contact_watch(self) -> ServiceAnswer:
-        """End the watch for contact, which is answered then; nothing happens without one."""
+        """End the contact watch, whose call then gets its answer; do nothing if there is none."""
         return self.call(EndContactWatchCall()).result()
 
     def hand_back_control(self) -> ServiceAnswer:
@@ -125,7 +126,7 @@ class RobotServices(ABC):
 
     def run_script(self, script: str, timeout: float = SCRIPT_TIMEOUT) -> ServiceAnswer:
         """
-        Run a script on the robot, outside all checks of the driver; see ``allow_scripts``.
+        Run a script without any of the driver's checks; needs ``allow_scripts``.
 
         :param script: a secondary program (``sec``), or in headless mode a primary one (``def``),
             after which the driver's own program is sent again.

@@ -115,7 +115,7 @@ class GoalMachine:
         self._text = ''
         self._touched = False
         self._has_moved = False
-        self._is_decided = False
+        self._has_entered_restoring = False
 
     @property
     def job(self) -> MotionJob:
@@ -205,7 +205,7 @@ class GoalMachine:
 
     def _append(self, append_job: AppendJob, now: float) -> list[GoalCommand]:
         commands = self.can.appending.append(append_job, self.state)
-        if self.state is GoalState.MOVING:  # whether points run out is checked at the next packet
+        if self.state is GoalState.MOVING:  # the next packet shows whether points run out
             return commands
         return commands + self._apply_supply(now)
 
@@ -263,14 +263,14 @@ class GoalMachine:
         return GoalSignal.STALE, explain_age(age, self._max_state_age).rstrip('.')
 
     def _check_outputs(self) -> Meaning | None:
-        """Return the signal if a pause changed outputs that may not be restored, else None."""
+        """Return the signal if a pause changed outputs that must not be restored, else None."""
         fault = self._guard.fault()
         if not fault or self.state not in INTERRUPTIBLE_STATES:
             return None
         return GoalSignal.DEVIATION, fault
 
     def _check_packet(self, packet: RobotState, now: float) -> Meaning:
-        """Return the signal of a packet in the present state; the packet reports no stop."""
+        """Return the signal of a packet that reports no stop."""
         if self.state in RUNNING_STATES:
             fault = self._monitor.find_fault(
                 packet, may_stand_still=self.can.streaming.is_read(now)
@@ -359,8 +359,8 @@ class GoalMachine:
                 self._touched = signal is GoalSignal.CONTACT
         if self.state is before:
             return []
-        # Leaving the motion's mode while the safe outputs are armed makes the program set them.
-        # After a success it must not, so they are disarmed first.
+        # If the feeder left its mode while the safe outputs are armed, the program would set them.
+        # After a success they are disarmed first, and the feeder leaves its mode in ENDED.
         disarms_first = self.state is GoalState.RESTORING and self._succeeds() and self._guard
         commands = [] if disarms_first else self.feeder.enter(self.state, self._packet)
         return commands + self._enter(self.state, signal, now)
@@ -421,7 +421,7 @@ class GoalMachine:
 
     def _enter_restoring(self, now: float) -> list[GoalCommand]:
         """Restore the TCP and release the outputs; a goal that set neither ends at once."""
-        self._is_decided = True
+        self._has_entered_restoring = True
         if self.temporary_tcp is None and not self._guard:
             return self._apply(GoalSignal.RESTORED, '', now)
         self._deadline = now + timeouts.SAFE_OUTPUTS_TIMEOUT
@@ -434,15 +434,15 @@ class GoalMachine:
 
     def _secure_unconfirmed(self) -> list[GoalCommand]:
         """Write the safe outputs of a failed goal, unless the program has confirmed them."""
-        if self._succeeds() or (self._is_decided and self._guard.is_safe(self._packet)):
+        if self._succeeds() or (self._has_entered_restoring and self._guard.is_safe(self._packet)):
             return []
         # On entering RESTORING, the machine has already released the outputs.
-        release = [] if self._is_decided else self._guard.release(succeeded=False)
+        release = [] if self._has_entered_restoring else self._guard.release(succeeded=False)
         return [*release, *self._guard.secure()]
 
     def _end(self, signal: GoalSignal) -> list[GoalCommand]:
         # Once RESTORING was entered, no motion is left that could go on.
-        if signal in STOP_PROGRAM_AFTER and not self._is_decided:
+        if signal in STOP_PROGRAM_AFTER and not self._has_entered_restoring:
             return [StopProgram(reason=self._text), *self._finish()]
         return self._finish()
 

@@ -4,8 +4,8 @@
 Messages as ``ros2 topic echo`` and ``rostopic echo`` print them.
 
 Such a text is YAML with a document for each message, and consists of mappings, lists, numbers and
-texts only. In this module each of these values keeps its line. PyYAML is used only to split the
-text, because the wording of its errors and its limits on nesting differ between versions.
+texts only. Every parsed value carries its line number. Only PyYAML's event parser is used: the
+texts of its other errors and its limits on nesting differ between versions.
 """
 
 from __future__ import annotations
@@ -27,13 +27,15 @@ _END_OF_MESSAGE = re.compile(r'^---[ \t]*$', re.MULTILINE)
 _BLANK_LINES = re.compile(r'(?:[ \t]*\n)*')
 #: The notice of a lost message; the hyphens at its end are not on a line of their own.
 _LOST = re.compile(r'^A message was lost!!!\n\ttotal count change:.*\n\ttotal count:.*---$', re.M)
-#: Characters that end lines only in YAML 1.1: they would shift the numbers of lines.
+#: Only YAML 1.1 treats these as ends of lines, which would shift the line numbers.
 _NO_LINE_ENDS = str.maketrans('\x85\u2028\u2029', '   ')
-_NO_TEXT = re.compile('[^\t\n\x20-\x7e\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]')
+_FORBIDDEN = re.compile(
+    '[^\t\n\x20-\x7e\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]'
+)
 
 
 class MessagePart:
-    """A mapping with its fields as attributes, and its line."""
+    """A mapping whose fields are attributes; ``line`` is its line number."""
 
     def __init__(self, line: int) -> None:
         """Begin without fields."""
@@ -82,7 +84,7 @@ class EchoedMessage:
     #: The number of the message's first line, from 1.
     line: int
     text: str
-    #: Whether a line of three hyphens ends the message, so that it is not cut off.
+    #: Whether a line ``---`` follows; if not, the message may be cut off.
     is_whole: bool
 
     def read(self) -> MessagePart:
@@ -91,9 +93,9 @@ class EchoedMessage:
 
         :raises BrokenFile: the text is no message, or is cut off.
         """
-        if strange := _NO_TEXT.search(self.text):
+        if strange := _FORBIDDEN.search(self.text):
             line = self.line + self.text.count('\n', 0, strange.start())
-            raise BrokenFile(line, f'the character {strange[0]!r} is none of a message')
+            raise BrokenFile(line, f'the character {strange[0]!r} is not allowed in a message')
         try:
             events = iter(yaml.parse(self.text, Loader=_Loader))
             values = [
@@ -104,18 +106,23 @@ class EchoedMessage:
         except yaml.YAMLError as error:
             mark = getattr(error, 'problem_mark', None)
             raise self._no_message(mark.line if mark else 0) from None
-        if len(values) != 1 or not isinstance(values[0], MessagePart):
-            raise BrokenFile(self.line, 'this is no message: it has no fields')
+        if len(values) > 1:
+            raise BrokenFile(
+                self.line, 'two messages follow each other without a line "---" between them'
+            )
+        if not values or not isinstance(values[0], MessagePart):
+            raise BrokenFile(self.line, 'the text is not a message: it has no fields')
         return values[0]
 
     def _no_message(self, row: int) -> BrokenFile:
-        """Return the error for a text that is no YAML, at the row of PyYAML's error."""
+        """Return the error for invalid YAML; ``row`` is where PyYAML failed."""
         lines = self.text.split('\n')
         row = min(row, len(lines) - 1)
         if '\t' in lines[row][: len(lines[row]) - len(lines[row].lstrip())]:
-            return BrokenFile(self.line + row, 'it begins with a tab; write blanks')
-        end = '' if self.is_whole or any(map(str.strip, lines[row + 1 :])) else ', or is cut off'
-        return BrokenFile(self.line + row, f'this is no message as ros2 topic echo prints it{end}')
+            return BrokenFile(self.line + row, 'the line is indented with a tab; use blanks')
+        is_last_line = not any(map(str.strip, lines[row + 1 :]))
+        end = ', or is cut off' if is_last_line and not self.is_whole else ''
+        return BrokenFile(self.line + row, f'the text is not output of ros2 topic echo{end}')
 
 
 def echoed_messages(text: str, remarks: ImportNotes) -> list[EchoedMessage]:
@@ -142,7 +149,7 @@ def _value(event: Any, events: Iterator[Any], first: int, depth: int) -> Any:
     """
     Return the value that begins with an event of PyYAML.
 
-    :param first: the line of the file that is PyYAML's line 0.
+    :param first: the line of the file at which the text of PyYAML begins.
     :raises BrokenFile: the value is a reference or is nested too deeply, or a field in it has no
         name or occurs twice.
     """
@@ -159,7 +166,7 @@ def _value(event: Any, events: Iterator[Any], first: int, depth: int) -> Any:
             items.append(_value(item, events, first, depth + 1))
         return items
     if not isinstance(event, yaml.MappingStartEvent):
-        raise BrokenFile(line, 'a reference (*) is no part of a message')
+        raise BrokenFile(line, 'a message has no references (*)')
     part = MessagePart(line)
     for key in events:
         if isinstance(key, yaml.MappingEndEvent):

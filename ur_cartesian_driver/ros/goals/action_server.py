@@ -60,8 +60,9 @@ class GoalServer:
             settings=settings,
             show=PlanMarkerPublisher(node, settings.frames.base).publish,
         )
-        # Guards ``_closing``, and ``_runs``: the runs of the goals that have not ended.
+        # Guards ``_closing`` and ``_runs``.
         self._lock = threading.Lock()
+        #: The goals that have not ended, by their ids.
         self._runs: dict[bytes, GoalRun] = {}
         self._closing = False
         self._servers: dict[str, Any] = {
@@ -74,7 +75,7 @@ class GoalServer:
             action.action_type,
             action.name,
             partial(self._begin, action),
-            # A group of its own, to serve goals and cancel requests while other callbacks run.
+            # A group of its own: with more threads, goals are served while other callbacks run.
             callback_group=MutuallyExclusiveCallbackGroup(),
             cancel_callback=self._cancel,
             result_timeout=RESULT_TIMEOUT,
@@ -90,7 +91,7 @@ class GoalServer:
 
     @property
     def frames(self) -> Frames:
-        """The frames that goals can name, in tf2 too."""
+        """The frames that goals can name, including those of tf2."""
         return self._context.frames
 
     @property
@@ -101,19 +102,19 @@ class GoalServer:
 
     @property
     def running_motion(self) -> MotionHandle | None:
-        """The motion of the goal that moves the arm; None = no goal does."""
+        """The running motion; None if no goal moves the arm."""
         with self._lock:
             runs = list(self._runs.values())
         motions = (run.motion(timeout=0.0) for run in runs)
         return next((motion for motion in motions if motion and not motion.done()), None)
 
-    def find_run(self, key: bytes) -> GoalRun | None:
-        """Return the run of a goal by the bytes of the goal's id; None if the goal has ended."""
+    def find_run(self, goal_id: bytes) -> GoalRun | None:
+        """Return the run of a goal; None if the goal has ended."""
         with self._lock:
-            return self._runs.get(key)
+            return self._runs.get(goal_id)
 
     def stop(self) -> None:
-        """Stop the arm, and abort all goals, also those that arrive later; return at once."""
+        """Stop the arm, and abort all goals, present and future; does not block."""
         with self._lock:
             self._closing = True
             runs = list(self._runs.values())
@@ -141,16 +142,12 @@ class GoalServer:
             is_over_limit = len(self._runs) >= MAX_GOALS
             if not is_over_limit:
                 self._runs[run.key] = run
+                run.thread.start()  # under the lock, because close() joins all threads it finds
             if self._closing:
                 run.abort()
-        if not is_over_limit:
-            run.thread.start()
-            return
-        text = (
-            f'{MAX_GOALS} goals are being planned, wait or run; send this one again when some of '
-            'them have ended.'
-        )
-        self._finish(run, Outcome(code=ErrorCode.ROBOT_NOT_READY, text=text))
+        if is_over_limit:
+            text = f'{MAX_GOALS} goals have not ended yet; send this one again when some have.'
+            self._finish(run, Outcome(code=ErrorCode.ROBOT_NOT_READY, text=text))
 
     def _cancel(self, handle: GoalHandle) -> CancelResponse:
         """Cancel a goal that has not ended; called by the executor."""
@@ -160,7 +157,7 @@ class GoalServer:
         return CancelResponse.ACCEPT
 
     def _finish(self, run: GoalRun, outcome: Outcome) -> None:
-        """Release the arm and hand the outcome to the executor; called in the run's thread."""
+        """Release the arm and hand the outcome to the executor; from any thread."""
         self.arbiter.release(run.arm_request)
         server = self._servers[run.action.name]
         server.finish(run.handle, lambda _: self._end(run, outcome))

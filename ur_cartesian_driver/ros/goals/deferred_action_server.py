@@ -32,14 +32,13 @@ class DeferredActionServer(ActionServer):
         Take a request without garbage collection.
 
         A large goal creates hundreds of thousands of objects, none of which is garbage. The
-        collector would visit them again and again, for 40 % of the time, while no other thread
-        can run.
+        collector would scan them repeatedly, for 40 % of the time, while no other thread can run.
         """
         with uncollected():
             return super().take_data()  # type: ignore[no-untyped-call]  # rclpy's
 
     def notify_execute(self, goal_handle: GoalHandle, execute_callback: Any) -> None:
-        """Start a goal, whose state is EXECUTING already."""
+        """Start a goal; rclpy has already set its state to EXECUTING."""
         (execute_callback or self._execute_callback)(goal_handle)
 
     def finish(self, goal_handle: GoalHandle, callback: Callable[[GoalHandle], Any]) -> None:
@@ -49,7 +48,7 @@ class DeferredActionServer(ActionServer):
             return
         # An executor that has been shut down has no guard condition any more, or an invalid one.
         with contextlib.suppress(AttributeError, InvalidHandle):
-            # Not a coroutine, because Python would warn if no executor runs it any more.
+            # A plain function: Python warns about a coroutine that is never awaited.
             executor.create_task(self._hand_over, goal_handle, callback)
 
     def _hand_over(self, goal_handle: GoalHandle, callback: Callable[[GoalHandle], Any]) -> None:

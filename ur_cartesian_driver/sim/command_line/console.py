@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Runs a shell command: signals end it like Ctrl-C, and an error is printed as one line."""
+"""Runs a command-line tool: signals end it like Ctrl-C, and an error is printed as one line."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ def run_command(
 ) -> int:
     """Run a command and return its exit status; 0 means that it succeeded."""
     logging.basicConfig(level=logging.WARNING, format='%(levelname)s: %(message)s')
-    # Background processes of a shell ignore SIGINT, and processes of nohup ignore SIGHUP. Only
-    # SIGHUP stays ignored here.
+    # Shells start background processes with SIGINT ignored; undo that. SIGHUP and SIGTERM stay
+    # ignored if they are, as under nohup.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     ended_by = signal.SIGINT
 
     def end(number: int, frame: FrameType | None) -> None:
-        """Do what Ctrl-C does here: asyncio.run() cancels its task, so no callback is lost."""
+        """Do what Ctrl-C does here: within asyncio.run(), cancel the main task."""
         nonlocal ended_by
         ended_by = signal.Signals(number)
         interrupt = signal.getsignal(signal.SIGINT)

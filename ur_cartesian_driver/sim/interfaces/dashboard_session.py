@@ -37,8 +37,8 @@ _RUNTIME_WORDS = {
     RuntimeState.PAUSING: 'PAUSED',
     RuntimeState.PAUSED: 'PAUSED',
 }
-#: Commands that control the arm, its power or its programs. They are refused in local control,
-#: and always to a client that connected in local control.
+#: Commands that control the arm, its power or its programs. They are refused in local control, and
+#: to a client that connected in local control until it reconnects.
 _REMOTE_ONLY = frozenset(
     {
         'load',
@@ -77,7 +77,7 @@ class DashboardHandlers:
         self.pendant = controller.pendant
         config = controller.config
         self.version = '.'.join(map(str, config.version))
-        #: The model without the letter of its generation, as the robot writes it.
+        #: The model as the robot reports it: upper case, without the e of the e-Series.
         self.robot_model = config.model.upper().removesuffix('E')
         self.serial_number = config.serial_number
 
@@ -85,7 +85,7 @@ class DashboardHandlers:
 
     @property
     def loaded(self) -> str:
-        """The name of the loaded program; at the start, this is an empty, unnamed program."""
+        """The name of the loaded program; '<unnamed>' until one is loaded."""
         return self.programs.loaded or '<unnamed>'
 
     @property
@@ -111,7 +111,7 @@ class DashboardHandlers:
         refusal = self.controller.load_program(name)
         if not refusal or refusal.startswith('File not found'):
             return refusal or None
-        # The reply of a real robot has no reason; its pendant shows it.
+        # A real robot's reply gives no reason; only its pendant does.
         self.controller.messages.note(f'Program {name} was not loaded: {refusal}.')
         _log.warning('Program %s was not loaded: %s.', name, refusal)
         return f'Error while loading program: {name}'
@@ -132,7 +132,7 @@ class DashboardHandlers:
         return None
 
     def restart_safety(self, _: str) -> None:
-        """Leave a fault or violation, if there is one; afterwards, the arm is without power."""
+        """Clear a fault or violation, and leave the arm without power."""
         if self.controller.safety_event(SafetyEvent.RESTART):
             self.controller.power_off()
 
@@ -182,7 +182,7 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
         'close popup': Controller.close_popups,
     }
 )
-#: Command with another effect -> its handler; all remaining commands only reply.
+#: Handlers of commands that need more than a call of the controller; all others only reply.
 _HANDLERS: Mapping[str, Callable[[DashboardHandlers, str], str | None]] = MappingProxyType(
     {
         'load': DashboardHandlers.load,
@@ -196,7 +196,7 @@ _HANDLERS: Mapping[str, Callable[[DashboardHandlers, str], str | None]] = Mappin
         'clear operational mode': DashboardHandlers.clear_operational_mode,
     }
 )
-#: Command -> value in its reply, by default the argument; {0} = the handlers, {1} = the argument.
+#: Format of the value in a reply, by default {1}; {0} = the handlers, {1} = the argument.
 _VALUES: Mapping[str, str] = MappingProxyType(
     {
         'running': '{0.running}',
@@ -211,7 +211,7 @@ _VALUES: Mapping[str, str] = MappingProxyType(
         'getUserRole': '{0.pendant.user_role}',
         'set operational mode': '"{1}" is set',
         'get operational mode': '{0.pendant.operational_mode}',
-        # The words of URSim, with a full stop.
+        # URSim's words, including the full stop.
         'clear operational mode': "Current operational mode: 'NONE'.",
         'is in remote control': '{0.remote_control}',
         'get serial number': '{0.serial_number}',
@@ -227,7 +227,7 @@ class DashboardSession(ClientSession):
     """Answers the commands that the software of this robot has."""
 
     def __init__(self, controller: Controller) -> None:
-        """Wait for commands."""
+        """Begin with the right to control that the client has on connecting."""
         self._controller = controller
         self._may_control = controller.takes_scripts
         self._handlers = DashboardHandlers(controller)
