@@ -264,6 +264,17 @@ def test_the_oldest_recordings_make_room_and_other_files_stay(tmp_path):
     assert {file.stem for file in tmp_path.iterdir()} == {*names[1:], 'kept for the report'}
 
 
+def test_a_folder_that_cannot_be_finished_makes_room_too(tmp_path):
+    damaged = tmp_path / '20260101-120000-000_spline_5_points.part'
+    damaged.mkdir()
+    (damaged / 'executed.npy').write_bytes(bytes(1000))
+    (tmp_path / '20260102-120000-000_spline_5_points.npz').write_bytes(bytes(1000))
+    enforce_quota(tmp_path, 2000.0)
+    assert damaged.exists()
+    enforce_quota(tmp_path, 1500.0)
+    assert only_file(tmp_path).suffix == '.npz'
+
+
 # ---- killed in the middle -----------------------------------------------------------------------
 
 KILLED = """

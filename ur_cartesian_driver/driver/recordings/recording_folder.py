@@ -15,6 +15,7 @@ import fcntl
 import json
 from pathlib import Path
 import re
+import shutil
 from typing import Any
 
 import numpy as np
@@ -168,23 +169,40 @@ def enforce_quota(
     """
     Finish the folders of killed processes, then remove the oldest recordings.
 
+    Folders that cannot be finished count as recordings, too.
+
     :param max_size: largest size of all recordings together [bytes].
     :param yield_cpu: called often, so that other threads can run.
     """
-    recordings = sorted(
-        path for path in directory.iterdir() if _RECORDING_NAME.fullmatch(path.name)
-    )
-    for path in recordings:
-        if path.suffix == disk.PART_SUFFIX and not _is_written(path):
+    for path in _unused_recordings(directory):
+        if path.suffix == disk.PART_SUFFIX:
             with suppress(OSError, ValueError):
                 disk.finish(path, yield_cpu)
-    recordings = [
-        path for path in sorted(directory.glob('*.npz')) if _RECORDING_NAME.fullmatch(path.name)
-    ]
-    sizes = [path.stat().st_size for path in recordings]
-    while recordings and sum(sizes) > max_size:
-        recordings.pop(0).unlink(missing_ok=True)
-        sizes.pop(0)
+    sizes = {path: _size(path) for path in _unused_recordings(directory)}
+    excess = sum(sizes.values()) - max_size
+    for path, size in sizes.items():
+        if excess <= 0.0:
+            break
+        excess -= size
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def _unused_recordings(directory: Path) -> list[Path]:
+    """Return the recordings that no process writes, the oldest first."""
+    return sorted(
+        path
+        for path in directory.iterdir()
+        if _RECORDING_NAME.fullmatch(path.name)
+        and not (path.suffix == disk.PART_SUFFIX and _is_written(path))
+    )
+
+
+def _size(recording: Path) -> int:
+    files = recording.iterdir() if recording.is_dir() else [recording]
+    return sum(file.stat().st_size for file in files)
 
 
 def _is_written(folder: Path) -> bool:
