@@ -12,6 +12,7 @@ from waiting import wait_for
 
 from ur_cartesian_driver.driver import DriverConfig, loop_connection
 from ur_cartesian_driver.driver.ipc import channel
+from ur_cartesian_driver.driver.loop import loop_host
 from ur_cartesian_driver.driver.loop_connection import LoopConnection
 from ur_cartesian_driver.driver.motion_handle import ActiveMotion
 from ur_cartesian_driver.driver.running_motions import RunningMotions
@@ -49,17 +50,8 @@ class Host:
         self.pipe.close()
 
 
-def test_a_loop_that_cannot_be_restarted_is_tried_again(monkeypatch, caplog):
-    hosts = [Host(), None, None, Host()]
-    left = list(hosts)
-
-    def start(_):
-        if (host := left.pop(0)) is None:
-            raise OSError(errno.EAGAIN, 'Resource temporarily unavailable')
-        return host
-
-    monkeypatch.setattr(loop_connection.host, 'start', start)
-    monkeypatch.setattr(loop_connection, 'RESTART_PAUSE', 0.01)
+def connected() -> LoopConnection:
+    """Return an open connection."""
     config = DriverConfig()
     connection = LoopConnection(
         config,
@@ -69,6 +61,52 @@ def test_a_loop_that_cannot_be_restarted_is_tried_again(monkeypatch, caplog):
         reconfigure=lambda: channel.Configure(config=config, may_upload=False),
     )
     connection.open()
+    return connection
+
+
+def close(connection: LoopConnection, host: Host) -> None:
+    """Close a connection, as the robot loop of a host does."""
+    closing = threading.Thread(target=connection.close)
+    closing.start()
+    assert channel.receive(host.loop_end) == channel.Shutdown()
+    host.loop_end.close()
+    closing.join(5.0)
+    assert not connection.is_open
+
+
+def test_a_loop_that_stops_reading_gets_no_message_after_a_part_of_one(monkeypatch):
+    hosts = [Host(), Host()]
+    first, second = hosts
+    monkeypatch.setattr(loop_host, 'start', lambda _: hosts.pop(0))
+    monkeypatch.setattr(loop_connection, 'RESTART_PAUSE', 0.01)
+    connection = connected()
+    assert isinstance(channel.receive(first.loop_end), channel.Configure)
+    first.pipe.settimeout(0.1)
+    connection.send_packed([bytes(10_000_000)])
+    connection.send(channel.OwnerHeartbeat())
+    assert isinstance(channel.receive(second.loop_end), channel.Configure)
+    first.loop_end.settimeout(5.0)
+    got = 0
+    while part := first.loop_end.recv(1 << 20):
+        got += len(part)
+        assert not part.strip(b'\0'), 'another message'
+    assert 0 < got < 10_000_000
+    first.loop_end.close()
+    close(connection, second)
+
+
+def test_a_loop_that_cannot_be_restarted_is_tried_again(monkeypatch, caplog):
+    hosts = [Host(), None, None, Host()]
+    left = list(hosts)
+
+    def start(_):
+        if (host := left.pop(0)) is None:
+            raise OSError(errno.EAGAIN, 'Resource temporarily unavailable')
+        return host
+
+    monkeypatch.setattr(loop_host, 'start', start)
+    monkeypatch.setattr(loop_connection, 'RESTART_PAUSE', 0.01)
+    connection = connected()
     hosts[0].loop_end.close()
     wait_for(lambda: not left)
     hosts[3].loop_end.settimeout(5.0)
@@ -77,9 +115,4 @@ def test_a_loop_that_cannot_be_restarted_is_tried_again(monkeypatch, caplog):
     assert not configured.may_upload
     tried = [r for r in caplog.records if 'cannot be restarted' in r.getMessage()]
     assert len(tried) == 2
-    closing = threading.Thread(target=connection.close)
-    closing.start()
-    assert channel.receive(hosts[3].loop_end) == channel.Shutdown()
-    hosts[3].loop_end.close()
-    closing.join(5.0)
-    assert not connection.is_open
+    close(connection, hosts[3])

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 import contextlib
+import socket
 import threading
 
 from ur_cartesian_driver.driver.callbacks import LOG
@@ -105,10 +106,16 @@ class LoopConnection:
 
     def send_packed(self, parts: Sequence[channel.Buffer]) -> None:
         """Send a packed request."""
-        with self.lock, contextlib.suppress(OSError):
-            if self.host is not None:
+        with self.lock:
+            if self.host is None:
+                return
+            try:
                 for part in parts:
                     self.host.pipe.sendall(part)
+            except OSError:
+                # No other message may follow a part of this one: the reader starts another loop.
+                with contextlib.suppress(OSError):
+                    self.host.pipe.shutdown(socket.SHUT_RDWR)
 
     def _start_thread(self, name: str, target: Callable[[], None]) -> None:
         thread = threading.Thread(target=target, name=name, daemon=True)
