@@ -7,7 +7,8 @@ A new mode needs a member of :class:`ExecutionMode` (its number is a constant ``
 the action), a row of traits in :data:`EXECUTION_MODES`, a row in ``PLANNERS`` of
 ``planning/planner.py``, a row in ``FEEDERS`` of ``driver/loop/goal_machine_factory.py``, and a
 module for each new planner or feeder. Planners and feeders belong to higher layers, and so do
-their tables; a test compares the keys of all three tables.
+their tables; a test compares the keys of all three tables. ``planning/request/goal_fields.py``
+chooses a mode for AUTO.
 """
 
 from __future__ import annotations

@@ -5,7 +5,8 @@ Wire dialects: the messages of robot programs of different ages, one row for eac
 
 A program that was saved on a pendant keeps the messages of the library version it came with, and
 nothing on the sockets reveals this version. So the dialect is a setting. A message has the same
-number of words and the same size in all dialects. All differences are defined here:
+number of words and the same size in all dialects; :mod:`~.point_fields` has the layout of today's
+words. All differences are defined here:
 
 =======  =============  ==========  ===================  =====================  =======
 dialect  library        time scale  motion types         words 6 - 17 of moves  streams

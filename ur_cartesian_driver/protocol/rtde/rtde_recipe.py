@@ -1,6 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""RTDE recipes: the fields that client and controller agreed on, and the bytes of their values."""
+"""
+RTDE recipes: the fields that client and controller agreed on, and the bytes of their values.
+
+:mod:`~ur_cartesian_driver.motion.state.rtde_state` has the outputs for which the driver asks.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The base class of all groups of script functions, and the mark of those without an effect."""
+"""
+The base class of all groups of script functions, and the mark of those without an effect.
+
+The package :mod:`~ur_cartesian_driver.sim.builtins` says how to add a function.
+"""
 
 from __future__ import annotations
 
