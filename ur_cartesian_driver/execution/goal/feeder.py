@@ -272,6 +272,11 @@ class Capabilities:
         self.reporting = all_of(Reporting)
 
 
+def counted(count: int, noun: str) -> str:
+    """Return a count with its noun and verb, for a report: "1 path offset was"."""
+    return f'1 {noun} was' if count == 1 else f'{count} {noun}s were'
+
+
 def how_often(count: int) -> str:
     """Return a count of 1 or more in words, for a report."""
     return 'once' if count == 1 else f'{count} times'

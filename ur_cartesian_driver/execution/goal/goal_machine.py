@@ -469,7 +469,9 @@ class GoalMachine:
         progress = self._monitor.progress(
             buffered=self.feeder.buffered,
             lag=self.can.streaming.lag,
-            at_end=waits or self.state is GoalState.SETTLING,
+            at_end=waits
+            or self.state is GoalState.SETTLING
+            or (self._succeeds() and not self._touched),
             waits=waits,
         )
         return [ReportProgress(progress=progress)]

@@ -324,19 +324,21 @@ class GoalMonitor:
 
     def start_offset(self, state: RobotState) -> str | None:
         """Return a clause if the arm is away from the start of the plan, else None."""
-        return _offset_clause(self._start, state.actual_tcp_pose)
+        return _offset_clause(self._start, state.actual_tcp_pose, 'the start of the plan')
 
     def rest_offset(self, state: RobotState) -> str | None:
         """Return a clause if the target is away from the place where the arm waits, else None."""
-        return _offset_clause(self._tracker.pose(), state.target_tcp_pose)
+        return _offset_clause(self._tracker.pose(), state.target_tcp_pose, 'where it waits')
 
     def missed_end(self, state: RobotState) -> str:
         """Return a clause if the controller's target is not at the end, else ''."""
         deviation = self._tracker.deviation(self._stiff(state.target_tcp_pose))
-        for value, limit in zip(deviation, self._max_plan_deviation, strict=True):
+        for unit, value, limit in zip(
+            ('m', 'rad'), deviation, self._max_plan_deviation, strict=True
+        ):
             if 0.0 < limit < value:
                 return (
-                    f'the robot program reports the end {value:.4f} m or rad away from the last '
+                    f'the robot program reports the end {value:.4f} {unit} away from the last '
                     f'point: it skipped motions that it does not know; {REMEDY}'
                 )
         return ''
@@ -451,11 +453,8 @@ class GoalMonitor:
         return behind if behind.distance_to(pose) < planned.distance_to(pose) else planned
 
 
-def _offset_clause(start: Pose, pose: Pose) -> str | None:
-    distance, angle = start.distance_to(pose), start.angle_to(pose)
+def _offset_clause(planned: Pose, pose: Pose, place: str) -> str | None:
+    distance, angle = planned.distance_to(pose), planned.angle_to(pose)
     if distance <= START_POSITION_TOLERANCE and angle <= START_ANGLE_TOLERANCE:
         return None
-    return (
-        f'the arm is {distance:.4f} m and {angle:.4f} rad away from the start of the plan: '
-        'it moved meanwhile'
-    )
+    return f'the arm is {distance:.4f} m and {angle:.4f} rad away from {place}: it moved meanwhile'

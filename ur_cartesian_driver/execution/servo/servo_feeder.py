@@ -110,8 +110,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         if self.stream.phase is not ServoPhase.READY:
             return (
                 'the robot program did not answer through its registers within '
-                f'{ARMING_TIMEOUT:g} s: it is paused, or knows no buffered servo; '
-                'nothing was moved'
+                f'{ARMING_TIMEOUT:g} s: it is paused, or knows no buffered servo'
             )
         # If the arm was moved after planning, the servo would pull it back to the start.
         error = 0.0 if packet is None else self._joint_distance(packet, 0)
