@@ -163,7 +163,7 @@ class MotionRunner:
         self._outputs.forget()
         self._ends.begin()
         self._link.set_executing(True)
-        self._execute(commands)
+        self._guarded(lambda: commands)
         if self._link.contact_watch.is_active:
             self.handle_event(ContactWatchChanged(is_active=True))
 
@@ -246,16 +246,22 @@ class MotionRunner:
         self._newest.publish()
 
     def _step(self, machine: GoalMachine, event: Event | AppendJob) -> None:
-        """Give an event to the machine; if the machine raises an error, stop the arm."""
+        """Give an event to the machine, and carry out its commands."""
+        self._guarded(lambda: machine.step(event, _now()))
+
+    def _guarded(self, make_commands: Callable[[], list[GoalCommand]]) -> None:
+        """Make and carry out commands; if that raises an error, stop the arm."""
         try:
-            self._execute(machine.step(event, _now()))
+            self._execute(make_commands())
         except Exception as error:
             if self._machine is None:
                 raise
-            text = f'The motion cannot go on ({type(error).__name__}: {error}).'
+            reason = f'{type(error).__name__}: {error}'.rstrip('.')
+            text = f'The motion cannot go on ({reason}).'
             self._pipe.log(logging.ERROR, f'{text} {traceback.format_exc()}')
-            self._finish(Outcome(code=ErrorCode.EXECUTION_FAILED, text=text))
+            # First: once no motion runs, the next goal could be given to the program.
             self._link.control.stop(text)
+            self._finish(Outcome(code=ErrorCode.EXECUTION_FAILED, text=text))
 
     def _execute(self, commands: list[GoalCommand]) -> None:
         for command in commands:
