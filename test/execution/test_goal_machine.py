@@ -795,7 +795,7 @@ def test_a_contact_ends_a_goal_that_has_not_moved_yet():
     assert machine.step(with_tcp(OWN), 0.02) == []
     end = outcome(machine.step(with_tcp(OWN), SET_TIMEOUT))
     assert end.code is ErrorCode.EXECUTION_FAILED
-    assert end.text.startswith('The tool touched, ')
+    assert end.text.startswith('The tool touched something ')
     assert end.text.endswith('(before anything moved).')
 
 

@@ -256,7 +256,9 @@ class Capabilities:
             return tuple(each for each in (feeder, *feeder.parts) if isinstance(each, kind))
 
         def one_of(kind: type[T]) -> T:
-            return (*all_of(kind), kind())[0]
+            found, *others = *all_of(kind), kind()
+            assert len(others) <= 1, f'{kind.__name__} has two providers'
+            return found
 
         self.preparation = one_of(Prepared)
         self.appending = one_of(Appendable)

@@ -24,9 +24,9 @@ state, and the error code if the signal decides the outcome of the goal.
   inside the goal tolerance, within the goal's time tolerance. If the controller's target is not
   at the last point, the program skipped motions (DEVIATION).
 * A goal that ends when the tool touches (CONTACT) succeeds without SETTLING: the program has
-  moved the arm back to the place of contact. A goal that such a contact ends for the sake of a
-  watch beside it (TOUCHED) fails, also at rest between or after its trajectories. It is cancelled,
-  too: the program may have read START just after the contact, and then runs the trajectory.
+  moved the arm back to the place of contact. If a watch beside the goal ends it at contact
+  (TOUCHED), the goal fails, even at rest between or after its trajectories. It is cancelled, too:
+  the program may have read START just after the contact, and then runs the trajectory.
 * **CANCELLING**: CANCEL has been sent. The program brakes, discards the points that it has not
   run and answers CANCELED. A SUCCESS in this state means that the last point was reached before
   the program read CANCEL; this is not the answer to CANCEL: CANCELED still follows.

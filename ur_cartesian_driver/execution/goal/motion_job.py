@@ -246,7 +246,7 @@ def job_from_plan(
 
 
 def _holds(standing: Mapping[int, Stop], end_times: Floats) -> Iterator[Hold]:
-    """Yield a hold for each row of consecutive stops."""
+    """Yield a hold for each run of consecutive stops."""
     for row in standing:
         if row - 1 in standing:
             continue

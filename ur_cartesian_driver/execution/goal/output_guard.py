@@ -3,8 +3,8 @@
 """
 The outputs of a goal that have to be safe whenever its motion does not go on as planned.
 
-The robot program gets the safe values before the motion; the thread of the program that stops the
-arm also sets the outputs. A program that is paused or gone runs no thread: then the driver writes
+The robot program gets the safe values before the motion; whichever of its threads stops the arm
+also sets the outputs. A program that is paused or gone runs no thread: then the driver writes
 the values to the robot. An order is regarded as carried out only once it is confirmed: the robot
 program confirms it by a token, the driver by the list of outputs that its write has changed.
 """

@@ -4,8 +4,8 @@
 The signal that overrides the feed of a goal: the newest value, its age, and a report.
 
 The signal may come at any time, jump, stop or be nonsense. A valid value, 0 to 1, is cut to the
-bounds of the goal. An invalid or stale value becomes the lower bound, because nobody knows what
-the process would bear. Who runs the motion changes its feed at the rate of the goal.
+bounds of the goal. Without a valid value the lower bound applies, because nobody knows what the
+process would bear. Whichever side runs the motion changes the feed at the goal's rate.
 """
 
 from __future__ import annotations

@@ -71,7 +71,7 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
     def target(self, time: float) -> Vector3:
         """Return the offset to which the tool should move, at a time of the motion [s]."""
         if not self._band.opens(time):
-            if self._is_stale:  # behind a turn of the path it would point another way
+            if self._is_stale:  # after a turn of the path, it would point another way
                 self._newest = ZERO3
             return ZERO3
         return ZERO3 if self._is_stale and self._fades else self._newest

@@ -14,8 +14,8 @@ from ur_cartesian_driver.execution.offsets.feed_requests import FeedRequests
 from ur_cartesian_driver.motion.goal.goal import FeedOverride
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
-#: Smaller changes are sent only to an end of the range: else the noise of an analog input would be
-#: a message to the robot program in each packet, and CANCEL would wait behind them.
+#: Smaller changes are sent only if they reach an end of the range; otherwise the noise of an
+#: analog input would cost a message per packet, and CANCEL would wait behind them.
 MIN_CHANGE = 0.005
 
 

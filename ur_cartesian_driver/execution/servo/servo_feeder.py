@@ -9,7 +9,7 @@ goal (:mod:`~ur_cartesian_driver.execution.goal.goal_transitions`) then mean:
 * in ARMING the inputs of the robot are claimed, the divergence thresholds are written and the
   robot program has to answer. If the inputs belong to another client, or the program does not
   answer, the goal ends before anything moves;
-* MOVING begins with a full buffer and ends when the robot has carried out the last set-point;
+* MOVING first fills the buffer, and ends when the robot has carried out the last set-point;
 * SETTLING holds that set-point until the arm is there and at rest;
 * in CANCELLING the mode IDLE is written instead of a CANCEL; the program answers by leaving the
   servo.
@@ -229,7 +229,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         return begun, begun - self._pieces_begun(time - self._max_servo_lag)
 
     def _behind(self, begun: int) -> int:
-        """Return how many motions the controller's target may lag behind that one [count]."""
+        """Return by how many motions the controller's target may lag behind ``begun``."""
         records = self.monitor.records
         begin = records.end_time(records.begun_records(begun) - 1)
         first = records.count_until(begin - self._max_servo_lag)
