@@ -23,6 +23,7 @@ from ur_cartesian_driver.robot.check.experiments import Experiment, EXPERIMENTS
 from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, skipped, Verdict
 from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 from ur_cartesian_driver.robot.check.observations import observe
+from ur_cartesian_driver.sim.command_line.simulator_options import fields_from
 
 #: Exit status: nothing answers at the address; something keeps the driver from working.
 UNREACHABLE, HAS_PROBLEMS = 3, 1
@@ -36,13 +37,7 @@ def check_robot(arguments: argparse.Namespace) -> int:
     """Check a robot, write the report, and return the exit status."""
     if arguments.with_motion and not sys.stdin.isatty():
         raise ValueError('--with-motion asks before each motion, so it needs a terminal.')
-    address = RobotAddress(
-        host=arguments.robot_ip,
-        rtde_port=arguments.rtde_port,
-        primary_port=arguments.primary_port,
-        dashboard_port=arguments.dashboard_port,
-        robot_api_port=arguments.robot_api_port,
-    )
+    address = RobotAddress(host=arguments.robot_ip, **fields_from(arguments, RobotAddress))
     findings = asyncio.run(_observe(address, arguments.seconds))
     recordings: dict[str, MotionSamples] = {}
     if arguments.with_motion:
