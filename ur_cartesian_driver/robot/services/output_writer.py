@@ -17,6 +17,7 @@ from math import isclose
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.events import OutputsSecured
 from ur_cartesian_driver.motion.goal.goal import SafeOutput
+from ur_cartesian_driver.motion.goal.output_names import output_name
 from ur_cartesian_driver.robot.services.rtde_input_writer import (
     joint_write,
     value_before,
@@ -59,7 +60,7 @@ async def _write(host: str, port: int, outputs: list[SafeOutput]) -> tuple[list[
     except TimeoutError:
         done = False
     if not done:
-        names = ' and '.join(f'{_name(output)} output {output.pin}' for output in outputs)
+        names = ' and '.join(output_name(output.output, output.pin) for output in outputs)
         verb = 'is as it was' if len(outputs) == 1 else 'are as they were'
         return [], f'The {names} {verb}, or not known to be safe: {reason}.'
     before = [value_before(call, values) for call in calls]
@@ -68,7 +69,3 @@ async def _write(host: str, port: int, outputs: list[SafeOutput]) -> tuple[list[
         for output, call, old in zip(outputs, calls, before, strict=True)
         if old.domain is not call.domain or not isclose(old.value, call.value, abs_tol=0.02)
     ], ''
-
-
-def _name(output: SafeOutput) -> str:
-    return output.output.name.lower().replace('_', ' ')

@@ -18,16 +18,9 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector3
 from ur_cartesian_driver.motion.goal.declared_types import declare_types, WrongType
 from ur_cartesian_driver.motion.goal.goal import OutputKind
 from ur_cartesian_driver.motion.goal.inertia import inertia_problem, MAX_TRANSITION_TIME
+from ur_cartesian_driver.motion.goal.output_names import OUTPUTS
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol.dashboard import DashboardRequest
-
-#: Number of outputs of each kind.
-PINS = {
-    OutputKind.STANDARD_DIGITAL: 8,
-    OutputKind.CONFIGURABLE_DIGITAL: 8,
-    OutputKind.TOOL_DIGITAL: 2,
-    OutputKind.STANDARD_ANALOG: 2,
-}
 
 #: How long a script may take: by default [s]; at most [s].
 SCRIPT_TIMEOUT, MAX_SCRIPT_TIMEOUT = 30.0, 600.0
@@ -234,11 +227,12 @@ class SetOutputCall:
     def __post_init__(self) -> None:
         """Check pin and value."""
         _declare_types(self)
-        if self.kind not in PINS:
+        if self.kind not in OUTPUTS:
             raise LocalProtocolError(f'kind is {self.kind}, which is no OutputKind.')
-        if not 0 <= self.pin < PINS[self.kind]:
+        _, pins = OUTPUTS[self.kind]
+        if not 0 <= self.pin < pins:
             raise LocalProtocolError(
-                f'pin is {self.pin}, but {self.kind.name} has the pins 0 to {PINS[self.kind] - 1}.'
+                f'pin is {self.pin}, but {self.kind.name} has the pins 0 to {pins - 1}.'
             )
         if self.is_analog and not 0.0 <= self.value <= 1.0:
             raise LocalProtocolError(

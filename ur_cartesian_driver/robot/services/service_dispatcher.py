@@ -13,7 +13,7 @@ contact lasts until it is ended.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from math import dist, isnan
 
 from ur_cartesian_driver.motion.errors import DriverError
@@ -163,8 +163,12 @@ class ServiceDispatcher:
                 return await self._dashboard.request_raw(call)
             case ListProgramsCall() | UploadProgramCall() | DownloadProgramCall():
                 return await self._program_files.carry_out(call)
-            case SetTcpCall() | SetPayloadCall() | SetGravityCall():
-                return await self._set(call)
+            case SetTcpCall():
+                return await self._set(self._set_tcp(call))
+            case SetPayloadCall():
+                return await self._set(self._set_payload(call))
+            case SetGravityCall():
+                return await self._set(self._set_gravity(call))
             case ZeroFtSensorCall():
                 return self._zero_ftsensor()
             case SetOutputCall():
@@ -277,17 +281,11 @@ class ServiceDispatcher:
         x, y, z = link.robot.actual_tcp_pose.position
         return succeeded(f'The tool touched at x {x:.4f}, y {y:.4f}, z {z:.4f} m in base.')
 
-    async def _set(self, call: SettingCall) -> ServiceAnswer:
-        """Set TCP, payload or gravity; no goal starts meanwhile."""
+    async def _set(self, setting: Awaitable[ServiceAnswer]) -> ServiceAnswer:
+        """Carry out a change of TCP, payload or gravity; no goal starts meanwhile."""
         self._pending_settings += 1
         try:
-            match call:
-                case SetTcpCall():
-                    return await self._set_tcp(call)
-                case SetPayloadCall():
-                    return await self._set_payload(call)
-                case SetGravityCall():
-                    return await self._set_gravity(call)
+            return await setting
         finally:
             self._pending_settings -= 1
 
