@@ -20,7 +20,13 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.robot.check.experiment_runner import motion_refusal, run_experiment
 from ur_cartesian_driver.robot.check.experiments import Experiment, EXPERIMENTS
-from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, skipped, Verdict
+from ur_cartesian_driver.robot.check.finding import (
+    Finding,
+    problem,
+    RobotAddress,
+    skipped,
+    Verdict,
+)
 from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 from ur_cartesian_driver.robot.check.observations import observe
 from ur_cartesian_driver.sim.command_line.simulator_options import fields_from
@@ -110,8 +116,7 @@ def _experiment(
             return [skipped(experiment.check, f'No motion: {refusal}')]
         samples = asyncio.run(run_experiment(address, experiment))
     except (OSError, DriverError) as error:
-        text = f'Not finished: {str(error).rstrip(".")}.'
-        return [Finding(check=experiment.check, verdict=Verdict.PROBLEM, text=text)]
+        return [problem(experiment.check, f'Not finished: {error}')]
     recordings[experiment.check] = samples
     return [analyse(samples) for analyse in experiment.analyses]
 
