@@ -18,6 +18,7 @@ from typing import Any
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.events import OutputsSecured
 from ur_cartesian_driver.motion.goal.goal import SafeOutput
+from ur_cartesian_driver.motion.goal.output_names import output_name
 from ur_cartesian_driver.robot.services.rtde_input_writer import (
     joint_write,
     value_before,
@@ -70,7 +71,7 @@ async def _write(
     except TimeoutError:
         done = False
     if not done:
-        names = ' and '.join(f'{_name(output)} output {output.pin}' for output in outputs)
+        names = ' and '.join(output_name(output.output, output.pin) for output in outputs)
         verb = 'is as it was' if len(outputs) == 1 else 'are as they were'
         return [], f'The {names} {verb}, or not known to be safe: {reason}.'
     old_calls = [value_before(call, before) for call in calls]
@@ -79,7 +80,3 @@ async def _write(
         for output, call, old in zip(outputs, calls, old_calls, strict=True)
         if old.domain is not call.domain or not isclose(old.value, call.value, abs_tol=0.02)
     ], ''
-
-
-def _name(output: SafeOutput) -> str:
-    return output.output.name.lower().replace('_', ' ')
