@@ -14,6 +14,7 @@ Read faults from text, for the command line and the markers of tests.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from math import isfinite
 import re
 from typing import Any, TypeAlias
 
@@ -90,6 +91,8 @@ class _WordReader:
             value = float(self.peek())
         except ValueError:
             raise self.wrong(meaning) from None
+        if not isfinite(value):
+            raise self.wrong(f'a finite number: {meaning}')
         self.take()
         return value
 
