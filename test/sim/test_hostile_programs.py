@@ -108,3 +108,17 @@ def test_a_host_that_is_none_is_refused_when_the_robot_starts():
     with pytest.raises((OSError, UnicodeError)):
         SimulatedRobot(SimulatorConfig(**{**FREE, 'host': 'a..b'})).start()
     assert time.monotonic() - begun < 30.0
+
+
+def test_a_list_is_no_item_of_a_matrix(bench):
+    log = bench.run('m = [[1, 2], [3, 4]]\nm[0, 0] = [5, 6]\ntextmsg("shared")')
+    assert 'a list holds lists only as the rows of a matrix' in log[-1]
+
+
+def test_a_secondary_program_shows_a_window_and_reports_its_exception(bench):
+    bench.programs.submit('sec a():\n  popup("hello", blocking=True)\nend\n')
+    bench.step(2)
+    assert [popup.text for popup in bench.controller.popups] == ['hello']
+    bench.programs.submit('sec b():\n  x = sqrt(-1)\nend\n')
+    bench.step(2)
+    assert any('Secondary program: Runtime error (2:7)' in line for line in bench.log)

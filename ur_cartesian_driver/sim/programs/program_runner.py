@@ -423,3 +423,4 @@ class ProgramRunner:
             error = error or RuntimeException('Runtime is too much behind')
         if error is not None:
             self._messages.key('SECONDARY_PROGRAM_EXCEPTION_XXX', str(error))
+            self._messages.note(f'Secondary program: {error}')
