@@ -28,7 +28,7 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = {
     'set unlock protective stop': Controller.unlock_soon,
     'stop program': lambda controller: controller.programs.stop(),
     'pause program': lambda controller: controller.programs.pause(),
-    'resume program': lambda controller: controller.programs.play(),
+    'resume program': lambda controller: controller.programs.unpause(),
     # On a robot, motions then go to the arm or only to the screen; here, always to the arm.
     'set real': lambda _: None,
     'set sim': lambda _: None,

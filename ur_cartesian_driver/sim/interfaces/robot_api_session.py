@@ -329,7 +329,9 @@ class RobotApiSession(ClientSession):
             return None
         del self._buffer[: self._request_size]
         self._request_size = 0
-        self._last_request = version == 'HTTP/1.0' or headers.get('Connection') == 'close'
+        self._last_request = (
+            version == 'HTTP/1.0' or headers.get('Connection', '').lower() == 'close'
+        )
         return method, path, rest[:size], headers.get('Content-Type', '')
 
     def _answer(self, method: str, path: str, body: bytes, content_type: str) -> bytes:

@@ -315,6 +315,11 @@ class ProgramRunner:
         # A real controller writes XXX, too; the text of the message is the name of the program.
         self._messages.key('PROGRAM_XXX_STARTED', self.name)
 
+    def unpause(self) -> None:
+        """Resume a paused program; start none."""
+        if self.state in (RuntimeState.PAUSED, RuntimeState.PAUSING):
+            self.play()
+
     def play(self) -> str:
         """Resume the program or start the loaded one; return the reason of a refusal, or ''."""
         reason = self._arm.start_refusal()
