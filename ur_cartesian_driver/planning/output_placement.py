@@ -29,6 +29,7 @@ def place_outputs(
     blend_halves: Floats | None = None,
     start_time: float = 0.0,
     point_times: Floats | None = None,
+    control_cycle: float = 0.0,
 ) -> PlannedRows:
     """
     Return the segments with the records of outputs switched during the motion, in order of time.
@@ -40,16 +41,18 @@ def place_outputs(
     :param start_time: when the first segment begins [s].
     :param point_times: when points are passed within a motion (n,) [s]; None = each point is at
         the end of a motion.
+    :param control_cycle: cycle of the controller [s], needed for pulses only.
     :raises InvalidGoal: no motion leads to a point, or too many outputs are pending at once.
     """
     if not any(events.values()):
         return segments
-    path = TimedPath(segments, reference, blend_halves, start_time, point_times)
+    path = TimedPath(
+        segments, reference, blend_halves, start_time, point_times, control_cycle
+    )  # fmt: skip
     switches = [
         found
         for kind in OUTPUT_EVENTS
-        for i, event in enumerate(events.get(kind.field, ()))
-        for found in kind.place(event, f'{kind.field}[{i}]', path)
+        for found in kind.place_all(events.get(kind.field, ()), path)
     ]
     _check_leads(switches)
     outputs: dict[int, tuple[OutputRecord, ...]] = {}
