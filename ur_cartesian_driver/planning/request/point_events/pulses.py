@@ -174,20 +174,20 @@ def _passed(path: TimedPath, field: str, waypoint: int) -> PassedPoint:
 
 def _count(train: PulseTrain, field: str, length: float) -> int:
     """Return how many pulses there are on a part of the path with a length [m]."""
-    room = floor((length - train.phase + _SAME_PLACE) / train.distance) + 1
+    most = floor((length - train.phase + _SAME_PLACE) / train.distance) + 1
     between = (
         f'but the path from point {train.first_waypoint} to point {train.last_waypoint} is '
         f'{1e3 * length:.4g} mm long'
     )
-    if room < 1:
+    if most < 1:
         raise InvalidGoal(f'{field}.phase', f'is {train.phase:g} m, {between}', 'reduce it')
-    if train.count > room:
+    if train.count > most:
         raise InvalidGoal(
             f'{field}.count',
-            f'is {train.count}, {between}, with room for {room}',
+            f'is {train.count}, {between}, with room for {most}',
             'reduce count or distance, or set count to 0 for as many as there is room for',
         )
-    return train.count or room
+    return train.count or most
 
 
 def _check_speed(train: PulseTrain, field: str, path: TimedPath, begin: float, end: float) -> None:
@@ -215,8 +215,8 @@ def _left(train: PulseTrain, rest: GoalRest) -> list[PulseTrain]:
         return []
     given = 0
     if rest.stopped > begin:
-        way = rest.distance(begin, rest.stopped) - train.phase
-        given = max(ceil((way - _SAME_PLACE) / train.distance), 0)
+        passed = rest.distance(begin, rest.stopped) - train.phase
+        given = max(ceil((passed - _SAME_PLACE) / train.distance), 0)
     if train.count and given >= train.count:
         return []
     first = (
