@@ -1,3 +1,5 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
 """
 Pulses along the path: the cycle of each rising edge, against the tool's own way.
 
