@@ -328,6 +328,8 @@ class IOCommand:
     fraction: Annotated[float, Range(-1.0, 1.0)] = 0.0
     #: Name of a lead: the command comes earlier by its dead time, see ``lead_file``; '' = none.
     lead: str = ''
+    #: The name of the lead whose dead time ``offset`` contains; '' = none.
+    lead_name: Annotated[str, Mark.NOT_SENT] = field(default='', compare=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -65,6 +65,8 @@ class PlacedOutput:
     text: str
     #: How much later the tool is at the place of the output, at full speed [s].
     lead: float = 0.0
+    #: The field that gives the lead, in a refusal.
+    lead_field: str = ''
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -266,9 +268,10 @@ class TimedPath:
                 if rests
                 else 'the robot program has not read the record by then'
             )
+            value = lead if field.endswith('.lead') else -lead
             raise InvalidGoal(
                 field,
-                f'is {-lead:g} s, but {why}: the longest lead here is '
+                f'is {value:g} s, but {why}: the longest lead here is '
                 f'{max(time - begin, 0.0):.3f} s',
                 'reduce the lead, or move the place',
             )
