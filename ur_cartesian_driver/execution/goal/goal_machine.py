@@ -200,7 +200,7 @@ class GoalMachine:
             behind,
             moving=self.state in RUNNING_STATES,
             applied_offset=self.can.displacement.applied_offset(packet),
-            feed=self.can.overriding.feed_state(packet, now),
+            feed=self.can.overriding.observe_feed(packet, now),
         )
         if self.state is GoalState.SETTLING:  # its deadlines run on the controller's clock
             self._deadline += self._monitor.held_time
@@ -417,7 +417,7 @@ class GoalMachine:
         """
         if self.job.due is None or tolerance < 0.0:
             return ''
-        due = self.job.due + self._monitor.start_delay
+        due = self.job.due + self._monitor.allowed_delay
         late = self._monitor.scaled_time - due
         if late <= tolerance:
             return ''
