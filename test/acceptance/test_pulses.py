@@ -150,11 +150,18 @@ class Run:
 
 
 def assert_in_place(run, *trains, bound=1.6):
-    """Judge each edge, the widths, and the counts of the program."""
+    """
+    Judge each edge and the widths.
+
+    Near a rest, where the tool is slow, what counts is the way that it is off.
+    """
+    steps = np.diff(run.ways, prepend=0.0)
     for train in trains:
-        late = run.lateness(train)
-        off = run.ways[run.rises[train.pin]] - run.places(train)
-        assert (np.abs(late) < bound)[np.abs(off) > 1e-5].all(), (late, off)
+        rises, late = np.array(run.rises[train.pin]), run.lateness(train)
+        off = run.ways[rises] - run.places(train)
+        near_rest = steps[rises] < 0.2 * steps.max()
+        good = (np.abs(late) < bound) | (near_rest & (np.abs(off) < 1e-4))
+        assert good.all(), (late[~good], off[~good])
         widths = np.subtract(run.falls[train.pin], run.rises[train.pin])
         assert set(widths) == {max(round(train.width / STEP), 1)}
     return run
