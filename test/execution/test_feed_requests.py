@@ -83,7 +83,7 @@ def test_the_delay_of_a_goal_begins_with_it():
     feed = ProgramFeed(BOUNDS)
 
     def state(fraction, delay):
-        return feed.feed_state(
+        return feed.observe_feed(
             RobotState(
                 timestamp=0.0, actual_q=(0.0,) * 6, feed_override=fraction, feed_delay=delay
             ),
@@ -108,7 +108,7 @@ def test_the_level_of_an_input_gives_the_feed_and_one_beyond_its_ends_is_invalid
 ):
     feed = ProgramFeed(BOUNDS, FeedInput(1, *((8.0, 2.0) if falls else (2.0, 8.0))))
     state = RobotState(timestamp=0.0, actual_q=(0.0,) * 6, standard_analog_input1=level)
-    valid = feed.feed_state(state, 1.0).is_valid
+    valid = feed.observe_feed(state, 1.0).is_valid
     assert valid == (fraction is not None)
     if valid:
         wanted = 1.0 - fraction if falls else fraction
@@ -119,7 +119,7 @@ def test_the_level_of_an_input_gives_the_feed_and_one_beyond_its_ends_is_invalid
 
 def test_an_input_that_the_robot_does_not_report_is_an_invalid_signal():
     feed = ProgramFeed(BOUNDS, FeedInput(0, 0.004, 0.02))
-    assert not feed.feed_state(RobotState(timestamp=0.0, actual_q=(0.0,) * 6), 1.0).is_valid
+    assert not feed.observe_feed(RobotState(timestamp=0.0, actual_q=(0.0,) * 6), 1.0).is_valid
 
 
 @pytest.mark.parametrize(

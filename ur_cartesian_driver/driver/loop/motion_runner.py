@@ -18,6 +18,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
     CancelMotion,
     MotionEnded,
     MotionProgress,
+    PulsesGiven,
     ServoProgress,
     SetFeedOverride,
     SetLiveTarget,
@@ -46,6 +47,7 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     OpenOffsets,
     OpenServo,
     ReportProgress,
+    ReportPulses,
     ReportServo,
     RestoreOutputs,
     RestoreTcp,
@@ -292,6 +294,8 @@ class MotionRunner:
                     self._link.control.stop(reason)
                 case ReportProgress(progress=progress):
                     self._pipe.send(MotionProgress(motion=self._number, progress=progress))
+                case ReportPulses(pulses=pulses):
+                    self._pipe.send(PulsesGiven(pulses=pulses))
                 case WriteInputs(values=values):
                     if self._inputs is not None:
                         self._inputs.write_row(values)

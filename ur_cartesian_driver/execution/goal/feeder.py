@@ -49,6 +49,10 @@ class Feeder(ABC):
         """Keep the monitor of the goal; nothing is sent yet."""
         self.monitor = monitor
 
+    def add_part(self, part: object) -> None:
+        """Give the feeder more capabilities, before a machine looks them up."""
+        self.parts = (part, *self.parts)
+
     @abstractmethod
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
         """
@@ -153,10 +157,11 @@ class Overridable:
         :param now: time of a steady clock [s].
         """
 
-    def feed_state(self, packet: RobotState, now: float) -> FeedState:
+    def observe_feed(self, packet: RobotState, now: float) -> FeedState:
         """
-        Return the feed that the motion has now.
+        Read the signal if an input of the robot gives it, and return the feed of the motion.
 
+        :param packet: the newest packet of the robot.
         :param now: time of a steady clock [s].
         """
         return FULL_FEED

@@ -76,9 +76,9 @@ class GoalMonitor:
         self._applied_offset, self._feed = NO_OFFSET, FULL_FEED
         #: Whether a watch beside the goal stops the arm at contact, and moves it back.
         self.contact_is_watched = False
-        #: Scaled time: time since the start, as the controller's clock ran [s]; the part of that
-        #: time before the motion began [s].
-        self.scaled_time = self.start_delay = 0.0
+        #: Scaled time: time since the start, as the controller's clock ran [s]; by how much the
+        #: goal may end later, because the motion began late, waited or was slowed [s].
+        self.scaled_time = self.allowed_delay = 0.0
         #: How long the slider or a pause held up the controller's clock before the newest packet
         #: [s], whether or not the arm moved.
         self.held_time = 0.0
@@ -99,7 +99,7 @@ class GoalMonitor:
         self._motions_begun = self._motions_before = self.records.motions_before(sent)
         self._standstill.restart()
         # What was late before is past, and the wait at rest is no delay of the motion.
-        self.scaled_time, self.start_delay = self._tracker.time(), 0.0
+        self.scaled_time, self.allowed_delay = self._tracker.time(), 0.0
 
     def update(
         self,
@@ -122,7 +122,7 @@ class GoalMonitor:
         before, self.latest = self.latest, state
         self._applied_offset = applied_offset
         # The time of the goal passes as slowly as its feed says: that is no delay.
-        self.start_delay += feed.delay - self._feed.delay
+        self.allowed_delay += feed.delay - self._feed.delay
         self._feed = feed
         passed = 0.0 if before is None else max(0.0, state.timestamp - before.timestamp)
         playing = state.runtime_state is RuntimeState.PLAYING

@@ -33,16 +33,16 @@ class OutputGuard:
         self,
         outputs: tuple[SafeOutput, ...],
         packet: RobotState,
-        following: frozenset[int] = frozenset(),
+        own: frozenset[tuple[OutputKind, int]] = frozenset(),
     ) -> None:
         """
         Keep the outputs of a goal; without outputs the guard does nothing.
 
         :param packet: the newest packet of the robot.
-        :param following: pins of the analog outputs that follow the speed; they are not restored
-            after a pause, because the robot program writes them again.
+        :param own: the outputs that follow the speed or give pulses; they are not restored after
+            a pause, because the robot program writes them again.
         """
-        self._outputs, self._following = outputs, following
+        self._outputs, self._own = outputs, own
         self._token = packet.safe_outputs_token
         self._is_held = False
         #: Whether the driver's write was ordered, in this pause or at the end of the goal.
@@ -133,9 +133,7 @@ class OutputGuard:
             return []
         changed, self._changed = self._changed, ()
         restored = tuple(
-            output
-            for output in changed
-            if output.output is not OutputKind.STANDARD_ANALOG or output.pin not in self._following
+            output for output in changed if (output.output, output.pin) not in self._own
         )
         if not restored:
             return []

@@ -50,8 +50,8 @@ class ProgramFeed(FeedRequests, Prepared):
         self._sent = self.target
         return [SetFeedTarget(fraction=self._sent, rate=self.bounds.rate)]
 
-    def feed_state(self, packet: RobotState, now: float) -> FeedState:
-        """Return the feed as the robot program reports it."""
+    def observe_feed(self, packet: RobotState, now: float) -> FeedState:
+        """Read the input, if it gives the signal, and return the feed that the program reports."""
         self.read_input(packet, now)
         if self._first_delay is None:
             self._first_delay = packet.feed_delay

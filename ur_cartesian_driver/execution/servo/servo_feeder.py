@@ -173,7 +173,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         if self.stream.phase is ServoPhase.SERVOING and not self._has_filled:
             # The time of the goal begins with its motion, not when the buffer begins to fill.
             self._has_filled = True
-            self.monitor.start_delay = (
+            self.monitor.allowed_delay = (
                 self.monitor.scaled_time - self.stream.source_time + self.stream.lag
             )
         commands: list[GoalCommand] = [] if row is None else [WriteInputs(values=row)]
@@ -192,7 +192,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         if self._holds and self.monitor.motions_begun >= self._holds[0].motions:
             hold = self._holds.popleft()
             stream.go_on(hold.end - hold.begin, self._next_hold())
-        self.monitor.start_delay += stream.held_time - self._held_time
+        self.monitor.allowed_delay += stream.held_time - self._held_time
         self._held_time = stream.held_time
 
     def interpret(self, event: Event, state: GoalState) -> Meaning | None:
