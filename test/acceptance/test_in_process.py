@@ -72,8 +72,13 @@ class Client:
     params=[SingleThreadedExecutor, MultiThreadedExecutor],
     ids=['single-threaded', 'multi-threaded'],
 )
-def client(request, cartesian_driver):
-    made = Client(cartesian_driver, request.param())
+def executor(request):
+    return request.param
+
+
+@pytest.fixture
+def client(executor, cartesian_driver):
+    made = Client(cartesian_driver, executor())
     yield made
     made.close()
 

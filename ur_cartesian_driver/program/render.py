@@ -32,7 +32,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 import re
 
@@ -250,6 +250,7 @@ class ProgramSettings:
             )
 
 
+@lru_cache(maxsize=4)  # a driver renders the same program again for each new connection
 def render(settings: ProgramSettings) -> str:
     """
     Return the program for the script sender: header and node, without a ``def`` around them.
