@@ -59,11 +59,6 @@ def pytest_addoption(parser):
         help='leave out the tests that only compute; what waits, for clocks and sockets, runs',
     )
     parser.addoption(
-        '--first-cases',
-        action='store_true',
-        help='of each slow test run the first case, and one with each kind of executor',
-    )
-    parser.addoption(
         '--browser',
         metavar='CHROMIUM',
         help='the browser for the tests of pages, which are left out without it',
@@ -91,31 +86,12 @@ def pytest_ignore_collect(collection_path, config):
     return True if collection_path.is_dir() and missing.get(collection_path.name) else None
 
 
-@pytest.hookimpl(trylast=True)  # -m may leave out first cases
 def pytest_collection_modifyitems(config, items):
     if config.getoption('--no-computing'):
         from overlap import rank
 
-        _keep(config, items, [rank(item.nodeid) < 0 for item in items])
-    if config.getoption('--first-cases'):
-        seen = set()
-        _keep(config, items, [_is_first(item, seen) for item in items])
-
-
-def _is_first(item, seen):
-    """Tell whether this is the first case of a slow test with its executor; any other test is."""
-    if not item.get_closest_marker('slow') or item.get_closest_marker('installation'):
-        return True
-    parameters = item.callspec.params if hasattr(item, 'callspec') else {}
-    case = item.nodeid.partition('[')[0], parameters.get('executor')
-    return case not in seen and not seen.add(case)
-
-
-def _keep(config, items, kept):
-    """Deselect the items that are not kept."""
-    left_out = [item for item, is_kept in zip(items, kept, strict=True) if not is_kept]
-    config.hook.pytest_deselected(items=left_out)
-    items[:] = [item for item, is_kept in zip(items, kept, strict=True) if is_kept]
+        config.hook.pytest_deselected(items=[item for item in items if rank(item.nodeid) >= 0])
+        items[:] = [item for item in items if rank(item.nodeid) < 0]
 
 
 @pytest.hookimpl(optionalhook=True)

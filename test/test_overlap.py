@@ -41,24 +41,3 @@ def test_each_test_runs_once_on_a_worker_of_its_kind(tmp_path, workers):
         assert computes or not is_for_computing(worker)
         # Else those that share the processor with a worker at a normal one take ten times as long.
         assert int(priority) == min(os.nice(0) + LOW_PRIORITY * computes, 19)
-
-
-def test_of_each_slow_test_the_first_case_runs_with_each_executor(tmp_path):
-    cases = """
-import pytest
-
-@pytest.mark.slow
-@pytest.mark.parametrize('number', [pytest.param(0, marks=pytest.mark.exhaustive), 1, 2])
-@pytest.mark.parametrize('executor', ['single', 'multi'])
-def test_slow(executor, number):
-    print('ran', executor, number)
-
-@pytest.mark.parametrize('number', [1, 2])
-def test_fast(number):
-    print('ran', 'fast', number)
-"""
-    options = ('--first-cases', '-m', 'not exhaustive', '-rP')
-    done = run_small_suite(tmp_path, {'test_cases.py': cases}, *options)
-    assert done.returncode == 0, done.stdout + done.stderr
-    ran = {line for line in done.stdout.splitlines() if line.startswith('ran ')}
-    assert ran == {'ran single 1', 'ran multi 1', 'ran fast 1', 'ran fast 2'}

@@ -72,13 +72,8 @@ class Client:
     params=[SingleThreadedExecutor, MultiThreadedExecutor],
     ids=['single-threaded', 'multi-threaded'],
 )
-def executor(request):
-    return request.param
-
-
-@pytest.fixture
-def client(executor, cartesian_driver):
-    made = Client(cartesian_driver, executor())
+def client(request, cartesian_driver):
+    made = Client(cartesian_driver, request.param())
     yield made
     made.close()
 
