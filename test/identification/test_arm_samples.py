@@ -103,11 +103,35 @@ def test_the_calls_of_a_program_are_read():
 
 
 @pytest.mark.parametrize(
+    ('call', 'found'),
+    [
+        ('movej([0, 1], 1.4, 1.05)', {'a': 1.4, 'v': 1.05}),
+        ('movej([0, 1], 1.4, 1.05, 0, 0.01)', {'a': 1.4, 'v': 1.05, 'r': 0.01}),
+        ('movej(f(2, a=1), 1.4, v=1.05)', {'a': 1.4, 'v': 1.05}),
+        ('movej(q=[a, v], t=3)', {'t': 3.0}),
+        ('movej(p[0,\n1], # a=9\n a=1)', {'a': 1.0}),
+        ('movej(x, a=+2, r=0)', {'a': 2.0}),
+        ('textmsg("movej(a=1)")\nmovej(x)', {}),
+    ],
+)
+def test_arguments_are_bound_as_the_controller_does(call, found):
+    assert read_commands(call, 'x') == [MotionCommand(name='movej', **found)]
+
+
+@pytest.mark.parametrize(
     ('content', 'words'),
     [
         ('sleep(1)', 'moves.script has no call of movej or movel'),
-        ('movel(there, a=fast)', 'moves.script, line 1: a of movel is fast; write a number'),
-        ('\nmovej(q, v=-1)', 'moves.script, line 2: v of movej is -1'),
+        ('movel(there, a=fast)', 'line 1: a of movel is no plain number; write the number that'),
+        ('movel(there, 1, 0.2 + x)', 'moves.script, line 1: v of movel is no plain number'),
+        ('\nmovej(q, v=-1)', 'moves.script, line 2: v of movej is -1; it must be more than 0'),
+        ('movej(q, a=0)', 'line 1: a of movej is 0; it must be more than 0'),
+        ('movej(q, 1, 1, -1)', 'line 1: t of movej is -1; it must be 0 or more'),
+        ('movej(q, x=1)', 'line 1: movej has no argument x; it has q, a, v, t, r'),
+        ('movej(q, 1, 1, 1, 1, 1)', 'line 1: movej has no argument number 6'),
+        ('while True:\n  movej(q)\nend', 'line 2: movej stands in a loop, a branch or a function'),
+        ('def f():\n def g():\n movel(p)\n end\n g()\n g()\nend', 'line 3: movel stands in a'),
+        ('movej(q', 'moves.script, line 1: this is no call of URScript'),
     ],
 )
 def test_what_is_no_call_is_refused(content, words):
