@@ -116,10 +116,15 @@ def _translation_leads(move: FoundMove) -> bool:
 
 
 def left_out(moves: Sequence[FoundMove], kind: Kind) -> tuple[Result, Result]:
-    """Find acceleration and speed of moves of a kind whose call left both out."""
+    """
+    Find acceleration and speed of moves of a kind whose call left both out.
+
+    A line whose turn leads has neither of them; whether it leads depends on the turn ratio.
+    """
     call = 'movej' if kind is Kind.JOINT else 'movel'
     names = _LEFT_OUT[kind]
-    accelerations, speeds, profiles, odd, quotients = [], [], [], 0, []
+    accelerations, speeds, profiles, quotients = [], [], [], []
+    odd = turning = 0
     for move in moves:
         command = move.command
         if command is None or command.name != call or move.kind is not kind:
@@ -128,8 +133,8 @@ def left_out(moves: Sequence[FoundMove], kind: Kind) -> tuple[Result, Result]:
             continue
         if not isinstance(move.profile, Profile):
             odd += isinstance(move.profile, Misfit)
-        elif kind is Kind.LINE and move.travel.line is None:
-            continue
+        elif kind is Kind.LINE and _turn_may_lead(move):
+            turning += 1
         elif command.t is not None:
             quotients += [move.profile.speed_squared_by_acceleration]
         else:
@@ -140,6 +145,8 @@ def left_out(moves: Sequence[FoundMove], kind: Kind) -> tuple[Result, Result]:
     known = [quotient for quotient in quotients if quotient is not None]
     if odd:
         reason = f'{_plural(odd, call)} without a and v followed no law that is known'
+    elif turning:
+        reason = f'{_plural(turning, call)} turned the tool so far that the turn may lead'
     elif known:
         whole = combined(known)
         reason = (
@@ -154,6 +161,14 @@ def left_out(moves: Sequence[FoundMove], kind: Kind) -> tuple[Result, Result]:
     )
 
 
+def _turn_may_lead(move: FoundMove) -> bool:
+    """Return whether the turn of a line leads by the least turn ratio that there is."""
+    line, turn = move.travel.line, move.travel.turn
+    if line is None:
+        return True
+    return turn is not None and float(np.ptp(turn)) > LAWS['turn_ratio'].low * float(np.ptp(line))
+
+
 _LEFT_OUT = {
     Kind.JOINT: ('timed_joint_acceleration', 'timed_joint_speed'),
     Kind.LINE: ('timed_linear_acceleration', 'timed_linear_speed'),
@@ -164,7 +179,9 @@ def idle_between_moves(moves: Sequence[FoundMove]) -> Result:
     """Find the time between the end of a move and the beginning of the next one in a chain."""
     gaps, profiles = [], []
     for before, after in pairwise(moves):
-        if before.samples is not after.samples or not after.piece.chained:
+        if before.samples is not after.samples:
+            continue
+        if not after.piece.directly_follows(before.piece):
             continue
         if not (isinstance(before.profile, Profile) and isinstance(after.profile, Profile)):
             continue

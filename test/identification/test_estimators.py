@@ -1,0 +1,62 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Moves that do not show a law leave it unidentified."""
+
+from dataclasses import fields, replace
+from random import Random
+
+from hidden_arm import Laws, Program
+import numpy as np
+import pytest
+
+from ur_cartesian_driver.identification.arm_samples import ArmSamples
+from ur_cartesian_driver.identification.estimators import Unknown
+from ur_cartesian_driver.identification.identify import identify
+
+
+@pytest.fixture
+def laws():
+    return replace(Laws.drawn(Random(3)), idle_between_moves=0.01, long_gaps=0.0)
+
+
+def without(samples, gone):
+    """Return a recording that lacks some packets, a mask (n,)."""
+    columns = {each.name: getattr(samples, each.name) for each in fields(ArmSamples)}
+    return ArmSamples(
+        **{k: v[~gone] if isinstance(v, np.ndarray) else v for k, v in columns.items()}
+    )
+
+
+def test_a_move_that_is_left_out_is_no_idle_time(laws):
+    """Packets of the middle one of three moves are missing: nothing follows its end."""
+    program = Program(laws=laws, random=Random(3))
+    for q in (0.9, 0.7, 0.1):
+        program.movej([q, 0.0, 0.0, 0.0, 0.0, 0.0], a=3.0, v=1.0)
+    samples = program.record('chain')
+    found = identify([samples]).results['idle_between_moves']
+    assert found.evidence == '2 pairs of moves in a row'
+    after_first, middle = program.parts[1][0], 0.5 * (program.parts[1][0] + program.parts[1][1])
+    begin = samples.time[0] + 0.4 + 0.5 * laws.start_time
+    gone = np.abs(samples.time - begin - middle) < 0.06
+    left = identify([without(samples, gone)])
+    assert len(left.moves) == 2
+    assert after_first < middle
+    assert isinstance(left.results['idle_between_moves'], Unknown)
+
+
+@pytest.mark.parametrize('turn', [0.3, 0.8])
+def test_a_line_whose_turn_may_lead_shows_no_speed_of_lines(laws, turn):
+    """Its way takes as long as its turn, so its speed is not that of the call."""
+    laws = replace(laws, turn_ratio=1.2)
+    axis = np.array([0.6, -0.3, 0.74])
+    program = Program(laws=laws, random=Random(3))
+    program.movel([0.2, 0.1, 0.0], turn * axis)
+    results = identify([program.record('line')], program.commands).results
+    for name in ('timed_linear_acceleration', 'timed_linear_speed'):
+        assert isinstance(results[name], Unknown)
+        assert '1 movel turned the tool' in results[name].reason
+    program = Program(laws=laws, random=Random(3))
+    program.movel([0.2, 0.1, 0.0], 0.2 * axis)
+    results = identify([program.record('line')], program.commands).results
+    low, high = results['timed_linear_speed'].interval
+    assert low < laws.timed_linear_speed < high
