@@ -48,6 +48,20 @@ def test_a_packet_that_was_written_twice_counts_once(tmp_path):
     assert len(read_samples(path).time) == len(ROWS)
 
 
+def test_a_column_that_the_robot_did_not_report_is_none(tmp_path):
+    rows = ROWS.copy()
+    rows[:, 7:] = np.nan
+    path = tmp_path / 'moves.csv'
+    path.write_text(text(rows=rows))
+    assert read_samples(path).actual_q is None
+
+
+def hole():
+    rows = ROWS.copy()
+    rows[7, 9] = np.nan
+    return text(rows=rows)
+
+
 def mixed():
     rows = ROWS.copy()
     rows[30:, 0] -= 1.0
@@ -61,14 +75,17 @@ def mixed():
         ('\n', 'is empty'),
         ('a b\n1 2\n', 'has no column timestamp: record the RTDE outputs'),
         (text(names=['time', 'x', *NAMES[2:]]), 'has no column target_q_0'),
+        (text(rows=ROWS[:0]), 'is too short: it has 0 packets, not 50'),
         (text(rows=ROWS[:9]), 'is too short: it has 9 packets, not 50'),
         (text()[:-100] + '\n', 'is damaged below its titles: '),
         (text().replace('0.1', 'x', 1), 'is damaged below its titles: could not convert'),
         (text().replace('0.1 ', 'nan ', 1), 'packet 1 has no number in target_q'),
+        (hole(), 'is damaged: packet 8 has no number in actual_q; remove that packet'),
         (mixed(), 'is mixed up: time goes back from 0.058 s to -0.940 s at packet 31'),
         (text(rows=np.repeat(ROWS[:1], 99, axis=0)), 'is damaged: its time stands still'),
     ],
 )
+@pytest.mark.filterwarnings('error')
 def test_what_is_no_recording_is_refused(tmp_path, content, words):
     path = tmp_path / 'moves.csv'
     path.write_text(content)
