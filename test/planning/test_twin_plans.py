@@ -139,6 +139,9 @@ def test_twin_file_is_read_and_refused_with_its_line(tmp_path):
         ValueError, match=r'^twin_file: .*twin\.yaml, line \d+: blend_start is no law'
     ):
         PlanningOptions(twin_file=str(file))
+    file.write_text(twin_text(replace(twin, arm=ArmIdentity(model='ur5ee'))))
+    with pytest.raises(ValueError, match=r"twin\.yaml, arm: There is no robot model 'ur5ee'"):
+        PlanningOptions(twin_file=str(file))
     with pytest.raises(ValueError, match='which cannot be read: No such file'):
         PlanningOptions(twin_file=str(tmp_path / 'none.yaml'))
 

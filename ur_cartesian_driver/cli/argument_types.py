@@ -5,13 +5,12 @@
 from __future__ import annotations
 
 import argparse
-from datetime import date
-import re
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import MAX_JOINT_VALUE
+from ur_cartesian_driver.motion.twin.twin import checked_day, checked_software
 from ur_cartesian_driver.robot.services.service_calls import MAX_TOOL_OFFSET
 from ur_cartesian_driver.sim.command_line.simulator_options import parsed, six_numbers
 
@@ -42,17 +41,12 @@ def code_output(text: str) -> tuple[str, CodeOutput]:
 
 def day(text: str) -> str:
     """Return a date, YYYY-MM-DD."""
-    try:
-        return date.fromisoformat(text).isoformat()
-    except ValueError:
-        raise argparse.ArgumentTypeError(f'{text} is no date; write it as YYYY-MM-DD') from None
+    return parsed(checked_day, text)
 
 
 def software(text: str) -> str:
     """Return a version of the controller's software."""
-    if re.fullmatch(r'\d+(\.\d+){1,3}', text) is None:
-        raise argparse.ArgumentTypeError(f'{text} is no version; write it like 5.21 or 5.21.0')
-    return text
+    return parsed(checked_software, text)
 
 
 def tcp(text: str) -> tuple[float, ...]:

@@ -630,7 +630,7 @@ def _add_identify(command: CommandParser) -> None:
         '-o', '--output', default='', metavar='FILE', help='twin to write, such as twin.yaml'
     )
     arm = command.add_argument_group('the arm', 'where the recordings do not name it')
-    arm.add_argument('--model', default='', help='such as ur5e')
+    arm.add_argument('--model', default='', choices=sorted(MODELS), help='model of the robot')
     arm.add_argument('--serial-number', default='', metavar='NUMBER', help='of the arm')
     arm.add_argument(
         '--software',

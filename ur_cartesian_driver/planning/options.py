@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal, Protocol
 
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes
 from ur_cartesian_driver.motion.goal.field_table import Range
 from ur_cartesian_driver.motion.goal.goal import IOCommand
@@ -291,12 +292,17 @@ def _read_twin(path: str) -> Twin:
     """
     Return the twin in a file.
 
-    :raises ValueError: the file cannot be read, or is no twin.
+    :raises ValueError: the file cannot be read, or is no twin of a known model.
     """
     try:
-        return read_twin(path)
+        twin = read_twin(path)
     except OSError as error:
         reason = error.strerror or error
         raise ValueError(f'twin_file is {path!r}, which cannot be read: {reason}.') from None
     except TwinFileError as error:
         raise ValueError(f'twin_file: {error}') from None
+    try:
+        robot_model(twin.arm.model)
+    except ValueError as error:
+        raise ValueError(f'twin_file: {path}, arm: {error}') from None
+    return twin
