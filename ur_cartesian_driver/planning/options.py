@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.goal.goal import IOCommand
 from ur_cartesian_driver.motion.goal.leads import Lead, with_lead_times
 from ur_cartesian_driver.motion.goal.output_names import parse_safe_outputs
 from ur_cartesian_driver.motion.goal.parameter_fields import check_parameters, Detected
-from ur_cartesian_driver.motion.twin.laws import MotionLaws
+from ur_cartesian_driver.motion.twin.laws import ASSUMED_LAWS, MotionLaws
 from ur_cartesian_driver.motion.twin.twin import ArmIdentity, laws_of, Twin, UNKNOWN_ARM
 from ur_cartesian_driver.motion.twin.twin_file import read_twin, TwinFileError
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
@@ -261,8 +261,19 @@ class PlanningOptions:
 
     @property
     def laws(self) -> MotionLaws:
-        """The laws by which the robot moves: measured, or else assumed."""
-        return laws_of(self.used_twin, self.turn_ratio)
+        """
+        The laws by which the robot moves: measured, or else assumed.
+
+        Begin and speed of a blend belong to its curve: if that is unknown, all three are assumed.
+        """
+        laws = laws_of(self.used_twin, self.turn_ratio)
+        if laws.blend_shape != 'unknown':
+            return laws
+        return replace(
+            laws,
+            blend_begin=ASSUMED_LAWS.blend_begin,
+            blend_speed_ratio=ASSUMED_LAWS.blend_speed_ratio,
+        )
 
     def lead_times(self, commands: Sequence[IOCommand]) -> tuple[IOCommand, ...]:
         """
