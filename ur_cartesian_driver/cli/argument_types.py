@@ -54,6 +54,22 @@ def tcp(text: str) -> tuple[float, ...]:
     return six_numbers(text, (MAX_TOOL_OFFSET, MAX_JOINT_VALUE))
 
 
+def box(text: str) -> tuple[float, ...]:
+    """Return the least and greatest coordinates of a box [m]."""
+    return six_numbers(text, (MAX_OFFSET, MAX_OFFSET))
+
+
+def experiments(text: str) -> tuple[str, ...]:
+    """Return the names of experiments, separated by commas."""
+    from ur_cartesian_driver.identification.law_experiments import LAW_EXPERIMENTS
+
+    known = [each.name for each in LAW_EXPERIMENTS]
+    for name in text.split(','):
+        if name not in known:
+            raise argparse.ArgumentTypeError(f'{name!r} is none of {", ".join(known)}')
+    return tuple(text.split(','))
+
+
 def offsets(text: str) -> tuple[float, ...]:
     """Return the equally spaced numbers of a text like ``-0.1,0.1,5`` (FROM,TO,COUNT)."""
     try:

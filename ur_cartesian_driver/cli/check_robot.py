@@ -36,14 +36,8 @@ def check_robot(arguments: argparse.Namespace) -> int:
     """Check a robot, write the report, and return the exit status."""
     if arguments.with_motion and not sys.stdin.isatty():
         raise ValueError('--with-motion asks before each motion, so it needs a terminal.')
-    address = RobotAddress(
-        host=arguments.robot_ip,
-        rtde_port=arguments.rtde_port,
-        primary_port=arguments.primary_port,
-        dashboard_port=arguments.dashboard_port,
-        robot_api_port=arguments.robot_api_port,
-    )
-    findings = asyncio.run(_observe(address, arguments.seconds))
+    address = address_of(arguments)
+    findings = asyncio.run(observe_and_show(address, arguments.seconds))
     recordings: dict[str, MotionSamples] = {}
     if arguments.with_motion:
         findings += experiment_findings(address, findings, ask, recordings)
@@ -53,7 +47,12 @@ def check_robot(arguments: argparse.Namespace) -> int:
     return exit_status(findings)
 
 
-async def _observe(address: RobotAddress, seconds: float) -> list[Finding]:
+async def observe_and_show(address: RobotAddress, seconds: float) -> list[Finding]:
+    """
+    Return the findings about a robot; print each as it comes.
+
+    :param seconds: duration of the recording of the RTDE stream [s].
+    """
     findings = []
     async for finding in observe(address, seconds):
         show(finding)
@@ -119,6 +118,17 @@ def _experiment(
         return [Finding(check=experiment.check, verdict=Verdict.PROBLEM, text=text)]
     recordings[experiment.check] = samples
     return [analyse(samples) for analyse in experiment.analyses]
+
+
+def address_of(arguments: argparse.Namespace) -> RobotAddress:
+    """Return the address of the robot in the options."""
+    return RobotAddress(
+        host=arguments.robot_ip,
+        rtde_port=arguments.rtde_port,
+        primary_port=arguments.primary_port,
+        dashboard_port=arguments.dashboard_port,
+        robot_api_port=arguments.robot_api_port,
+    )
 
 
 def ask(motion: str) -> bool:
