@@ -201,7 +201,7 @@ def test_what_others_do_ends_the_experiments(identify, ur_sim, fault, words):
 def test_an_arm_that_is_faster_than_allowed_is_stopped(identify, ur_sim):
     status, _, outcomes = identify('--only', 'movel_without_speed', speed='0.26')
     assert status == 1
-    assert outcomes['movel_without_speed'].startswith('ended: the tool was too fast: 0.2')
+    assert outcomes['movel_without_speed'].startswith('ended: the tool was too fast: 0.')
     rests(ur_sim)
 
 

@@ -26,7 +26,7 @@ TARGET_FLOOR = 1e-8
 NOWHERE = 1e6
 _ORDER = 2
 #: Largest share of the noise that a fit is taken to have removed.
-_MOST_TAKEN = 0.1
+_MAX_TAKEN = 0.1
 _ITERATIONS, _MIN_GAIN, _MAX_DAMPING = 60, 1e-4, 1e12
 #: Quantiles of Student's t for 95 % with 1, 2, 3 degrees of freedom; of the normal distribution.
 _FEW, _NORMAL = (12.7062, 4.3027, 3.1824), 1.959964
@@ -218,7 +218,7 @@ def _autoregression(residuals: Floats, follows: Flags, fitted: int) -> Floats:
     )
     phi = _yule_walker(powers)
     at_rest = float(powers[0] - phi @ powers[1:]) / (1.0 - float(phi.sum())) ** 2
-    taken = min(fitted * at_rest / len(now), _MOST_TAKEN * float(powers[0]))
+    taken = min(fitted * at_rest / len(now), _MAX_TAKEN * float(powers[0]))
     return _yule_walker(powers + taken)
 
 

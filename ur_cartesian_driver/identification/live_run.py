@@ -116,8 +116,9 @@ class _Run:
         self._state, self._bounds = state, bounds
         self._recorder = RtdeRecorder(RECORDED, address.host, address.rtde_port)
         self._probe = PrimaryProbe()
-        #: Whether a pause was sent, and the number of rows that belong to the experiment.
-        self._pauses, self._rows = False, 0
+        #: Whether a pause was sent, and the number of rows that belong to the experiment, and of
+        #: those that were looked at.
+        self._pauses, self._rows, self._seen = False, 0, 0
 
     async def open(self) -> None:
         await self._recorder.open()
@@ -219,14 +220,18 @@ class _Run:
 
         :raises Surprise: there was one, or the row did not come in time.
         """
-        surprise = ''
+        surprise, recorder = '', self._recorder
 
         def check(row: Mapping[str, Any]) -> bool:
             nonlocal surprise
-            surprise = surprise or self._surprise(row)
+            for values in recorder.rows[self._seen :]:
+                surprise = surprise or self._surprise(
+                    dict(zip(recorder.names, values, strict=True))
+                )
+            self._seen = len(recorder.rows)
             return bool(surprise) or is_reached(row)
 
-        reached = await self._recorder.wait_for(check, time)
+        reached = await recorder.wait_for(check, time)
         if surprise or not reached:
             raise Surprise(surprise or f'{otherwise} within {time:g} s')
 
