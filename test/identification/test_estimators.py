@@ -5,13 +5,14 @@
 from dataclasses import fields, replace
 from random import Random
 
-from hidden_arm import Laws, Program
+from hidden_arm import Laws, Program, speed_steps
 import numpy as np
 import pytest
 
 from ur_cartesian_driver.identification.arm_samples import ArmSamples
 from ur_cartesian_driver.identification.estimators import Unknown
 from ur_cartesian_driver.identification.identify import identify
+from ur_cartesian_driver.identification.profile import find_profile
 
 
 @pytest.fixture
@@ -60,3 +61,35 @@ def test_a_line_whose_turn_may_lead_shows_no_speed_of_lines(laws, turn):
     results = identify([program.record('line')], program.commands).results
     low, high = results['timed_linear_speed'].interval
     assert low < laws.timed_linear_speed < high
+
+
+def test_begin_and_end_of_a_move_are_known_to_be_correlated():
+    """A move that seems to begin late seems to end early, so gaps beside it err together."""
+    generator, t = np.random.default_rng(1), 0.004 * np.arange(450)
+    travel = speed_steps(0.6, 2.0, 0.6).integral(np.maximum(t - 0.2013, 0.0))
+    follows = np.arange(len(t)) > 0
+    found = [
+        find_profile(
+            t, travel + 5e-8 * generator.standard_normal(len(t)), follows, may_start=False
+        )
+        for _ in range(100)
+    ]
+    sample = np.cov([(each.begin.value, each.end.value) for each in found], rowvar=False)
+    assert sample[0, 1] < 0.0
+    for expected, measured in (
+        (sample[0, 0], [each.begin.error**2 for each in found]),
+        (sample[1, 1], [each.end.error**2 for each in found]),
+        (sample[0, 1], [each.begin_and_end for each in found]),
+    ):
+        assert np.mean(measured) == pytest.approx(expected, rel=0.4)
+
+
+def test_an_estimate_at_the_bound_of_its_law_keeps_an_interval(laws):
+    """No idle time, measured as a little less than none, is not known exactly."""
+    laws = replace(laws, idle_between_moves=0.0)
+    for seed in range(6):
+        program = Program(laws=laws, random=Random(seed))
+        for q in (0.9, 0.1):
+            program.movej([q, 0.0, 0.0, 0.0, 0.0, 0.0], a=3.0, v=1.0)
+        low, high = identify([program.record('chain')]).results['idle_between_moves'].interval
+        assert low == 0.0 < high

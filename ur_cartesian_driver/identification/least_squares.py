@@ -71,13 +71,20 @@ class Fit:
 
     def combination(self, weights: dict[int, float]) -> Measured:
         """Return a linear combination of parameters with its standard error."""
-        row = np.zeros(len(self.parameters))
-        row[list(weights)] = list(weights.values())
         return Measured(
-            value=float(row @ self.parameters),
-            error=sqrt(max(float(row @ self.covariance @ row), 0.0)),
+            value=float(self._row(weights) @ self.parameters),
+            error=sqrt(max(self.common(weights, weights), 0.0)),
             freedom=self.freedom,
         )
+
+    def common(self, one: dict[int, float], other: dict[int, float]) -> float:
+        """Return the covariance of two linear combinations of parameters."""
+        return float(self._row(one) @ self.covariance @ self._row(other))
+
+    def _row(self, weights: dict[int, float]) -> Floats:
+        row = np.zeros(len(self.parameters))
+        row[list(weights)] = list(weights.values())
+        return row
 
     @property
     def rms(self) -> float:
@@ -241,6 +248,23 @@ def student(freedom: float) -> float:
         (3.0 * z**7 + 19.0 * z**5 + 17.0 * z**3 - 15.0 * z) / 384.0,
     )
     return z + sum(term / freedom**i for i, term in enumerate(terms, 1))
+
+
+def correlated_mean(parts: Sequence[Measured], common: Floats) -> Measured:
+    """
+    Return the best mean of measurements of one number whose errors are correlated.
+
+    :param common: (n - 1,) covariance of each measurement with the next one.
+    """
+    covariance = np.diag([part.error**2 for part in parts])
+    covariance = covariance + np.diag(common, 1) + np.diag(common, -1)
+    weights = np.linalg.solve(covariance, np.ones(len(parts)))
+    values = np.array([part.value for part in parts])
+    return Measured(
+        value=float(weights @ values / weights.sum()),
+        error=float(weights.sum() ** -0.5),
+        freedom=sum(part.freedom for part in parts),
+    )
 
 
 def combined(parts: Sequence[Measured]) -> Measured:
