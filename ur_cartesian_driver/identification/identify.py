@@ -56,8 +56,8 @@ class Identification:
             if isinstance(move.profile, Misfit):
                 text += (
                     f'\nThe move at {move.samples.time[move.piece.moving[0]]:.2f} s of '
-                    f'{move.samples.name} is no trapezoid: {1e6 * move.profile.rms:.3g} um or urad '
-                    'are left.'
+                    f'{move.samples.name} is no trapezoid: {1e6 * move.profile.rms:.3g} um or '
+                    'urad are left.'
                 )
         return text
 
