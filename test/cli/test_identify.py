@@ -84,7 +84,11 @@ def test_our_own_recordings_name_their_arm(laws, tmp_path, capsys):
 @pytest.mark.parametrize(
     ('calls', 'words', 'said'),
     [
-        ('movej(a)', [], 'has 1 calls of movej and movel, but the recordings show 2 moves'),
+        (
+            'movej(a)',
+            [],
+            'calls of movej and movel in calls.script: 1, moves in the recordings: 2;',
+        ),
         ('movej(a)\nmovel(b)', [], 'says movel for move 2, but the recording moves.csv shows a'),
         ('movej(a)\nmovej(b)', ['-o', 'twin.yaml'], 'the recordings do not name their arm'),
     ],
@@ -98,8 +102,15 @@ def test_what_does_not_fit_is_refused(folder, tmp_path, monkeypatch, capsys, cal
     assert not (tmp_path / 'twin.yaml').exists()
 
 
-@pytest.mark.parametrize('words', [['--date', 'monday'], ['--software', 'new']])
-def test_options_that_cannot_be_are_refused(folder, capsys, words):
+@pytest.mark.parametrize(
+    ('words', 'said'),
+    [
+        (['--date', 'monday'], 'monday is no date; write it as YYYY-MM-DD'),
+        (['--software', 'new'], 'new is no version; write it like 5.21'),
+        (['--model', 'ur5ee'], "invalid choice: 'ur5ee'"),
+    ],
+)
+def test_options_that_cannot_be_are_refused(folder, capsys, words, said):
     with pytest.raises(SystemExit):
         main(['identify', str(folder / 'moves.csv'), *words])
-    assert 'write it' in capsys.readouterr().err
+    assert said in capsys.readouterr().err

@@ -48,6 +48,20 @@ def test_a_packet_that_was_written_twice_counts_once(tmp_path):
     assert len(read_samples(path).time) == len(ROWS)
 
 
+def test_a_column_that_the_robot_did_not_report_is_none(tmp_path):
+    rows = ROWS.copy()
+    rows[:, 7:] = np.nan
+    path = tmp_path / 'moves.csv'
+    path.write_text(text(rows=rows))
+    assert read_samples(path).actual_q is None
+
+
+def hole():
+    rows = ROWS.copy()
+    rows[7, 9] = np.nan
+    return text(rows=rows)
+
+
 def mixed():
     rows = ROWS.copy()
     rows[30:, 0] -= 1.0
@@ -61,14 +75,17 @@ def mixed():
         ('\n', 'is empty'),
         ('a b\n1 2\n', 'has no column timestamp: record the RTDE outputs'),
         (text(names=['time', 'x', *NAMES[2:]]), 'has no column target_q_0'),
+        (text(rows=ROWS[:0]), 'is too short: it has 0 packets, not 50'),
         (text(rows=ROWS[:9]), 'is too short: it has 9 packets, not 50'),
         (text()[:-100] + '\n', 'is damaged below its titles: '),
         (text().replace('0.1', 'x', 1), 'is damaged below its titles: could not convert'),
         (text().replace('0.1 ', 'nan ', 1), 'packet 1 has no number in target_q'),
+        (hole(), 'is damaged: packet 8 has no number in actual_q; remove that packet'),
         (mixed(), 'is mixed up: time goes back from 0.058 s to -0.940 s at packet 31'),
         (text(rows=np.repeat(ROWS[:1], 99, axis=0)), 'is damaged: its time stands still'),
     ],
 )
+@pytest.mark.filterwarnings('error')
 def test_what_is_no_recording_is_refused(tmp_path, content, words):
     path = tmp_path / 'moves.csv'
     path.write_text(content)
@@ -103,11 +120,35 @@ def test_the_calls_of_a_program_are_read():
 
 
 @pytest.mark.parametrize(
+    ('call', 'found'),
+    [
+        ('movej([0, 1], 1.4, 1.05)', {'a': 1.4, 'v': 1.05}),
+        ('movej([0, 1], 1.4, 1.05, 0, 0.01)', {'a': 1.4, 'v': 1.05, 'r': 0.01}),
+        ('movej(f(2, a=1), 1.4, v=1.05)', {'a': 1.4, 'v': 1.05}),
+        ('movej(q=[a, v], t=3)', {'t': 3.0}),
+        ('movej(p[0,\n1], # a=9\n a=1)', {'a': 1.0}),
+        ('movej(x, a=+2, r=0)', {'a': 2.0}),
+        ('textmsg("movej(a=1)")\nmovej(x)', {}),
+    ],
+)
+def test_arguments_are_bound_as_the_controller_does(call, found):
+    assert read_commands(call, 'x') == [MotionCommand(name='movej', **found)]
+
+
+@pytest.mark.parametrize(
     ('content', 'words'),
     [
         ('sleep(1)', 'moves.script has no call of movej or movel'),
-        ('movel(there, a=fast)', 'moves.script, line 1: a of movel is fast; write a number'),
-        ('\nmovej(q, v=-1)', 'moves.script, line 2: v of movej is -1'),
+        ('movel(there, a=fast)', 'line 1: a of movel is no plain number; write the number that'),
+        ('movel(there, 1, 0.2 + x)', 'moves.script, line 1: v of movel is no plain number'),
+        ('\nmovej(q, v=-1)', 'moves.script, line 2: v of movej is -1; it must be more than 0'),
+        ('movej(q, a=0)', 'line 1: a of movej is 0; it must be more than 0'),
+        ('movej(q, 1, 1, -1)', 'line 1: t of movej is -1; it must be 0 or more'),
+        ('movej(q, x=1)', 'line 1: movej has no argument x; it has q, a, v, t, r'),
+        ('movej(q, 1, 1, 1, 1, 1)', 'line 1: movej has no argument number 6'),
+        ('while True:\n  movej(q)\nend', 'line 2: movej stands in a loop, a branch or a function'),
+        ('def f():\n def g():\n movel(p)\n end\n g()\n g()\nend', 'line 3: movel stands in a'),
+        ('movej(q', 'moves.script, line 1: this is no call of URScript'),
     ],
 )
 def test_what_is_no_call_is_refused(content, words):

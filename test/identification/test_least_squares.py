@@ -5,7 +5,13 @@
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.identification.least_squares import combined, fit, Measured, student
+from ur_cartesian_driver.identification.least_squares import (
+    combined,
+    correlated_mean,
+    fit,
+    Measured,
+    student,
+)
 
 T = np.linspace(0.0, 1.0, 600)
 
@@ -53,3 +59,18 @@ def test_measurements_that_differ_widen_the_interval():
     whole = combined(parts)
     assert whole.value == pytest.approx(1.1)
     assert whole.half_width == pytest.approx(4.303 * 0.1 / 3**0.5, rel=1e-3)
+
+
+def test_measurements_with_one_error_are_no_better_than_one():
+    parts = [Measured(value=x, error=0.1, freedom=50) for x in (1.0, 1.2, 1.1)]
+    alone = correlated_mean(parts, np.zeros(2))
+    assert alone.value == pytest.approx(1.1)
+    assert alone.error == pytest.approx(0.1 / 3**0.5)
+    pair = correlated_mean(parts[:2], np.array([0.00999]))
+    assert pair.value == pytest.approx(1.1)
+    assert pair.error == pytest.approx(0.1, rel=1e-3)
+    covariance = np.array([[0.01, 0.004, 0.0], [0.004, 0.01, -0.002], [0.0, -0.002, 0.01]])
+    whole = correlated_mean(parts, np.array([0.004, -0.002]))
+    inverse = np.linalg.inv(covariance)
+    assert whole.error == pytest.approx(inverse.sum() ** -0.5)
+    assert whole.value == pytest.approx(inverse.sum(axis=0) @ [1.0, 1.2, 1.1] / inverse.sum())

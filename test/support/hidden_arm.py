@@ -291,8 +291,10 @@ def step_arm(laws, q, step, generator):
 def standard_experiments(laws, random, shape=speed_steps):
     """Return the recordings of one arm, and the calls behind their moves."""
     cycle = random.choice([0.002, 0.002, 0.008])
-    near = lambda x: x * random.uniform(0.8, 1.2)  # noqa: E731  # a word for a drawn number
     axis = np.array([0.6, -0.3, 0.74]) / np.linalg.norm([0.6, -0.3, 0.74])
+
+    def near(x):
+        return x * random.uniform(0.8, 1.2)
 
     def program():
         return Program(laws=laws, random=random, cycle=cycle, shape=shape)

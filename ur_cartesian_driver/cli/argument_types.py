@@ -5,14 +5,13 @@
 from __future__ import annotations
 
 import argparse
-from datetime import date
-import re
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import MAX_JOINT_VALUE
 from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.twin.twin import checked_day, checked_software
 from ur_cartesian_driver.robot.services.service_calls import MAX_TOOL_OFFSET
 from ur_cartesian_driver.sim.command_line.simulator_options import parsed, six_numbers
 
@@ -43,22 +42,33 @@ def code_output(text: str) -> tuple[str, CodeOutput]:
 
 def day(text: str) -> str:
     """Return a date, YYYY-MM-DD."""
-    try:
-        return date.fromisoformat(text).isoformat()
-    except ValueError:
-        raise argparse.ArgumentTypeError(f'{text} is no date; write it as YYYY-MM-DD') from None
+    return parsed(checked_day, text)
 
 
 def software(text: str) -> str:
     """Return a version of the controller's software."""
-    if re.fullmatch(r'\d+(\.\d+){1,3}', text) is None:
-        raise argparse.ArgumentTypeError(f'{text} is no version; write it like 5.21 or 5.21.0')
-    return text
+    return parsed(checked_software, text)
 
 
 def pose(text: str) -> Pose:
     """Return the pose of six numbers [m], [rad]."""
     return Pose.from_rotation_vector(six_numbers(text, (MAX_TOOL_OFFSET, MAX_JOINT_VALUE)))
+
+
+def box(text: str) -> tuple[float, ...]:
+    """Return the least and greatest coordinates of a box [m]."""
+    return six_numbers(text, (MAX_OFFSET, MAX_OFFSET))
+
+
+def experiments(text: str) -> tuple[str, ...]:
+    """Return the names of experiments, separated by commas."""
+    from ur_cartesian_driver.identification.law_experiments import LAW_EXPERIMENTS
+
+    known = [each.name for each in LAW_EXPERIMENTS]
+    for name in text.split(','):
+        if name not in known:
+            raise argparse.ArgumentTypeError(f'{name!r} is none of {", ".join(known)}')
+    return tuple(text.split(','))
 
 
 def offsets(text: str) -> tuple[float, ...]:

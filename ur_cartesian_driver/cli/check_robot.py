@@ -43,8 +43,8 @@ def check_robot(arguments: argparse.Namespace) -> int:
     """Check a robot, write the report, and return the exit status."""
     if arguments.with_motion and not sys.stdin.isatty():
         raise ValueError('--with-motion asks before each motion, so it needs a terminal.')
-    address = RobotAddress(host=arguments.robot_ip, **fields_from(arguments, RobotAddress))
-    findings = asyncio.run(_observe(address, arguments.seconds))
+    address = address_of(arguments)
+    findings = asyncio.run(observe_and_show(address, arguments.seconds))
     recordings: dict[str, MotionSamples] = {}
     if arguments.with_motion:
         findings += experiment_findings(address, findings, ask, recordings)
@@ -54,7 +54,12 @@ def check_robot(arguments: argparse.Namespace) -> int:
     return exit_status(findings)
 
 
-async def _observe(address: RobotAddress, seconds: float) -> list[Finding]:
+async def observe_and_show(address: RobotAddress, seconds: float) -> list[Finding]:
+    """
+    Return the findings about a robot; print each as it comes.
+
+    :param seconds: duration of the recording of the RTDE stream [s].
+    """
     findings = []
     async for finding in observe(address, seconds):
         show(finding)
@@ -119,6 +124,11 @@ def _experiment(
         return [problem(experiment.check, f'Not finished: {error}')]
     recordings[experiment.check] = samples
     return [analyse(samples) for analyse in experiment.analyses]
+
+
+def address_of(arguments: argparse.Namespace) -> RobotAddress:
+    """Return the address of the robot in the options."""
+    return RobotAddress(host=arguments.robot_ip, **fields_from(arguments, RobotAddress))
 
 
 def ask(motion: str) -> bool:

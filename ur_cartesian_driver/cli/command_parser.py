@@ -603,9 +603,35 @@ def _add_identify(command: CommandParser) -> None:
     command.set_defaults(run=identify_command.identify)
     command.add_argument(
         'recordings',
-        nargs='+',
+        nargs='*',
         metavar='RECORDING',
         help='recordings of one arm: .npz or .part of the driver, or text with titles of RTDE',
+    )
+    live = command.add_argument_group('or a robot that shall move', 'each motion is asked for')
+    live.add_argument('--robot-ip', default='', metavar='ADDRESS', help='address of the robot')
+    add_ports(command, 'its port', rtde=30004, primary=30001, dashboard=29999, robot_api=80)
+    live.add_argument(
+        '--box',
+        type=argument_types.box,
+        metavar='X,Y,Z,X,Y,Z',
+        help='least and greatest coordinates of the TCP in the base of the robot [m]',
+    )
+    live.add_argument(
+        '--max-speed', type=argument_types.factor, metavar='SPEED', help='of the TCP [m/s]'
+    )
+    live.add_argument(
+        '--only',
+        type=argument_types.experiments,
+        metavar='NAMES',
+        help='of these experiments, separated by commas; without it all of them',
+    )
+    live.add_argument(
+        '--folder', default='identification', help='new folder for recordings and progress'
+    )
+    live.add_argument(
+        '--yes',
+        action='store_true',
+        help='do not ask before moves; stops and pauses are asked for all the same',
     )
     command.add_argument(
         '--commands',
@@ -617,7 +643,7 @@ def _add_identify(command: CommandParser) -> None:
         '-o', '--output', default='', metavar='FILE', help='twin to write, such as twin.yaml'
     )
     arm = command.add_argument_group('the arm', 'where the recordings do not name it')
-    arm.add_argument('--model', default='', help='such as ur5e')
+    arm.add_argument('--model', default='', choices=sorted(MODELS), help='model of the robot')
     arm.add_argument('--serial-number', default='', metavar='NUMBER', help='of the arm')
     arm.add_argument(
         '--software',
@@ -678,7 +704,7 @@ COMMANDS: dict[str, tuple[str, Callable[[CommandParser], None]]] = {
         _add_check_robot,
     ),
     'identify': (
-        'estimate the laws of motion of the arm that made recordings, each with an interval',
+        'estimate the laws of motion of an arm, from recordings or by short motions that it makes',
         _add_identify,
     ),
     'plot': ('draw a recorded motion: path, deviation, speed, lag, outputs and events', _add_plot),

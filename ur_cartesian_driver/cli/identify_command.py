@@ -8,10 +8,12 @@ import argparse
 from dataclasses import fields
 from datetime import date
 from pathlib import Path
+import sys
 
 from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.identification.arm_samples import read_samples
 from ur_cartesian_driver.identification.estimators import Result, Unknown
+from ur_cartesian_driver.identification.identify import Identification
 from ur_cartesian_driver.identification.identify import identify as identify_laws
 from ur_cartesian_driver.identification.recorded_calls import MotionCommand, read_commands
 from ur_cartesian_driver.motion.twin.laws import LAWS
@@ -21,6 +23,10 @@ from ur_cartesian_driver.motion.twin.twin_file import twin_text
 
 def identify(arguments: argparse.Namespace) -> int:
     """Print each law with its interval, or why it was not identified; write the twin."""
+    if bool(arguments.recordings) == bool(arguments.robot_ip):
+        raise ValueError('give either recordings, or the robot that shall move: --robot-ip')
+    if arguments.robot_ip:
+        return _identify_live(arguments)
     paths = [Path(name) for name in arguments.recordings]
     arm = _arm(paths, arguments)
     if arguments.output and not arm.model:
@@ -30,7 +36,27 @@ def identify(arguments: argparse.Namespace) -> int:
     if arguments.commands:
         text = Path(arguments.commands).read_text(encoding='utf-8', errors='replace')
         calls = read_commands(text, arguments.commands)
-    found = identify_laws(recordings, calls, arguments.commands)
+    _show_and_write(identify_laws(recordings, calls, arguments.commands), arm, paths, arguments)
+    return 0
+
+
+def _identify_live(arguments: argparse.Namespace) -> int:
+    """Let the robot move, and identify what it showed; 1 if a surprise ended that."""
+    from ur_cartesian_driver.cli.identify_live import CALLS, record
+
+    live = record(arguments)
+    if live.samples:
+        arm = _merged(_asked(arguments), live.arm, arguments.robot_ip)
+        names = [Path(samples.name) for samples in live.samples]
+        _show_and_write(identify_laws(live.samples, live.commands, CALLS), arm, names, arguments)
+    if live.surprise:
+        print(f'The experiments ended early: {live.surprise}.', file=sys.stderr)
+    return int(bool(live.surprise))
+
+
+def _show_and_write(
+    found: Identification, arm: ArmIdentity, paths: list[Path], arguments: argparse.Namespace
+) -> None:
     print(found.summary())
     for name, result in found.results.items():
         print(f'{name:<26} {_described(name, result)}')
@@ -44,7 +70,6 @@ def identify(arguments: argparse.Namespace) -> int:
         )
         Path(arguments.output).write_text(twin_text(twin), encoding='utf-8')
         print(f'twin: {arguments.output}')
-    return 0
 
 
 def _described(name: str, result: Result) -> str:
@@ -60,12 +85,7 @@ def _arm(paths: list[Path], arguments: argparse.Namespace) -> ArmIdentity:
 
     :raises ValueError: the recordings, or an option, name different arms.
     """
-    arm = ArmIdentity(
-        model=arguments.model,
-        serial_number=arguments.serial_number,
-        software=arguments.software or '',
-        motion_version=arguments.motion_version,
-    )
+    arm = _asked(arguments)
     for path in paths:
         if not (path.is_dir() or path.suffix == '.npz'):
             continue
@@ -76,10 +96,26 @@ def _arm(paths: list[Path], arguments: argparse.Namespace) -> ArmIdentity:
             software=str(robot.get('polyscope_version') or ''),
             motion_version=int(robot.get('motion_version') or 0),
         )
-        if differences := arm.differences(own):
-            raise ValueError(
-                f'{path} is of another arm: {differences}; identify one arm at a time'
-            )
-        names = [each.name for each in fields(ArmIdentity)]
-        arm = ArmIdentity(**{name: getattr(arm, name) or getattr(own, name) for name in names})
+        arm = _merged(arm, own, str(path))
     return arm
+
+
+def _asked(arguments: argparse.Namespace) -> ArmIdentity:
+    return ArmIdentity(
+        model=arguments.model,
+        serial_number=arguments.serial_number,
+        software=arguments.software or '',
+        motion_version=arguments.motion_version,
+    )
+
+
+def _merged(arm: ArmIdentity, own: ArmIdentity, source: str) -> ArmIdentity:
+    """
+    Return what is known of an arm.
+
+    :raises ValueError: the source names another arm.
+    """
+    if differences := arm.differences(own):
+        raise ValueError(f'{source} is of another arm: {differences}; identify one arm at a time')
+    names = [each.name for each in fields(ArmIdentity)]
+    return ArmIdentity(**{name: getattr(arm, name) or getattr(own, name) for name in names})

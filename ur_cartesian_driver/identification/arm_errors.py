@@ -12,8 +12,8 @@ cycles of the controller, whatever packets are missing.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from math import exp, log, pi, sqrt
+from dataclasses import dataclass, replace
+from math import exp, hypot, log, pi, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.identification.arm_samples import ArmSamples
 from ur_cartesian_driver.identification.least_squares import Fit, fit, Measured, NOWHERE
 from ur_cartesian_driver.identification.segmentation import LONGEST_GAP, noise_of, REST_SPEED
-from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 
 Spectrum: TypeAlias = NDArray[np.complex128]
 
@@ -41,6 +41,8 @@ _LAG_START, _SETTLING_START, _DECAY_START, _FREQUENCIES = 7e-4, 0.02, 6.0, (5.0,
 _LONGEST_KERNEL, _SIZE_STEP = 2.5, 512
 #: Logarithm that no time or frequency has.
 _NO_BOUND = 9.0
+#: Parts of a cycle in which motions begin and end.
+_PARTS = 16
 #: Lags for autocovariances of squared third differences.
 _LAGS = 6
 
@@ -82,8 +84,9 @@ class _Grid:
 
     :param qd: (j, m) target speed [rad/s]; ``qdd``: (j, m) target acceleration [rad/s^2],
         of the cycles before and after each packet.
-    :param direction: (j, m) direction of the present or last motion; 0 before the first one.
-    :param moving: (j, m) mask.
+    :param turning: (j, m) mean direction in the cycle before each packet; 0 at rest.
+    :param turned: (j, m) mean direction of the last motion in that cycle; 0 in motion.
+    :param unmoved: (j, m) share of that cycle before the first motion.
     :param rows: (n,) cycle of each packet.
     :param error: (j, n) measured less target [rad].
     """
@@ -91,8 +94,9 @@ class _Grid:
     cycle: float
     qd: Floats
     qdd: Floats
-    direction: Floats
-    moving: Flags
+    turning: Floats
+    turned: Floats
+    unmoved: Floats
     rows: Indices
     error: Floats
 
@@ -104,15 +108,17 @@ def find_arm_errors(samples: ArmSamples) -> ArmErrors | None:
     :returns: None if no measured joints were recorded, none move, or there is too little data.
     """
     grid = _grid(samples)
-    if grid is None:
+    if grid is None or samples.actual_q is None:
         return None
     found = _best(grid)
     if found is None:
         return None
+    noise, static = noise_of(found.residuals), found.measured(_STATIC)
+    doubt = _rest_doubt(grid, resolution_of(samples.actual_q), noise)
     return ArmErrors(
         lag=found.measured(_LAG),
         friction=found.measured(_FRICTION),
-        static_error=found.measured(_STATIC),
+        static_error=replace(static, error=hypot(static.error, doubt)),
         acceleration_error=found.combination({_BEND: 1.0, _BEND_LATER: 1.0}),
         ringing_frequency=_exponential(found, _FREQUENCY),
         ringing_decay=_exponential(found, _DECAY),
@@ -120,8 +126,26 @@ def find_arm_errors(samples: ArmSamples) -> ArmErrors | None:
         cycle=grid.cycle,
         joints=len(grid.qd),
         rms=found.rms,
-        noise=noise_of(found.residuals),
+        noise=noise,
     )
+
+
+def _rest_doubt(grid: _Grid, resolution: float, noise: float) -> float:
+    """
+    Return the error of the static error by the resolution of joints at rest [rad].
+
+    A joint that moves passes all steps of its encoder. One that rests keeps the error of its place
+    between two steps, however long it rests: evenly distributed noise of the width w leaves
+    r^2/(sqrt(180) w) of a step r, root mean square (its Fourier series, each term at its largest).
+
+    :param noise: standard deviation of measured positions, with the resolution [rad].
+    """
+    width = sqrt(max(12.0 * noise**2 - resolution**2, 0.0))
+    left = min(resolution / sqrt(12.0), resolution**2 / max(sqrt(180.0) * width, 1e-12))
+    rests = np.abs(grid.turned) == 1.0
+    edges = np.diff(np.pad(rests.astype(np.int8), ((0, 0), (1, 1))), axis=1)
+    lengths = np.nonzero(edges == -1)[1] - np.nonzero(edges == 1)[1]
+    return left * float(np.linalg.norm(lengths)) / max(int(lengths.sum()), 1)
 
 
 def _exponential(found: Fit, parameter: int) -> Measured:
@@ -149,19 +173,70 @@ def _grid(samples: ArmSamples) -> _Grid | None:
     cycles = np.arange(rows[-1] + 1)
     q = np.stack([np.interp(cycles, rows, target[:, joint]) for joint in moves])
     step = np.diff(q, axis=1, prepend=q[:, :1], append=q[:, -1:]) / cycle
-    qd = 0.5 * (step[:, 1:] + step[:, :-1])
-    moving = np.abs(qd) > REST_SPEED
-    last = np.maximum.accumulate(np.where(moving, cycles, -1), axis=1)
-    direction = np.where(last < 0, 0.0, np.take_along_axis(np.sign(qd), np.maximum(last, 0), 1))
+    turning, turned, unmoved = _directions(step)
     return _Grid(
         cycle=cycle,
-        qd=qd,
+        qd=0.5 * (step[:, 1:] + step[:, :-1]),
         qdd=np.diff(step, axis=1) / cycle,
-        direction=direction,
-        moving=moving,
+        turning=turning,
+        turned=turned,
+        unmoved=unmoved,
         rows=rows,
         error=(actual - target)[:, moves].T,
     )
+
+
+def _directions(step: Floats) -> tuple[Floats, Floats, Floats]:
+    """
+    Return the mean directions in motion and at rest (j, m), and the share before the first motion.
+
+    Motions begin and end within cycles. To count them in whole cycles would delay the friction by
+    up to a cycle, and make it look larger, above all at 125 Hz.
+
+    :param step: (j, m + 1) mean speed between packets [rad/s].
+    """
+    ends = _end_speeds(step)
+    before, after, mean = ends[:, :-1], ends[:, 1:], step[:, 1:-1]
+    # The speed changes evenly within a share of the cycle, at the end at which it is faster.
+    change = np.where(after == before, 1.0, after - before)
+    rises = np.abs(after) > np.abs(before)
+    off = np.where(rises, mean - before, after - mean)
+    share = np.clip(2.0 * off / change, 1.0 / _PARTS, 1.0)[:, :, None]
+    u = (np.arange(_PARTS) + 0.5) / _PARTS
+    passed = np.where(rises[:, :, None], (u - 1.0) / share + 1.0, u / share)
+    speed = before[:, :, None] + np.clip(passed, 0.0, 1.0) * change[:, :, None]
+    speed = np.where((after == before)[:, :, None], before[:, :, None], speed)
+    shape = len(step), -1, _PARTS
+    fine = speed.reshape(len(step), -1)
+    moving = np.abs(fine) > REST_SPEED
+    last = np.maximum.accumulate(np.where(moving, np.arange(fine.shape[1]), -1), axis=1)
+    sign = np.sign(np.take_along_axis(fine, np.maximum(last, 0), 1))
+    parts = (
+        np.where(moving, np.sign(fine), 0.0),
+        np.where(moving | (last < 0), 0.0, sign),
+        (last < 0).astype(np.float64),
+    )
+    # In front of the first packet the joint rests.
+    turning, turned, unmoved = (
+        np.pad(part.reshape(shape).mean(axis=2), ((0, 0), (1, 0)), 'edge') for part in parts
+    )
+    return turning, turned, unmoved
+
+
+def _end_speeds(step: Floats) -> Floats:
+    """Return the speeds at packets (j, m), from the side on which the acceleration is even."""
+    padded = np.pad(step, ((0, 0), (2, 2)), 'edge')
+    bend = np.abs(np.diff(padded, 2, axis=1))
+    count = step.shape[1] - 1
+    left = 1.5 * padded[:, 2 : 2 + count] - 0.5 * padded[:, 1 : 1 + count]
+    right = 1.5 * padded[:, 3 : 3 + count] - 0.5 * padded[:, 4 : 4 + count]
+    is_left = bend[:, :count] < bend[:, 3 : 3 + count]
+    # Beyond an end, a line through the speeds has the other sign.
+    beside = 2.0 * np.stack([step[:, :-1], step[:, 1:], np.zeros_like(left)])
+    speeds: Floats = np.clip(
+        np.where(is_left, left, right), beside.min(axis=0), beside.max(axis=0)
+    )
+    return speeds
 
 
 class _Model:
@@ -179,15 +254,9 @@ class _Model:
         self._kernel_length = min(count, round(_LONGEST_KERNEL / grid.cycle))
         self._size = -(-(count + self._kernel_length) // _SIZE_STEP) * _SIZE_STEP
         # A drag that has rested at 1 for long differs from it by the travel since.
-        unmoved = (grid.direction == 0.0).astype(np.float64)
         self._speed = self._spectrum(-grid.qd)
         self._inputs = [
-            self._spectrum(each)
-            for each in (
-                -grid.direction * grid.moving,
-                -grid.direction * ~grid.moving,
-                unmoved - 1.0,
-            )
+            self._spectrum(each) for each in (-grid.turning, -grid.turned, grid.unmoved - 1.0)
         ]
         # Differences of packets, and even changes between them, each take (w cycle)^2 / 12 of an
         # acceleration that swings with w; its own differences give that back.

@@ -9,6 +9,7 @@ import gzip
 from pathlib import Path
 import re
 from typing import IO
+import warnings
 import zlib
 
 import numpy as np
@@ -100,12 +101,10 @@ def _from_text(file: IO[str], path: Path) -> ArmSamples:
     groups = _wanted_columns(places, path)
     wanted = [name for group in groups.values() for name in group]
     try:
-        rows = np.loadtxt(
-            file,
-            delimiter=delimiter,
-            usecols=[places[name] for name in wanted],
-            ndmin=2,
-        )
+        with warnings.catch_warnings(action='ignore', category=UserWarning):  # about no rows
+            rows = np.loadtxt(
+                file, delimiter=delimiter, usecols=[places[name] for name in wanted], ndmin=2
+            )
     except ValueError as error:
         text = str(error).partition(';')[0].rstrip('.')
         raise ValueError(f'{path} is damaged below its titles: {text}') from None
@@ -171,13 +170,9 @@ def _checked(samples: ArmSamples, path: Path) -> ArmSamples:
     time = samples.time
     if len(time) < MIN_ROWS:
         raise ValueError(f'{path} is too short: it has {len(time)} packets, not {MIN_ROWS}')
-    columns = {name: getattr(samples, name) for name in _FORMS}
+    columns: dict[str, Floats | None] = {name: getattr(samples, name) for name in _FORMS}
     for name, values in columns.items():
-        if values is not None and not np.isfinite(values).all():
-            row = int(np.flatnonzero(~np.isfinite(values.reshape(len(time), -1)).all(axis=1))[0])
-            if name in ('time', 'target_q'):
-                raise ValueError(f'{path} is damaged: packet {row + 1} has no number in {name}')
-            columns[name] = None
+        columns[name] = _numbers(name, values, path)
     back = np.flatnonzero(np.diff(time) < 0.0)
     if len(back):
         row = int(back[0])
@@ -188,5 +183,18 @@ def _checked(samples: ArmSamples, path: Path) -> ArmSamples:
     new = np.concatenate([[True], np.diff(time) > 0.0])
     if new.sum() < MIN_ROWS:
         raise ValueError(f'{path} is damaged: its time stands still')
-    kept = {name: None if values is None else values[new] for name, values in columns.items()}
-    return ArmSamples(name=samples.name, **kept)  # type: ignore[arg-type]  # time is never None
+    kept = {name: values[new] for name, values in columns.items() if values is not None}
+    return ArmSamples(name=samples.name, **kept)
+
+
+def _numbers(name: str, values: Floats | None, path: Path) -> Floats | None:
+    """Return a column; None if the robot did not report it. A column with holes is damaged."""
+    if values is None or np.isfinite(values).all():
+        return values
+    if name not in ('time', 'target_q') and np.isnan(values).all():
+        return None
+    packet = int(np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1))[0])
+    raise ValueError(
+        f'{path} is damaged: packet {packet + 1} has no number in {name}; remove that packet, or '
+        'record again'
+    )

@@ -19,7 +19,12 @@ import numpy as np
 from ur_cartesian_driver.identification.arm_errors import find_arm_errors, find_noise
 from ur_cartesian_driver.identification.arm_samples import ArmSamples
 from ur_cartesian_driver.identification.geometry import Kind
-from ur_cartesian_driver.identification.least_squares import combined, Measured, student
+from ur_cartesian_driver.identification.least_squares import (
+    combined,
+    correlated_mean,
+    Measured,
+    student,
+)
 from ur_cartesian_driver.identification.moves import FoundMove
 from ur_cartesian_driver.identification.profile import find_profile, Misfit, Profile
 from ur_cartesian_driver.identification.segmentation import Ending
@@ -116,10 +121,15 @@ def _translation_leads(move: FoundMove) -> bool:
 
 
 def left_out(moves: Sequence[FoundMove], kind: Kind) -> tuple[Result, Result]:
-    """Find acceleration and speed of moves of a kind whose call left both out."""
+    """
+    Find acceleration and speed of moves of a kind whose call left both out.
+
+    A line whose turn leads has neither of them; whether it leads depends on the turn ratio.
+    """
     call = 'movej' if kind is Kind.JOINT else 'movel'
     names = _LEFT_OUT[kind]
-    accelerations, speeds, profiles, odd, quotients = [], [], [], 0, []
+    accelerations, speeds, profiles, quotients = [], [], [], []
+    odd = turning = 0
     for move in moves:
         command = move.command
         if command is None or command.name != call or move.kind is not kind:
@@ -128,8 +138,8 @@ def left_out(moves: Sequence[FoundMove], kind: Kind) -> tuple[Result, Result]:
             continue
         if not isinstance(move.profile, Profile):
             odd += isinstance(move.profile, Misfit)
-        elif kind is Kind.LINE and move.travel.line is None:
-            continue
+        elif kind is Kind.LINE and _turn_may_lead(move):
+            turning += 1
         elif command.t is not None:
             quotients += [move.profile.speed_squared_by_acceleration]
         else:
@@ -140,6 +150,8 @@ def left_out(moves: Sequence[FoundMove], kind: Kind) -> tuple[Result, Result]:
     known = [quotient for quotient in quotients if quotient is not None]
     if odd:
         reason = f'{_plural(odd, call)} without a and v followed no law that is known'
+    elif turning:
+        reason = f'{_plural(turning, call)} turned the tool so far that the turn may lead'
     elif known:
         whole = combined(known)
         reason = (
@@ -154,6 +166,14 @@ def left_out(moves: Sequence[FoundMove], kind: Kind) -> tuple[Result, Result]:
     )
 
 
+def _turn_may_lead(move: FoundMove) -> bool:
+    """Return whether the turn of a line leads by the least turn ratio that there is."""
+    line, turn = move.travel.line, move.travel.turn
+    if line is None:
+        return True
+    return turn is not None and float(np.ptp(turn)) > LAWS['turn_ratio'].low * float(np.ptp(line))
+
+
 _LEFT_OUT = {
     Kind.JOINT: ('timed_joint_acceleration', 'timed_joint_speed'),
     Kind.LINE: ('timed_linear_acceleration', 'timed_linear_speed'),
@@ -161,29 +181,50 @@ _LEFT_OUT = {
 
 
 def idle_between_moves(moves: Sequence[FoundMove]) -> Result:
-    """Find the time between the end of a move and the beginning of the next one in a chain."""
-    gaps, profiles = [], []
+    """
+    Find the time between the end of a move and the beginning of the next one in a chain.
+
+    The move between two gaps bounds both: where it seems to begin late it seems to end early, so
+    their errors are correlated.
+    """
+    chains: list[list[Profile]] = []
+    last: FoundMove | None = None
     for before, after in pairwise(moves):
-        if before.samples is not after.samples or not after.piece.chained:
+        if before.samples is not after.samples:
+            continue
+        if not after.piece.directly_follows(before.piece):
             continue
         if not (isinstance(before.profile, Profile) and isinstance(after.profile, Profile)):
             continue
-        end, begin = before.profile.end, after.profile.begin
-        gaps.append(
-            Measured(
-                value=begin.value - end.value,
-                error=sqrt(begin.error**2 + end.error**2),
-                freedom=min(begin.freedom, end.freedom),
-            )
+        if before is last:
+            chains[-1].append(after.profile)
+        else:
+            chains.append([before.profile, after.profile])
+        last = after
+    gaps = [
+        correlated_mean(
+            [_gap(*pair) for pair in pairwise(chain)],
+            np.array([-each.begin_and_end for each in chain[1:-1]]),
         )
-        profiles += [before.profile, after.profile]
+        for chain in chains
+    ]
+    number = sum(len(chain) - 1 for chain in chains)
     return _result(
         'idle_between_moves',
         gaps,
-        f'{_plural(len(gaps), "pair")} of moves in a row',
+        f'{_plural(number, "pair")} of moves in a row',
         'no two moves in a row whose profiles are known',
         'record a program of three joint moves without blends',
-        left_over=_rms(profiles),
+        left_over=_rms([profile for chain in chains for profile in chain]),
+    )
+
+
+def _gap(before: Profile, after: Profile) -> Measured:
+    end, begin = before.end, after.begin
+    return Measured(
+        value=begin.value - end.value,
+        error=sqrt(begin.error**2 + end.error**2),
+        freedom=min(begin.freedom, end.freedom),
     )
 
 
@@ -343,7 +384,11 @@ def _result(
             reason=f'it came out as {whole.value:.3g} {law.unit}; it {law.problem(whole.value)}',
             experiment=experiment,
         )
-    low, high = min(max(low, law.low), value), max(min(high, law.high), value)
+    # At a bound of the law the estimate itself may lie beyond it.
+    low, high = min(low, value), max(high, value)
+    if low < law.low:
+        low, high = law.low, max(high, law.low + whole.half_width)
+    high = min(high, law.high)
     return Estimate(value=value, interval=(low, high), evidence=evidence, left_over=left_over)
 
 

@@ -51,14 +51,14 @@ class Identification:
         if kinds[Kind.OTHER]:
             parts.append(f'{kinds[Kind.OTHER]} of another shape (not used)')
         count = len(self.moves)
-        odd = [move for move in self.moves if isinstance(move.profile, Misfit)]
         text = f'{count} move{"s" * (count != 1)}: {", ".join(parts)}.' if parts else 'No moves.'
-        for move in odd:
-            rms = 1e6 * move.profile.rms  # type: ignore[union-attr]  # only misfits
-            text += (
-                f'\nThe move at {move.samples.time[move.piece.moving[0]]:.2f} s of '
-                f'{move.samples.name} is no trapezoid: {rms:.3g} um or urad are left.'
-            )
+        for move in self.moves:
+            if isinstance(move.profile, Misfit):
+                text += (
+                    f'\nThe move at {move.samples.time[move.piece.moving[0]]:.2f} s of '
+                    f'{move.samples.name} is no trapezoid: {1e6 * move.profile.rms:.3g} um or '
+                    'urad are left.'
+                )
         return text
 
 

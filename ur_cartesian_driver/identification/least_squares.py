@@ -25,6 +25,8 @@ TARGET_FLOOR = 1e-8
 #: What a model returns for parameters that it cannot have; finite, so that it can be filtered.
 NOWHERE = 1e6
 _ORDER = 2
+#: Largest share of the noise that a fit is taken to have removed.
+_MAX_TAKEN = 0.1
 _ITERATIONS, _MIN_GAIN, _MAX_DAMPING = 60, 1e-4, 1e12
 #: Quantiles of Student's t for 95 % with 1, 2, 3 degrees of freedom; of the normal distribution.
 _FEW, _NORMAL = (12.7062, 4.3027, 3.1824), 1.959964
@@ -69,13 +71,20 @@ class Fit:
 
     def combination(self, weights: dict[int, float]) -> Measured:
         """Return a linear combination of parameters with its standard error."""
-        row = np.zeros(len(self.parameters))
-        row[list(weights)] = list(weights.values())
         return Measured(
-            value=float(row @ self.parameters),
-            error=sqrt(max(float(row @ self.covariance @ row), 0.0)),
+            value=float(self._row(weights) @ self.parameters),
+            error=sqrt(max(self.common(weights, weights), 0.0)),
             freedom=self.freedom,
         )
+
+    def common(self, one: dict[int, float], other: dict[int, float]) -> float:
+        """Return the covariance of two linear combinations of parameters."""
+        return float(self._row(one) @ self.covariance @ self._row(other))
+
+    def _row(self, weights: dict[int, float]) -> Floats:
+        row = np.zeros(len(self.parameters))
+        row[list(weights)] = list(weights.values())
+        return row
 
     @property
     def rms(self) -> float:
@@ -124,7 +133,7 @@ def fit(
             return None
         if variance <= floor**2:
             break  # What is left is rounding, with no process to describe.
-        phi = _autoregression(residuals, follows)
+        phi = _autoregression(residuals, follows, len(found))
     return Fit(parameters=found, covariance=covariance, residuals=residuals, freedom=freedom)
 
 
@@ -194,15 +203,35 @@ def _whitened(values: Floats, follows: Flags, phi: Floats) -> Floats:
     return filtered
 
 
-def _autoregression(residuals: Floats, follows: Flags) -> Floats:
-    """Return the coefficients (2,) of Yule and Walker; zeros if too few values are in a row."""
+def _autoregression(residuals: Floats, follows: Flags, fitted: int) -> Floats:
+    """
+    Return the coefficients (2,) of Yule and Walker; zeros if too few values are in a row.
+
+    A fit takes its own smooth share out of the noise: with each parameter, as much of every
+    autocovariance as the noise has at frequency 0, by the number of values. That is given back.
+
+    :param fitted: number of parameters.
+    """
     whole = follows[1:-1] & follows[2:]
     if whole.sum() < 20:
         return np.zeros(_ORDER)
     now, before, first = (part[whole] for part in (residuals[2:], residuals[1:-1], residuals[:-2]))
-    power = float(now @ now + before @ before + first @ first) / 3.0
-    r1 = 0.5 * float(now @ before + before @ first) / power
-    r2 = float(now @ first) / power
+    powers = np.array(
+        [
+            float(now @ now + before @ before + first @ first) / 3.0,
+            0.5 * float(now @ before + before @ first),
+            float(now @ first),
+        ]
+    )
+    phi = _yule_walker(powers)
+    at_rest = float(powers[0] - phi @ powers[1:]) / (1.0 - float(phi.sum())) ** 2
+    taken = min(fitted * at_rest / len(now), _MAX_TAKEN * float(powers[0]))
+    return _yule_walker(powers + taken)
+
+
+def _yule_walker(powers: Floats) -> Floats:
+    """Return the coefficients (2,) of a process with autocovariances (3,)."""
+    r1, r2 = (powers[1:] / powers[0]).tolist()
     r1 = min(max(r1, -0.98), 0.98)
     second = min(max((r2 - r1 * r1) / (1.0 - r1 * r1), -0.98), 0.98)
     return np.array([r1 * (1.0 - second), second])
@@ -219,6 +248,23 @@ def student(freedom: float) -> float:
         (3.0 * z**7 + 19.0 * z**5 + 17.0 * z**3 - 15.0 * z) / 384.0,
     )
     return z + sum(term / freedom**i for i, term in enumerate(terms, 1))
+
+
+def correlated_mean(parts: Sequence[Measured], common: Floats) -> Measured:
+    """
+    Return the best mean of measurements of one number whose errors are correlated.
+
+    :param common: (n - 1,) covariance of each measurement with the next one.
+    """
+    covariance = np.diag([part.error**2 for part in parts])
+    covariance = covariance + np.diag(common, 1) + np.diag(common, -1)
+    weights = np.linalg.solve(covariance, np.ones(len(parts)))
+    values = np.array([part.value for part in parts])
+    return Measured(
+        value=float(weights @ values / weights.sum()),
+        error=float(weights.sum() ** -0.5),
+        freedom=sum(part.freedom for part in parts),
+    )
 
 
 def combined(parts: Sequence[Measured]) -> Measured:

@@ -87,8 +87,8 @@ def join_commands(
     own = [move for move in moves if not move.piece.resumed]
     if len(own) != len(commands):
         raise ValueError(
-            f'{name} has {len(commands)} calls of movej and movel, but the recordings show '
-            f'{len(own)} moves; write one call for each, in the order of the recordings'
+            f'calls of movej and movel in {name}: {len(commands)}, moves in the recordings: '
+            f'{len(own)}; write one call for each move, in the order of the recordings'
         )
     joined = iter(commands)
     found = []

@@ -49,6 +49,7 @@ class Profile:
     :param step: time from change to change of the rate in the start [s]; 0 = it changes evenly.
     :param begin: time at which it sets out, by the controller's clock [s].
     :param end: time at which it arrives [s].
+    :param begin_and_end: covariance of both [s^2].
     :param speed_squared_by_acceleration: v^2/a, which stays the same in a stretched move.
     """
 
@@ -59,6 +60,7 @@ class Profile:
     step: float
     begin: Measured
     end: Measured
+    begin_and_end: float
     speed_squared_by_acceleration: Measured | None
     fit: Fit
 
@@ -96,12 +98,6 @@ def trapezoid_travel(t: Floats, length: float, acceleration: float, speed: float
         np.where(left < v / a, length - 0.5 * a * left * left, v * (up - 0.5 * v / a)),
     )
     return travel
-
-
-def trapezoid_time(length: float, acceleration: float, speed: float) -> float:
-    """Return the time of a trapezoid from rest to rest [s]."""
-    v = min(speed, sqrt(length * acceleration))
-    return length / v + v / acceleration
 
 
 def find_profile(
@@ -240,7 +236,7 @@ class _Found:
         weights |= {last: 0.5} if self.has_start else {}
         begin = self.fit.measured(_ONSET)
         lost = 0.5 * (self.start.value - self.step) if self.has_start else 0.0
-        whole = trapezoid_time(length, a, v) + lost
+        whole = length / v + v / a + lost
         error = self.fit.combination(weights).error
         acceleration, freedom = self.fit.measured(_ACCELERATION), self.fit.freedom
         squared = speed = None
@@ -255,6 +251,7 @@ class _Found:
             step=self.step,
             begin=_moved(begin, origin),
             end=Measured(value=origin + begin.value + whole, error=error, freedom=freedom),
+            begin_and_end=self.fit.common({_ONSET: 1.0}, weights),
             speed_squared_by_acceleration=squared,
             fit=self.fit,
         )

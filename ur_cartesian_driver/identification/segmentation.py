@@ -46,6 +46,7 @@ class Piece:
     :param begin: first row; rest before it, if any, is included.
     :param end: row after the last one; rest behind it, if any, is included.
     :param moving: first and last row in which the target moves.
+    :param number: place among all pieces of the recording, also those that are left out.
     :param chained: whether another piece precedes it within :data:`CHAIN_TIME`.
     :param ending: None = it came to its end, or the recording does not tell.
     :param resumed: whether it is the rest of a move that was paused or stopped.
@@ -55,10 +56,15 @@ class Piece:
     begin: int
     end: int
     moving: tuple[int, int]
+    number: int
     chained: bool
     ending: Ending | None
     resumed: bool
     slowed: bool
+
+    def directly_follows(self, before: Piece) -> bool:
+        """Return whether no other piece lies between this one and one in a chain before it."""
+        return self.chained and self.number == before.number + 1
 
 
 def pieces(samples: ArmSamples) -> list[Piece]:
@@ -77,9 +83,8 @@ def pieces(samples: ArmSamples) -> list[Piece]:
         after = cuts[k + 1][0] if k + 1 < len(cuts) else len(speed)
         if end - begin < _FEWEST_ROWS or _has_long_gap(samples.time[begin : end + 1]):
             continue
-        found.append(
-            _piece(samples, (begin, end), (before, after), (place > 0, place + 1 < count))
-        )
+        cut = place > 0, place + 1 < count
+        found.append(_piece(samples, k, (begin, end), (before, after), cut))
     return found
 
 
@@ -135,7 +140,11 @@ def _split(time: Floats, speed: Floats, begin: int, last: int) -> list[tuple[int
 
 
 def _piece(
-    samples: ArmSamples, moving: tuple[int, int], beside: tuple[int, int], cut: tuple[bool, bool]
+    samples: ArmSamples,
+    number: int,
+    moving: tuple[int, int],
+    beside: tuple[int, int],
+    cut: tuple[bool, bool],
 ) -> Piece:
     """
     Make a piece of the steps that move.
@@ -156,6 +165,7 @@ def _piece(
         begin=low,
         end=max(high, low),
         moving=(begin, end),
+        number=number,
         chained=bool(pause < CHAIN_TIME),
         ending=ending,
         resumed=_is_resumed(samples, begin),

@@ -8,13 +8,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal, Protocol
 
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes
 from ur_cartesian_driver.motion.goal.field_table import Range
 from ur_cartesian_driver.motion.goal.goal import IOCommand
 from ur_cartesian_driver.motion.goal.leads import Lead, with_lead_times
 from ur_cartesian_driver.motion.goal.output_names import parse_safe_outputs
 from ur_cartesian_driver.motion.goal.parameter_fields import check_parameters, Detected
-from ur_cartesian_driver.motion.twin.laws import MotionLaws
+from ur_cartesian_driver.motion.twin.laws import ASSUMED_LAWS, MotionLaws
 from ur_cartesian_driver.motion.twin.twin import ArmIdentity, laws_of, Twin, UNKNOWN_ARM
 from ur_cartesian_driver.motion.twin.twin_file import read_twin, TwinFileError
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
@@ -264,8 +265,19 @@ class PlanningOptions:
 
     @property
     def laws(self) -> MotionLaws:
-        """The laws by which the robot moves: measured, or else assumed."""
-        return laws_of(self.used_twin, self.turn_ratio)
+        """
+        The laws by which the robot moves: measured, or else assumed.
+
+        Begin and speed of a blend belong to its curve: if that is unknown, all three are assumed.
+        """
+        laws = laws_of(self.used_twin, self.turn_ratio)
+        if laws.blend_shape != 'unknown':
+            return laws
+        return replace(
+            laws,
+            blend_begin=ASSUMED_LAWS.blend_begin,
+            blend_speed_ratio=ASSUMED_LAWS.blend_speed_ratio,
+        )
 
     def lead_times(self, commands: Sequence[IOCommand]) -> tuple[IOCommand, ...]:
         """
@@ -309,14 +321,19 @@ def _read_twin(path: str) -> Twin | None:
     """
     Return the twin in a file; '' = none.
 
-    :raises ValueError: the file cannot be read, or is no twin.
+    :raises ValueError: the file cannot be read, or is no twin of a known model.
     """
     if not path:
         return None
     try:
-        return read_twin(path)
+        twin = read_twin(path)
     except OSError as error:
         reason = error.strerror or error
         raise ValueError(f'twin_file is {path!r}, which cannot be read: {reason}.') from None
     except TwinFileError as error:
         raise ValueError(f'twin_file: {error}') from None
+    try:
+        robot_model(twin.arm.model)
+    except ValueError as error:
+        raise ValueError(f'twin_file: {path}, arm: {error}') from None
+    return twin

@@ -120,11 +120,11 @@ class Controller:
         self.arm = Arm(config.robot_model, config.geometry)
         self.motion = MotionGenerator(self.arm, self.cycle, config.q, config.laws)
         self.motion.motion_version = config.motion_version
-        self.motion.second_version = config.second_motion_version
+        self.motion.second_version = config.second_version_laws
         #: The bodies that the tool can touch, and the compliance of the arm.
         self.contact = ContactMotion(self.motion, config.contact_bodies)
         #: The measured motion, which equals the targets unless something disturbs the arm.
-        self.actual = ActualMotion(self.motion, config.imperfections, self.contact)
+        self.actual = ActualMotion(self.motion, config.arm_imperfections, self.contact)
         self.sockets = MemorySockets() if sockets is None else sockets
         self.io = ControllerIo()
         for channel in config.inputs:

@@ -104,7 +104,7 @@ def _actual_acceleration(controller: Controller) -> Vector6:
 
 def _target_currents(controller: Controller) -> Vector6:
     """Return the joint currents [A] without noise; only an imperfect arm has currents."""
-    imperfections = controller.config.imperfections
+    imperfections = controller.config.arm_imperfections
     return imperfections.holding_current if imperfections and _powered(controller) else ZERO6
 
 

@@ -85,8 +85,8 @@ class SimulatorConfig:
     #: movec, movep and optimovel use 1.
     turn_ratio: float = ASSUMED_LAWS.turn_ratio
     #: Measured laws, by which this robot moves; laws that were not measured are assumed. They
-    #: take the place of ``turn_ratio``, of figures of ``imperfections`` and, in motion version 2,
-    #: of ``blend_fraction``. The twin must be of this model, software and motion version.
+    #: come before ``turn_ratio``, figures of ``imperfections`` and, in motion version 2,
+    #: ``blend_fraction``. The twin must be of this model, software and motion version.
     twin: Twin | None = None
     #: Motion version of movej and movel at the start, and of programs that are played: 1 or, from
     #: PolyScope 5.22 on, 2. Programs can set another one.
@@ -127,6 +127,8 @@ class SimulatorConfig:
     #: that requests more waits.
     answers: Sequence[object] = ()
     contact_bodies: tuple[ContactBody, ...] = field(init=False, default=())
+    #: ``imperfections`` with the figures of the twin.
+    arm_imperfections: Imperfections | None = field(init=False, default=None)
     #: Cycles after which a new thread of a program begins.
     thread_delay: int = 0
     #: Seed of random switches between the threads of a program; None = no random switches, so
@@ -200,10 +202,10 @@ class SimulatorConfig:
                 'use 5.22 or newer.'
             )
         if self.twin is not None:
-            self._take(self.twin)
+            self._check_twin(self.twin)
+        object.__setattr__(self, 'arm_imperfections', self._imperfections())
 
-    def _take(self, twin: Twin) -> None:
-        """Give the robot what a twin has beside the laws of motion."""
+    def _check_twin(self, twin: Twin) -> None:
         software = '.'.join(map(str, self.version[:3]))
         robot = ArmIdentity(
             model=self.model, software=software, motion_version=self.motion_version
@@ -213,12 +215,19 @@ class SimulatorConfig:
                 f'twin is of another robot: {differences}; set model, polyscope and '
                 'motion_version to those of the twin.'
             )
-        if figures := twin.arm_figures:
-            arm = self.imperfections or typical_imperfections(self.robot_model)
-            object.__setattr__(self, 'imperfections', replace(arm, **figures))
-        if self.motion_version == 2 and 'blend_begin' in twin.estimates:
-            version = replace(self.second_motion_version, blend_fraction=1.0)
-            object.__setattr__(self, 'second_motion_version', version)
+
+    def _imperfections(self) -> Imperfections | None:
+        if self.twin is None or not (figures := self.twin.arm_figures):
+            return self.imperfections
+        arm = self.imperfections or typical_imperfections(self.robot_model)
+        return replace(arm, **figures)
+
+    @property
+    def second_version_laws(self) -> SecondMotionVersion:
+        """Return ``second_motion_version`` with the blends of the twin."""
+        if self.twin is None or 'blend_begin' not in self.twin.estimates:
+            return self.second_motion_version
+        return replace(self.second_motion_version, blend_fraction=1.0)
 
     @property
     def serial_number(self) -> str:

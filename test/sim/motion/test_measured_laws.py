@@ -227,8 +227,9 @@ def test_figures_of_the_arm_make_it_imperfect():
     figures = {name: law.low + 1e-3 for name, law in LAWS.items() if law.assumed is None}
     assert set(figures) == set(ArmFigures.__dataclass_fields__)
     config = SimulatorConfig(twin=twin_of(**figures))
-    assert {name: getattr(config.imperfections, name) for name in figures} == figures
-    assert SimulatorConfig(twin=twin_of(start_time=0.1)).imperfections is None
+    assert {name: getattr(config.arm_imperfections, name) for name in figures} == figures
+    assert SimulatorConfig(twin=twin_of(start_time=0.1)).arm_imperfections is None
+    assert replace(config, twin=None) == SimulatorConfig()
 
 
 def test_a_twin_of_another_robot_is_refused():
@@ -252,6 +253,6 @@ def test_a_measured_begin_of_blends_takes_the_place_of_the_assumed_one_of_versio
     version: dict[str, Any] = {'polyscope': '5.22', 'motion_version': 2}
     plain = SimulatorConfig(**version, twin=replace(twin_of(start_time=0.1), arm=arm))
     measured = SimulatorConfig(**version, twin=replace(twin_of(blend_begin=0.7), arm=arm))
-    assert plain.second_motion_version.blend_fraction == 0.9
-    assert measured.second_motion_version.blend_fraction == 1.0
+    assert plain.second_version_laws.blend_fraction == 0.9
+    assert measured.second_version_laws.blend_fraction == 1.0
     assert measured.laws.blend_begin == 0.7

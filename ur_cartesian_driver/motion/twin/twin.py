@@ -6,7 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from datetime import date
 from math import isfinite
+import re
 from typing import Any
 
 from ur_cartesian_driver.motion.twin.laws import (
@@ -77,6 +79,30 @@ class ArmIdentity:
 
 UNKNOWN_ARM = ArmIdentity()
 
+
+def checked_software(text: str) -> str:
+    """
+    Return a version of the controller's software.
+
+    :raises ValueError: the text is none.
+    """
+    if re.fullmatch(r'\d+(\.\d+){1,3}', text) is None:
+        raise ValueError(f'{text} is no version; write it like 5.21 or 5.21.0')
+    return text
+
+
+def checked_day(text: str) -> str:
+    """
+    Return a date, YYYY-MM-DD.
+
+    :raises ValueError: the text is none.
+    """
+    try:
+        return date.fromisoformat(text).isoformat()
+    except ValueError:
+        raise ValueError(f'{text} is no date; write it as YYYY-MM-DD') from None
+
+
 #: Field of an identity -> its name in a sentence.
 _IDENTITY = {
     'model': 'model',
@@ -110,6 +136,8 @@ class Twin:
     estimates: Mapping[str, Estimate] = field(default_factory=dict)
     #: Laws that were not identified -> the reason, and the experiment that would do it.
     not_identified: Mapping[str, str] = field(default_factory=dict)
+    #: The laws of the controller: the measured ones, and the assumed for the rest.
+    laws: MotionLaws = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Refuse unknown laws and impossible values."""
@@ -121,11 +149,7 @@ class Twin:
                 raise ValueError(f'{name} is {estimate.value}; it {problem}.')
         if both := sorted(set(self.estimates) & set(self.not_identified)):
             raise ValueError(f'{both[0]} is estimated and not identified; remove one of them.')
-
-    @property
-    def laws(self) -> MotionLaws:
-        """Return the laws of the controller: the measured ones, and the assumed for the rest."""
-        return MotionLaws(**self._values(MotionLaws))
+        object.__setattr__(self, 'laws', MotionLaws(**self._values(MotionLaws)))
 
     @property
     def arm_figures(self) -> dict[str, Any]:

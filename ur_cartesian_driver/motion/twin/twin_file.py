@@ -28,16 +28,21 @@ A law that is left out is assumed. Every error names the line.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import date
 from difflib import get_close_matches
 from pathlib import Path
-import re
 from textwrap import indent
 from typing import Any, NoReturn, TYPE_CHECKING
 
 from ur_cartesian_driver.motion.twin.laws import Law, LAWS
-from ur_cartesian_driver.motion.twin.twin import ArmIdentity, Estimate, Twin
+from ur_cartesian_driver.motion.twin.twin import (
+    ArmIdentity,
+    checked_day,
+    checked_software,
+    Estimate,
+    Twin,
+)
 
 if TYPE_CHECKING:
     import yaml  # else with the first file: a simulator without one needs only numpy
@@ -50,7 +55,6 @@ _MAX_LENGTH = 1_000_000
 _HEAD = ('twin', 'arm', 'date', 'files')
 _ARM = ('model', 'serial_number', 'software', 'motion_version')
 _ESTIMATE = ('value', 'unit', 'interval', 'evidence', 'left_over')
-_SOFTWARE = re.compile(r'\d+(\.\d+){1,3}')
 
 
 class TwinFileError(ValueError):
@@ -152,10 +156,8 @@ class _Reader:
             self._refuse(
                 root, f'this is no twin: it has no field twin; it begins with twin: {FORMAT}'
             )
-        if version.value != str(FORMAT):
-            self._refuse(
-                version, f'twin is {version.value}, a format that is not known; use {FORMAT}'
-            )
+        if (number := self._text(version, 'twin')) != str(FORMAT):
+            self._refuse(version, f'twin is {number}, a format that is not known; use {FORMAT}')
         for key in ('arm', 'date'):
             if key not in entries:
                 self._refuse(root, f'{key} is missing, so the file may be cut off')
@@ -270,11 +272,8 @@ class _Reader:
         if 'model' not in entries:
             self._refuse(node, 'arm has no model, such as ur5e')
         texts = {key: self._text(entries[key], f'{key} of arm') for key in entries}
-        software = texts.get('software', '')
-        if software and not _SOFTWARE.fullmatch(software):
-            self._refuse(
-                entries['software'], f'software of arm is {software}; write it like 5.21 or 5.21.0'
-            )
+        if texts.get('software'):
+            self._checked(checked_software, entries['software'], texts['software'])
         version = texts.pop('motion_version', '0')
         if version not in ('0', '1', '2'):
             self._refuse(
@@ -284,11 +283,7 @@ class _Reader:
         return ArmIdentity(**texts, motion_version=int(version))
 
     def _date(self, node: yaml.Node) -> str:
-        text = self._text(node, 'date')
-        try:
-            return date.fromisoformat(text).isoformat()
-        except ValueError:
-            self._refuse(node, f'date is {text}; write it as YYYY-MM-DD')
+        return self._checked(checked_day, node, self._text(node, 'date'))
 
     def _files(self, node: yaml.Node | None) -> tuple[str, ...]:
         if node is None:
@@ -296,6 +291,12 @@ class _Reader:
         if _kind(node) != 'sequence':
             self._refuse(node, 'files must be a list of names')
         return tuple(self._text(item, 'a name in files') for item in node.value)
+
+    def _checked(self, check: Callable[[str], str], node: yaml.Node, text: str) -> str:
+        try:
+            return check(text)
+        except ValueError as error:
+            self._refuse(node, str(error))
 
     def _number(self, node: yaml.Node, what: str) -> float:
         text = self._text(node, what)

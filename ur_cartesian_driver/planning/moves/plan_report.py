@@ -16,7 +16,6 @@ from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometr
 from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.blend_limits import (
-    blend_law,
     BLEND_LAWS,
     blend_time_uncertainty,
     blends_are_measured,
@@ -94,8 +93,10 @@ def twin_remarks(options: PlanningOptions, timings: SegmentTimings) -> list[str]
     laws = [
         *['turn_ratio'] * bool(timings.requests.turn_leads_line.any()),
         *['idle_between_moves'] * bool(timings.requests.rests_between.any()),
-        *BLEND_LAWS[: 3 * bool((times.begin_rate > 0.0).any())],
+        *BLEND_LAWS[: 3 * bool((timings.requests.blends_by_law & (times.begin_rate > 0.0)).any())],
     ]
+    if options.laws.blend_shape == 'unknown':
+        laws = [name for name in laws if name not in BLEND_LAWS]
     if used and (measured := used.measured(*laws)):
         lines.append(f'planned as {measured_on(options)}: {measured}')
     return lines
@@ -109,9 +110,10 @@ def blend_remarks(
         return []
     planned, (least, greatest) = timings.durations.sum(), timings.bounds()
     off = max(planned - least.sum(), greatest.sum() - planned)
-    law = blend_law(options)
+    is_measured = blends_are_measured(options) and bool(timings.requests.blends_by_law.any())
+    law = measured_on(options) if is_measured else 'assumed for motion version 1'
     why = f'because how the robot passes them is not published; planned as {law}'
-    if blends_are_measured(options):
+    if is_measured:
         off = min(
             off, blend_time_uncertainty(options) * float(timings.chain.times.blend_time.sum())
         )

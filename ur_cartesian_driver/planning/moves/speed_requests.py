@@ -146,6 +146,11 @@ class SpeedRequests:
             self._by_speed()
         #: Whether the arm rests after each segment but the last only because there is no blend.
         self.rests_between = ~geometries.path.has_blend_after[:-1] & ~stops[:-1]
+        #: Whether the blend before each segment follows the laws of blends, which arcs of PROCESS
+        #: do not.
+        self.blends_by_law = geometries.path.has_blend_before.copy()
+        self.blends_by_law[1:] &= FOLLOWS_BLEND_LAWS[self._kinds[:-1]]
+        self.blends_by_law[0] = False
         self._is_running = running is not None
         if running is not None:
             self._request_again(running)
@@ -193,7 +198,6 @@ class SpeedRequests:
         leaving = np.where(fillet, arc * per_metre, leaving)
         one, laws = np.ones(len(counted)), self._options.laws
         chained = np.append(False, self.rests_between)
-        by_laws = np.append(False, before[1:] & FOLLOWS_BLEND_LAWS[self._kinds[:-1]])
         return Moves(
             length=counted,
             speed=one,
@@ -206,7 +210,7 @@ class SpeedRequests:
             exit_rate=joining,
             entry_rate=leaving,
             idle=np.where(chained, laws.idle_between_moves, 0.0),
-            bend=np.where(by_laws, laws.blend_speed_ratio, 1.0),
+            bend=np.where(self.blends_by_law, laws.blend_speed_ratio, 1.0),
         )
 
     def _request_again(self, running: PlannedSegment) -> None:

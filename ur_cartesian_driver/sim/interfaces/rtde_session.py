@@ -85,7 +85,7 @@ class RtdeSession(ClientSession):
             fields_of(OUTPUT_TYPES, controller.config.version),
             fields_of(INPUT_TYPES, controller.config.version),
         )
-        imperfections = controller.config.imperfections
+        imperfections = controller.config.arm_imperfections
         self._gaps = None if imperfections is None else _PacketGaps(imperfections)
         self._schedule: _OutputSchedule | None = None
 

@@ -1,0 +1,307 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""``ur-cartesian identify --robot-ip``: from a simulated arm with hidden laws to its twin."""
+
+from dataclasses import replace
+from io import StringIO
+from random import Random
+import sys
+
+import pytest
+from waiting import wait_for
+
+from ur_cartesian_driver.cli import main
+from ur_cartesian_driver.cli.identify_live import arm_of, PROGRESS
+from ur_cartesian_driver.identification.law_experiments import (
+    Interruption,
+    LAW_EXPERIMENTS,
+    MotionBounds,
+)
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.twin.twin import ArmIdentity, Estimate, Twin
+from ur_cartesian_driver.motion.twin.twin_file import read_twin
+from ur_cartesian_driver.robot.check.finding import Finding, Verdict
+
+HOME = (0.0, -1.2, 1.4, -1.6, -1.5, 0.2)
+NAMES = [each.name for each in LAW_EXPERIMENTS]
+BOX = '-1,-1,0,1,1,1'
+
+
+def hidden_laws(seed):
+    """Return a twin with laws drawn at random; ramps of the simulator take whole cycles."""
+    random = Random(seed)
+    laws = {
+        'start_time': 0.008 * random.randint(8, 30),
+        'stop_time': 0.008 * random.randint(8, 40),
+        'pause_time': 0.008 * random.randint(10, 50),
+        'protective_stop_time': 0.008 * random.randint(8, 30),
+        'turn_ratio': random.uniform(1.0, 5.0),
+        'timed_joint_acceleration': random.uniform(1.0, 2.5),
+        'timed_joint_speed': random.uniform(0.4, 0.9),
+        'timed_linear_acceleration': random.uniform(0.8, 2.0),
+        'timed_linear_speed': random.uniform(0.1, 0.25),
+        'idle_between_moves': random.uniform(0.002, 0.02),
+        'lag': random.uniform(3e-4, 1.3e-3),
+        'friction': random.uniform(1e-4, 3e-4),
+        'static_error': random.uniform(5e-5, 4e-4),
+        'single_gaps': 0.01,
+    }
+    return Twin(
+        arm=ArmIdentity(model='ur5e', software='5.21.0'),
+        date='2026-11-27',
+        estimates={name: Estimate(value=x, interval=(x, x)) for name, x in laws.items()},
+    )
+
+
+HIDDEN = hidden_laws(5)
+hidden_arm = pytest.mark.ur_sim(twin=HIDDEN, polyscope='5.21.0', rate=4.0, q=HOME)
+
+
+class Terminal(StringIO):
+    """A person who answers yes or no."""
+
+    def isatty(self):
+        return True
+
+
+@pytest.fixture
+def identify(ur_sim, tmp_path, monkeypatch, capsys):
+    """Run the command; return its status, its output, and the outcome of each experiment."""
+
+    def run(*words, answer='y', terminal=True, box=BOX, speed='0.3'):
+        answers = (Terminal if terminal else StringIO)(f'{answer}\n' * 20)
+        monkeypatch.setattr(sys, 'stdin', answers)
+        ports = ur_sim.ports
+        arguments = ['--robot-ip', '127.0.0.1', '--folder', str(tmp_path / 'found')]
+        for name in ('rtde', 'primary', 'dashboard', 'robot_api'):
+            arguments += [f'--{name.replace("_", "-")}-port', str(getattr(ports, name))]
+        arguments += [f'--box={box}', '--max-speed', speed, '-o', str(tmp_path / 'twin.yaml')]
+        status = main(['identify', *arguments, *words])
+        printed = capsys.readouterr()
+        lines = (tmp_path / 'found' / PROGRESS).read_text().splitlines()
+        outcomes = dict(line.split(': ', 1) for line in lines)
+        return status, printed.out + printed.err, outcomes
+
+    return run
+
+
+def rests(ur_sim):
+    """Wait until the arm stands still and no program runs."""
+    places = []
+
+    def still():
+        state = ur_sim.state()
+        places.append(state.q)
+        stopped = state.runtime_state is RuntimeState.STOPPED
+        return stopped and len(places) > 20 and len(set(places[-20:])) == 1
+
+    wait_for(still, 20.0)
+
+
+@pytest.mark.slow
+@hidden_arm
+def test_the_command_alone_finds_the_laws_of_a_hidden_arm(identify, ur_sim, tmp_path, capsys):
+    begin = ur_sim.state().T_base_tcp
+    status, printed, outcomes = identify()
+    assert status == 0, printed
+    assert outcomes == dict.fromkeys(NAMES, 'done')
+    found = read_twin(tmp_path / 'twin.yaml')
+    assert (found.arm.model, found.arm.software, found.arm.motion_version) == ('ur5e', '5.21.0', 1)
+    for name, estimate in HIDDEN.estimates.items():
+        if name == 'protective_stop_time':
+            assert 'a protective stop is not provoked' in found.not_identified[name]
+            continue
+        low, high = found.estimates[name].interval
+        # As in test_simulated_arms: the simulator's ramps change once a cycle.
+        is_arm = name in HIDDEN.arm_figures
+        margin = (0.05 if is_arm else 1e-4) * estimate.value
+        margin = max(margin, 2e-4) if name.endswith(('_time', '_moves')) else margin
+        assert low - margin <= estimate.value <= high + margin, name
+    assert begin.distance_to(ur_sim.state().T_base_tcp) < 1e-4
+    # The same files, later and without the robot.
+    files = [str(tmp_path / 'found' / name) for name in found.files]
+    calls = str(tmp_path / 'found' / 'calls.script')
+    again = ['--commands', calls, '-o', str(tmp_path / 'again.yaml'), '--model', 'ur5e']
+    assert main(['identify', *files, *again]) == 0
+    assert read_twin(tmp_path / 'again.yaml').estimates == found.estimates
+
+
+#: Experiments in which the tool travels, and where the fault happens [m].
+TRAVELS = ('line', 'movel_without_speed', 'pause', 'stop')
+
+
+@pytest.mark.slow
+@hidden_arm
+@pytest.mark.parametrize('name', TRAVELS)
+def test_a_protective_stop_ends_the_experiments_and_stays(identify, ur_sim, name, tmp_path):
+    # Where the arm cruises, so that the ramp is seen.
+    ur_sim.inject(f'protective_stop at {0.05 if name == "movel_without_speed" else 0.02} m')
+    rest = [each for each in NAMES if each in (name, 'wrist_fast', 'stop')]
+    status, printed, outcomes = identify('--only', ','.join(rest))
+    assert status == 1
+    before = rest[: rest.index(name)]
+    behind = rest[rest.index(name) + 1 :]
+    expected = 'ended: the robot stopped, with safety mode PROTECTIVE_STOP'
+    assert outcomes == dict.fromkeys(before, 'done') | {name: expected} | dict.fromkeys(
+        behind, 'not begun'
+    )
+    assert 'The experiments ended early: the robot stopped' in printed
+    rests(ur_sim)
+    assert ur_sim.call(lambda controller: controller.safety.mode) is SafetyMode.PROTECTIVE_STOP
+    # What was recorded until then shows this very stop.
+    low, high = read_twin(tmp_path / 'twin.yaml').estimates['protective_stop_time'].interval
+    assert low - 3e-4 <= HIDDEN.estimates['protective_stop_time'].value <= high + 3e-4
+
+
+@pytest.mark.slow
+@hidden_arm
+@pytest.mark.parametrize('name', TRAVELS)
+@pytest.mark.parametrize('cut', [('rtde',), ('rtde', 'primary')], ids=['rtde', 'both'])
+def test_a_cut_connection_leaves_a_resting_arm(identify, ur_sim, name, cut):
+    ur_sim.inject(*(f'drop {interface} at 0.02 m' for interface in cut))
+    status, printed, outcomes = identify('--only', f'{name},wrist_slow')
+    assert status == 1
+    assert outcomes['wrist_slow'] == 'done'
+    assert outcomes[name].startswith('ended: 127.0.0.1 port')
+    assert 'RTDE' in outcomes[name]
+    assert 'start_time' in printed  # the first experiment is evaluated
+    rests(ur_sim)
+
+
+@pytest.mark.slow
+@hidden_arm
+@pytest.mark.parametrize(
+    ('fault', 'words'),
+    [
+        ('stop at 0.02 m', 'the program ended 2'),
+        ('pause at 0.02 m', 'the program was paused'),
+        ('slider 0.5 at 0.02 m', 'the speed slider was moved'),
+        ('foreign_motion y 0.03 at 0.02 m', 'the program ended'),
+    ],
+)
+def test_what_others_do_ends_the_experiments(identify, ur_sim, fault, words):
+    ur_sim.inject(fault)
+    status, _, outcomes = identify('--only', 'line,stop')
+    assert status == 1
+    assert outcomes['line'].startswith(f'ended: {words}')
+    assert outcomes['stop'] == 'not begun'
+    rests(ur_sim)
+
+
+@pytest.mark.slow
+@pytest.mark.ur_sim(
+    polyscope='5.21.0',
+    rate=4.0,
+    q=HOME,
+    twin=replace(
+        HIDDEN, estimates={'timed_linear_speed': Estimate(value=0.6, interval=(0.6, 0.6))}
+    ),
+)
+def test_an_arm_that_is_faster_than_allowed_is_stopped(identify, ur_sim):
+    status, _, outcomes = identify('--only', 'movel_without_speed', speed='0.26')
+    assert status == 1
+    assert outcomes['movel_without_speed'].startswith('ended: the tool was too fast: 0.')
+    rests(ur_sim)
+
+
+@pytest.mark.slow
+@hidden_arm
+def test_yes_answers_for_moves_only(identify, ur_sim):
+    status, printed, outcomes = identify(
+        '--yes', '--only', 'wrist_slow,pause,stop', terminal=False
+    )
+    assert status == 0, printed
+    assert outcomes == {
+        'wrist_slow': 'done',
+        'pause': 'skipped: not wanted',
+        'stop': 'skipped: not wanted',
+    }
+
+
+@pytest.mark.slow
+@hidden_arm
+def test_nothing_moves_without_a_yes_or_outside_the_bounds(identify, ur_sim):
+    begin = ur_sim.state().q
+    x, y, z = ur_sim.state().T_base_tcp.position
+    box = f'{x - 0.01},{y - 0.01},{z - 0.01},{x + 0.01},{y + 0.01},{z + 0.01}'
+    status, printed, outcomes = identify(answer='n', box=box, speed='0.03')
+    assert status == 0
+    for name in NAMES:
+        words = 'it would leave the box: ' if name in TRAVELS else 'not wanted'
+        assert outcomes[name].startswith(f'skipped: {words}'), name
+    assert ur_sim.state().q == begin
+    assert 'start_time' not in printed
+
+
+@pytest.mark.slow
+@hidden_arm
+def test_a_robot_that_is_not_ready_is_not_moved(identify, ur_sim):
+    ur_sim.set_speed_slider(0.5)
+    status, _, outcomes = identify()
+    assert status == 1
+    assert outcomes['wrist_slow'] == 'ended: the speed slider is at 50%; set it to 100 %'
+    assert outcomes['turn'] == 'not begun'
+
+
+@pytest.mark.parametrize(
+    ('words', 'said'),
+    [
+        ([], 'give either recordings, or the robot that shall move: --robot-ip'),
+        (['x.csv', '--robot-ip', '127.0.0.1'], 'give either recordings, or the robot'),
+        (['--robot-ip', '127.0.0.1'], 'add --box and --max-speed'),
+        (
+            ['--robot-ip', '127.0.0.1', f'--box={BOX}', '--max-speed', '0.1'],
+            'needs a terminal; --yes answers for moves',
+        ),
+        (
+            ['--robot-ip', '127.0.0.1', '--box=1,0,0,0,1,1', '--max-speed', '0.1', '--yes'],
+            'the box reaches from (1.0, 0.0, 0.0) to (0.0, 1.0, 1.0)',
+        ),
+    ],
+)
+def test_what_is_missing_is_said(monkeypatch, capsys, tmp_path, words, said):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, 'stdin', StringIO())
+    assert main(['identify', *words]) == 1
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_with_recordings_is_not_written_over(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(sys, 'stdin', Terminal())
+    (tmp_path / PROGRESS).write_text('line: done\n')
+    words = ['--robot-ip', '127.0.0.1', f'--box={BOX}', '--max-speed', '0.1']
+    assert main(['identify', *words, '--folder', str(tmp_path)]) == 1
+    assert 'has the recordings of another run; name another --folder' in capsys.readouterr().err
+
+
+def test_a_robot_with_a_problem_is_not_moved():
+    problem = Finding(check='rtde', verdict=Verdict.PROBLEM, text='Nothing answers.')
+    with pytest.raises(ValueError, match=r'no motion, because of rtde: Nothing answers\.'):
+        arm_of([problem])
+
+
+def test_experiments_are_slow_first_and_interrupted_last():
+    kinds = [each.interruption is not Interruption.NONE for each in LAW_EXPERIMENTS]
+    assert kinds == sorted(kinds)
+    assert LAW_EXPERIMENTS[0].speed == min(each.speed for each in LAW_EXPERIMENTS if each.wrist)
+
+
+def test_a_tool_beside_the_axis_of_the_wrist_moves_on_a_circle():
+    state = RobotState(
+        timestamp=0.0,
+        actual_q=(0.0,) * 5 + (1.0,),
+        actual_tcp_pose=Pose((0.5, 0.1, 0.3)),
+        target_tcp_pose=Pose((0.5, 0.1, 0.3)),
+        T_flange_tcp=Pose((0.1, 0.0, 0.2)),
+    )
+    fast = next(each for each in LAW_EXPERIMENTS if each.name == 'wrist_fast')
+    assert fast.tool_speed(state) == pytest.approx(0.06)
+    # 40 degrees, back towards the middle of the range.
+    assert fast.places(state)[-1] == pytest.approx((0.4766, 0.0357, 0.3), abs=1e-4)
+    tight = MotionBounds(low=(0.4, 0.05, 0.2), high=(0.6, 0.15, 0.4), max_speed=0.05)
+    assert fast.refusal(state, tight).startswith('it would leave the box: y = ')
+    wide = replace(tight, low=(0.4, 0.0, 0.2))
+    assert fast.refusal(state, wide) == '0.06 m/s is faster than 0.05 m/s'
+    assert fast.refusal(state, replace(wide, max_speed=0.07)) == ''

@@ -1,0 +1,194 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""``ur-cartesian identify --robot-ip``: run the experiments that a person allows, one by one."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+import sys
+
+from ur_cartesian_driver.cli.check_robot import address_of, ask, observe_and_show
+from ur_cartesian_driver.identification.arm_samples import ArmSamples, read_samples
+from ur_cartesian_driver.identification.law_experiments import (
+    Interruption,
+    LAW_EXPERIMENTS,
+    LawExperiment,
+    MotionBounds,
+)
+from ur_cartesian_driver.identification.live_run import (
+    ready_state,
+    record_experiment,
+    Surprise,
+)
+from ur_cartesian_driver.identification.moves import find_moves, join_commands
+from ur_cartesian_driver.identification.recorded_calls import MotionCommand, read_commands
+from ur_cartesian_driver.motion.errors import DriverError
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
+from ur_cartesian_driver.motion.twin.twin import ArmIdentity
+from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, Verdict
+
+#: The file that says how far the experiments came, and the one with the calls behind the moves.
+PROGRESS, CALLS = 'experiments.txt', 'calls.script'
+WARNING = (
+    'The arm will move. A hand on the emergency stop, nobody in reach. Any surprise ends the '
+    'experiments; a protective stop is not unlocked.'
+)
+#: Time for which the robot is observed before it moves [s].
+_OBSERVED = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiveRecordings:
+    """
+    What the experiments recorded.
+
+    :param surprise: what ended them early, as a clause; '' = nothing did.
+    """
+
+    arm: ArmIdentity
+    samples: list[ArmSamples]
+    commands: list[MotionCommand]
+    surprise: str
+
+
+def record(arguments: argparse.Namespace) -> LiveRecordings:
+    """
+    Run the experiments that are wanted, and return their recordings.
+
+    :raises ValueError: an option is missing, or the robot cannot be used.
+    """
+    if arguments.box is None or arguments.max_speed is None:
+        raise ValueError('the arm moves: add --box and --max-speed, within which it has to stay')
+    if not (arguments.yes or sys.stdin.isatty()):
+        raise ValueError(
+            'identify asks before each motion, so it needs a terminal; --yes answers for moves'
+        )
+    bounds = MotionBounds(
+        low=arguments.box[:3], high=arguments.box[3:], max_speed=arguments.max_speed
+    )
+    folder = Path(arguments.folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    if (folder / PROGRESS).exists():
+        raise ValueError(f'{folder} has the recordings of another run; name another --folder')
+    address = address_of(arguments)
+    arm = arm_of(asyncio.run(observe_and_show(address, _OBSERVED)))
+    print(f'\n{WARNING}')
+    wanted = [
+        each for each in LAW_EXPERIMENTS if not arguments.only or each.name in arguments.only
+    ]
+    series = _Series(address, bounds, folder, _answers(arguments.yes), wanted)
+    series.run()
+    samples, commands = series.usable()
+    return LiveRecordings(arm=arm, samples=samples, commands=commands, surprise=series.surprise)
+
+
+def arm_of(findings: list[Finding]) -> ArmIdentity:
+    """
+    Return the arm that was observed.
+
+    :raises ValueError: the robot cannot be used.
+    """
+    if problems := [each for each in findings if each.verdict is Verdict.PROBLEM]:
+        raise ValueError(f'no motion, because of {problems[0].check}: {problems[0].text}')
+    data = {each.check: each.data for each in findings}
+    return ArmIdentity(
+        model=data['model']['models'][0],
+        software='.'.join(str(data['software']['version']).split('.')[:3]),
+        motion_version=data.get('motion_version', {}).get('motion_version', 0),
+    )
+
+
+def _answers(yes: bool) -> Callable[[LawExperiment], bool]:
+    """Return who answers: --yes only for moves that nothing stops or pauses."""
+
+    def agrees(experiment: LawExperiment) -> bool:
+        if yes and experiment.interruption is Interruption.NONE:
+            print(f'\n{experiment.question}')
+            return True
+        return sys.stdin.isatty() and ask(experiment.question)
+
+    return agrees
+
+
+@dataclass(slots=True)
+class _Series:
+    """The experiments of one run, and how far they came."""
+
+    address: RobotAddress
+    bounds: MotionBounds
+    folder: Path
+    agrees: Callable[[LawExperiment], bool]
+    experiments: Sequence[LawExperiment]
+    surprise: str = ''
+    outcomes: dict[str, str] = field(default_factory=dict)
+
+    def run(self) -> None:
+        """Run all that are wanted and possible, up to the first surprise."""
+        start: RobotState | None = None
+        self._write()
+        for experiment in self.experiments:
+            try:
+                outcome, start = self._one(experiment, start)
+            except (OSError, DriverError, Surprise) as error:
+                self.surprise = str(error).rstrip('.')
+            except KeyboardInterrupt:
+                self.surprise = 'interrupted from the keyboard'
+            if self.surprise:
+                outcome = f'ended: {self.surprise}'
+            self.outcomes[experiment.name] = outcome
+            print(f'{experiment.name:<20} {outcome}', flush=True)
+            self._write()
+            if self.surprise:
+                return
+
+    def _one(self, experiment: LawExperiment, start: RobotState | None) -> tuple[str, RobotState]:
+        state = asyncio.run(ready_state(self.address, start))
+        first = start or state
+        if refusal := experiment.refusal(state, self.bounds):
+            return f'skipped: {refusal}', first
+        if not self.agrees(experiment):
+            return 'skipped: not wanted', first
+        state = asyncio.run(ready_state(self.address, first))  # again, after the answer
+        asyncio.run(
+            record_experiment(self.address, experiment, state, self.bounds, self._path(experiment))
+        )
+        return 'done', first
+
+    def _path(self, experiment: LawExperiment) -> Path:
+        return self.folder / f'{experiment.name}.csv.gz'
+
+    def _write(self) -> None:
+        """Write how far the experiments came."""
+        lines = [
+            f'{each.name}: {self.outcomes.get(each.name, "not begun")}\n'
+            for each in self.experiments
+        ]
+        (self.folder / PROGRESS).write_text(''.join(lines), encoding='utf-8')
+
+    def usable(self) -> tuple[list[ArmSamples], list[MotionCommand]]:
+        """Return the recordings whose moves are those of their calls, and write the calls."""
+        samples: list[ArmSamples] = []
+        calls: list[str] = []
+        for experiment in self.experiments:
+            path = self._path(experiment)
+            if not path.exists():
+                continue
+            try:
+                found = read_samples(path)
+                moves = find_moves(found)
+                number = sum(not move.piece.resumed for move in moves)
+                own = experiment.calls[:number]  # an experiment that was ended made fewer
+                if own:
+                    join_commands(moves, read_commands('\n'.join(own), CALLS), CALLS)
+            except ValueError as error:
+                print(f'{path.name} is not used: {error}')
+                continue
+            samples.append(found)
+            calls += own
+        text = ''.join(f'{call}\n' for call in calls)
+        (self.folder / CALLS).write_text(text, encoding='utf-8')
+        return samples, read_commands(text, CALLS) if calls else []

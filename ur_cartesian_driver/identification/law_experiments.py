@@ -1,0 +1,260 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The motions by which an arm shows its laws, and the bounds within which they may run.
+
+Each begins and ends at the present pose of the tool: wrist 3 turns, or the tool moves against its
+z axis or turns about it, there and back. The slow ones come first, those that stop or pause the
+program last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from math import degrees, hypot, radians
+
+import numpy as np
+
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector3
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
+from ur_cartesian_driver.motion.twin.laws import ASSUMED_LAWS
+
+#: The tool may leave the box, and exceed the speed, by as much: rounding of the robot [m, m/s].
+_OVER = 1e-3
+#: Places on the path that are compared with the box.
+_PLACES = 25
+
+
+class Interruption(Enum):
+    """What happens to the program while the arm moves there."""
+
+    NONE = ''
+    STOP = 'stop'
+    PAUSE = 'pause'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionBounds:
+    """
+    Where the tool may be, and its largest speed.
+
+    :param low: least coordinates of the TCP in the robot's base [m]; ``high``: greatest ones.
+    :param max_speed: of the TCP [m/s].
+    :raises ValueError: the box is empty, or the speed is not above 0.
+    """
+
+    low: Vector3
+    high: Vector3
+    max_speed: float
+
+    def __post_init__(self) -> None:
+        """Refuse bounds that allow nothing."""
+        if not all(a < b for a, b in zip(self.low, self.high, strict=True)):
+            raise ValueError(
+                f'the box reaches from {self.low} to {self.high}; give its least coordinates '
+                'first, then its greatest'
+            )
+        if not self.max_speed > 0.0:
+            raise ValueError(f'max_speed is {self.max_speed:g} m/s; it must be more than 0')
+
+    def outside(self, position: Sequence[float]) -> str:
+        """Return where a position [m] is outside the box, as a clause; '' = it is inside."""
+        for axis, x, low, high in zip('xyz', position, self.low, self.high, strict=True):
+            if not low - _OVER <= x <= high + _OVER:
+                return f'{axis} = {x:.3f} m is outside {low:g} to {high:g} m'
+        return ''
+
+    def too_fast(self, speed: float) -> str:
+        """Return that a speed [m/s] is too large, as a clause; '' = it is not."""
+        if speed <= self.max_speed + _OVER:
+            return ''
+        return f'{speed:.3g} m/s is faster than {self.max_speed:g} m/s'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LawExperiment:
+    """
+    One motion there and back.
+
+    :param name: of its recording.
+    :param shows: the laws that it shows, for people.
+    :param wrist: angle by which wrist 3 turns in a ``movej`` [rad]; 0 = the tool moves instead.
+    :param retract: way of the tool against its z axis in a ``movel`` [m]; ``turn``: its angle
+        about that axis [rad].
+    :param speed: fastest the arm gets [rad/s] for ``wrist`` and ``turn``, [m/s] for ``retract``.
+    :param there: arguments of the call that moves there; ``back``: of the one that moves back.
+    :param rest: time between the two [s].
+    :param after: time from the start of the motion to the interruption [s].
+    """
+
+    name: str
+    shows: str
+    wrist: float = 0.0
+    retract: float = 0.0
+    turn: float = 0.0
+    speed: float
+    there: str
+    back: str
+    rest: float = 0.0
+    interruption: Interruption = Interruption.NONE
+    after: float = 0.0
+
+    @property
+    def question(self) -> str:
+        """The sentence about what moves, how far and how fast."""
+        if self.wrist:
+            what = f'Wrist 3 turns by {degrees(self.wrist):.0f} degrees'
+        elif self.turn:
+            what = f'The tool turns by {degrees(self.turn):.0f} degrees about its z axis'
+        else:
+            what = f'The tool moves {1e3 * self.retract:.0f} mm against its z axis'
+        fast = (
+            f'{1e3 * self.speed:.0f} mm/s'
+            if self.retract
+            else f'{degrees(self.speed):.0f} degrees/s'
+        )
+        happens = {
+            Interruption.NONE: 'and back',
+            Interruption.STOP: 'at most; its program is stopped on the way, and it moves back',
+            Interruption.PAUSE: 'and back; its program is paused on the way, and resumed',
+        }[self.interruption]
+        return f'{what} {happens}, at up to {fast}. It shows {self.shows}.'
+
+    @property
+    def calls(self) -> tuple[str, ...]:
+        """The calls behind the recorded moves; the way back from a stop is not recorded."""
+        there, back = self._call('there', self.there), self._call('back', self.back)
+        return (there,) if self.interruption is Interruption.STOP else (there, back)
+
+    def _call(self, target: str, arguments: str) -> str:
+        function = 'movej' if self.wrist else 'movel'
+        return f'{function}({target}, {arguments})' if arguments else f'{function}({target})'
+
+    def script(self, state: RobotState) -> str:
+        """Return the body of the program for the place of the arm."""
+        if self.wrist:
+            angle = self._wrist_angle(state)
+            lines = [
+                'back = get_target_joint_positions()',
+                f'there = [back[0], back[1], back[2], back[3], back[4], back[5] + {angle:.9g}]',
+            ]
+        else:
+            offset = f'p[0, 0, {-self.retract:.9g}, 0, 0, {self.turn:.9g}]'
+            lines = [
+                'back = get_target_tcp_pose()',
+                f'there = pose_trans(back, {offset})',
+            ]
+        rest = [f'sleep({self.rest:g})'] if self.rest else []
+        moves = [self._call('there', self.there), *rest, self._call('back', self.back)]
+        return '\n'.join([*lines, *moves])
+
+    def refusal(self, state: RobotState, bounds: MotionBounds) -> str:
+        """Return why the motion leaves the bounds, as a clause; '' = it does not."""
+        places = self.places(state)
+        outside = next((clause for place in places if (clause := bounds.outside(place))), '')
+        return (outside and f'it would leave the box: {outside}') or bounds.too_fast(
+            self.tool_speed(state)
+        )
+
+    def tool_speed(self, state: RobotState) -> float:
+        """Return the largest speed of the TCP [m/s]."""
+        if self.turn:
+            return 0.0
+        radius = hypot(*state.T_flange_tcp.position[:2]) if self.wrist else 1.0
+        return radius * self.speed
+
+    def places(self, state: RobotState) -> list[Vector3]:
+        """Return positions of the TCP on the way [m]; the last one is where it turns back."""
+        start, tool = state.actual_tcp_pose, state.T_flange_tcp
+        found = []
+        for u in np.linspace(0.0, 1.0, _PLACES).tolist():
+            if self.wrist:
+                turned = Pose.from_rotation_vector((0, 0, 0, 0, 0, u * self._wrist_angle(state)))
+                found.append((start @ tool.inverse() @ turned @ tool).position)
+            else:
+                moved = (0, 0, -u * self.retract, 0, 0, u * self.turn)
+                found.append((start @ Pose.from_rotation_vector(moved)).position)
+        return found
+
+    def _wrist_angle(self, state: RobotState) -> float:
+        """Return the angle, towards the middle of the joint's range."""
+        return -self.wrist if state.actual_q[5] > 0.0 else self.wrist
+
+
+_TIMED_SPEED = ASSUMED_LAWS.timed_joint_speed
+LAW_EXPERIMENTS = (
+    LawExperiment(
+        name='wrist_slow',
+        shows='the start of a program, lag and friction',
+        wrist=radians(10.0),
+        speed=0.1,
+        there='a=0.5, v=0.1',
+        back='a=0.5, v=0.1',
+        rest=1.0,
+    ),
+    LawExperiment(
+        name='turn',
+        shows='how fast a movel turns the tool',
+        turn=radians(15.0),
+        speed=0.03 * ASSUMED_LAWS.turn_ratio,
+        there='a=0.3, v=0.03',
+        back='a=0.3, v=0.03',
+    ),
+    LawExperiment(
+        name='line',
+        shows='the time between two moves',
+        retract=0.04,
+        speed=0.04,
+        there='a=0.4, v=0.04',
+        back='a=0.4, v=0.04',
+    ),
+    LawExperiment(
+        name='wrist_fast',
+        shows='lag, friction and ringing',
+        wrist=radians(40.0),
+        speed=0.6,
+        there='a=2, v=0.6',
+        back='a=2, v=0.6',
+        rest=1.0,
+    ),
+    LawExperiment(
+        name='movej_without_speed',
+        shows='speed and acceleration of a movej without a and v',
+        wrist=radians(60.0),
+        speed=_TIMED_SPEED,
+        there='',
+        back='',
+        rest=1.0,
+    ),
+    LawExperiment(
+        name='movel_without_speed',
+        shows='speed and acceleration of a movel without a and v',
+        retract=0.1,
+        speed=ASSUMED_LAWS.timed_linear_speed,
+        there='',
+        back='',
+    ),
+    LawExperiment(
+        name='pause',
+        shows='the ramp of a pause',
+        retract=0.06,
+        speed=0.04,
+        there='a=0.4, v=0.04',
+        back='a=0.4, v=0.04',
+        interruption=Interruption.PAUSE,
+        after=0.7,
+    ),
+    LawExperiment(
+        name='stop',
+        shows='the ramp of a stopped program',
+        retract=0.06,
+        speed=0.04,
+        there='a=0.4, v=0.04',
+        back='a=0.4, v=0.04',
+        interruption=Interruption.STOP,
+        after=0.7,
+    ),
+)
