@@ -37,15 +37,11 @@ from ur_cartesian_driver.motion.goal.goal_table import (
 )
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SAME_ANGLE, SAME_POSITION
 from ur_cartesian_driver.planning.geometry.samples import CurvePieces, joined_columns
-from ur_cartesian_driver.planning.moves.path_samples import (
-    BlendSamples,
-    JointSamples,
-    PathSamples,
-    speed_bounds,
-)
+from ur_cartesian_driver.planning.moves.path_samples import BlendSamples, PathSamples, speed_bounds
 from ur_cartesian_driver.planning.moves.segment_drafts import SegmentDrafts
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.clearance import JointSamples
 from ur_cartesian_driver.planning.preflight.joint_path_solver import (
     JointPath,
     max_path_length,

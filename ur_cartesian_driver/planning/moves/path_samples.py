@@ -55,15 +55,6 @@ class BlendSamples:
     tool_distance: Floats
 
 
-class JointSamples(NamedTuple):
-    """Where the arm is along the path; columns (n,)."""
-
-    segment: Int32s
-    fraction: Floats
-    #: Joint positions (n, 6) [rad].
-    q: Floats
-
-
 class PathSamples(NamedTuple):
     """Samples that the arm can follow, in order of time; columns (n,)."""
 

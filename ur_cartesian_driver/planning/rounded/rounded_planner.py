@@ -120,7 +120,7 @@ class RoundedMotion:
     @cached_property
     def joint_spline(self) -> JointSpline:
         """The joints over time."""
-        return JointSpline.through(self.polynomials.times, self.polynomials.joints, quintic=True)
+        return self.polynomials.spline
 
 
 def plan_rounded_path(
