@@ -38,7 +38,8 @@ def reference_path(start: Pose, begin: int, path: BlendedPath, times: MoveTimes)
     time = _times(path, times, row + is_blend, is_blend, at)
     time[0] = 0.0
     points = begin + row + (is_blend & (at > 0.5))
-    blend_tolerance = np.where(is_blend[:, None], path.blend_tolerance[row], 0.0)
+    blend_tolerance = np.zeros((len(at), 2))
+    blend_tolerance[is_blend] = path.blend_tolerance[row[is_blend]]
     poses = path.rows(number, at)
     poses[0] = start.row()
     keep_hemisphere(poses)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
+from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
 from ur_cartesian_driver.motion.goal.goal_table import Rows, rows_where
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SLOWER_BY, SlowStretch
@@ -126,12 +127,13 @@ class _SlowMoves:
     def stretches(self) -> SlowStretches:
         """Return the stretches in the order of the path."""
         groups = [*self._at_points(), self._cruises(), *self._blends()]
-        columns = {
-            name: np.concatenate([getattr(group, name) for group in groups])
-            for name in SlowStretches.__dataclass_fields__
-        }
-        order = np.lexsort((columns['first_fraction'], columns['first']))
-        return SlowStretches(**{name: column[order] for name, column in columns.items()})
+
+        def column(name: str) -> Shared:
+            return np.concatenate([getattr(group, name) for group in groups])
+
+        order = np.lexsort((column('first_fraction'), column('first')))
+        names = SlowStretches.__dataclass_fields__
+        return SlowStretches(**{name: column(name)[order] for name in names})
 
     # -- between the blends ----------------------------------------------------------------------
 
@@ -308,7 +310,7 @@ class _SlowMoves:
             return
         end = times.begins[rows + 1]
         begin = end - times.blend_time[rows + 1]
-        steps = np.linalg.norm(np.diff(reference.poses[:, :3], axis=0), axis=1)
+        steps = length_rows(np.diff(reference.poses[:, :3], axis=0))
         passing = np.diff(reference.time)
         speeds = np.where(passing > _SAME_TIME, steps / np.maximum(passing, _SAME_TIME), np.inf)
         middle = 0.5 * (reference.time[1:] + reference.time[:-1])
