@@ -42,7 +42,7 @@ from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, Curv
 from ur_cartesian_driver.planning.geometry.curves import arc_faults, ArcRows, JointLineCurve
 from ur_cartesian_driver.planning.geometry.samples import (
     CurvePieces,
-    sample_poses,
+    sample_parameters,
     STEP_ANGLE,
     STEP_LENGTH,
 )
@@ -403,12 +403,13 @@ def test_places_are_dense_and_on_their_curves(cell, a, b, radius, fillet):
     path = path_of([first, second], radius, fillet)
     leave, join = path.u_leave[0], path.u_join[1]
     pieces = pieces_of(path, [0, 1, 2], [0.0, 0.0, join], [leave, 1.0, 1.0])
-    samples = sample_poses(pieces)
-    rows = np.concatenate([[cell.home.row()], samples.poses])
+    piece, at = sample_parameters(pieces)
+    poses = pieces.rows(piece, at)
+    rows = np.concatenate([[cell.home.row()], poses])
     assert np.linalg.norm(np.diff(rows[:, :3], axis=0), axis=1).max() <= 2.0 * STEP_LENGTH + 1e-9
     dots = np.abs(np.einsum('ij,ij->i', rows[1:, 3:], rows[:-1, 3:]))
     assert 2.0 * np.arccos(np.minimum(1.0, dots)).max() <= 2.5 * STEP_ANGLE
-    for k, t, pose in zip(samples.piece, samples.t, samples.poses, strict=True):
+    for k, t, pose in zip(piece, at, poses, strict=True):
         if k == 1:
             assert np.linalg.norm(pose[:3] - first.end.position) <= radius + 1e-9
             continue

@@ -179,9 +179,10 @@ def _plan_free(table: GoalTable, state: RobotState, arm: Arm, options: PlanningO
     found = 'no rotation about the free axis was found that leads along the whole path'
     for density in _SEARCH_DENSITIES:
         try:
-            chosen = choose_rotations(table, at_set_point(state, arm), arm, options, density)
-            plan = _plan_fixed(chosen.goal, state, arm, options)
-            return replace(plan, remarks=(*chosen.remarks, *plan.remarks))
+            start = at_set_point(state, arm)
+            chosen, remarks = choose_rotations(table, start, arm, options, density)
+            plan = _plan_fixed(chosen, state, arm, options)
+            return replace(plan, remarks=(*remarks, *plan.remarks))
         except NoRotation:
             break
         except GoalRefused as error:
@@ -210,16 +211,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
         planner.reasons,
     )
     geometries = paths.geometries(planner.first_target(), state.actual_tcp_pose, state.actual_q)
-    samples = paths.samples
-    lines = clearance_lines(
-        arm,
-        tool_tips(goal, planner.T_flange_active),
-        options,
-        samples.q,
-        state.actual_q,
-        samples.segment,
-        samples.fraction,
-    )
+    lines = clearance_lines(arm, planner.tool_tips, options, paths.samples, state.actual_q)
     timings = SegmentTimings(
         geometries,
         options,
@@ -229,7 +221,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
         planner.stops.waypoints,
     )
     segments = _planned_rows(paths, geometries, timings)
-    del paths, samples  # frees memory: samples and reference path of long goals are large
+    del paths  # frees memory: samples and reference path of long goals are large
     motion = reference_path(
         state.actual_tcp_pose, geometries.begin, geometries.path, timings.chain.times
     )
@@ -248,8 +240,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     ]
     if goal.min_speed_fraction:
         remarks += unknown_speed_remark(goal, *unknown_speeds(geometries))
-    planned = planner.plan(goal, segments, motion, remarks, find_slow_stretches)
-    return _with_offset_band(planned, planner) if goal.path_offset else planned
+    return planner.plan(goal, segments, motion, remarks, find_slow_stretches)
 
 
 def _planned_rows(
@@ -284,15 +275,9 @@ def plan_rounded_goal(planner: GoalPlanner) -> Plan:
     )
     report = RoundedReport(motion)
     clearance = clearance_lines(
-        planner.arm,
-        tool_tips(goal, planner.T_flange_active),
-        options,
-        motion.path.q[1:],
-        state.actual_q,
-        motion.path.points[1:],
-        motion.path.fractions[1:],
+        planner.arm, planner.tool_tips, options, motion.path.samples, state.actual_q
     )
-    planned = planner.plan(
+    return planner.plan(
         goal,
         planned_rows(motion, report),
         motion.reference,
@@ -300,7 +285,6 @@ def plan_rounded_goal(planner: GoalPlanner) -> Plan:
         cache(partial(report.slow_stretches, slower_by(goal))),
         motion.point_times,
     )
-    return _with_offset_band(planned, planner) if goal.path_offset else planned
 
 
 def plan_spline_goal(planner: GoalPlanner) -> Plan:
@@ -316,16 +300,15 @@ def plan_spline_goal(planner: GoalPlanner) -> Plan:
         state.T_flange_tcp,
         planner.options,
         first=first,
-        tool_tips=tool_tips(goal, planner.T_flange_active),
+        tool_tips=planner.tool_tips,
     )
-    planned = planner.plan(
+    return planner.plan(
         stretch_times(goal, found.stretch),
         found.segments,
         found.reference,
         found.remarks,
         found.find_slow_stretches,
     )
-    return _with_offset_band(planned, planner) if goal.path_offset else planned
 
 
 #: The planner of each execution mode.
@@ -356,7 +339,7 @@ def _with_offset_band(plan: Plan, planner: GoalPlanner) -> Plan:
         reference=path,
         q=q,
         qd=qd,
-        tool_tips=tool_tips(planner.goal, planner.T_flange_active),
+        tool_tips=planner.tool_tips,
     ).check()
     remarks = (*plan.remarks, *offset_remarks(band, plan.duration), *warnings[:1])
     return replace(plan, offset_band=band, remarks=remarks)
@@ -387,6 +370,7 @@ class GoalPlanner:
         self.running = running
         self.T_flange_active, self._retargeted = T_flange_active, retargeted
         self.kinematics = TcpKinematics(arm, state.T_flange_tcp)
+        self.tool_tips = tool_tips(goal, T_flange_active)
         self.remarks = list(retargeted.remarks)
         #: The reasons why a primitive is not the usual one of its segment type, by point.
         self.reasons: dict[int, list[str]] = {}
@@ -444,7 +428,8 @@ class GoalPlanner:
         :param remarks: appended to the remarks that have been collected so far.
         :param point_times: (n,) when each point is passed [s], not including stops; None = each
             point is at the end of a piece.
-        :raises GoalRefused: the tool is slower than demanded, or an output cannot be placed.
+        :raises GoalRefused: the tool is slower than demanded, an output cannot be placed, or
+            offsets of the path are not possible.
         """
         if goal.min_speed_fraction:
             check_min_speed(goal, find_slow_stretches())
@@ -457,7 +442,7 @@ class GoalPlanner:
             point_times=None if point_times is None else self.stops.delayed(point_times),
             control_cycle=self.arm.model.control_cycle,
         )
-        return Plan(
+        planned = Plan(
             goal=goal,
             segments=segments,
             reference=reference,
@@ -470,3 +455,4 @@ class GoalPlanner:
             older_program=self.options.older_program,
             execution=self.mode,
         )
+        return _with_offset_band(planned, self) if goal.path_offset else planned

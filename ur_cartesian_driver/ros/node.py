@@ -48,7 +48,7 @@ DISCOVERY_TIME = 2.0
 #: How long :func:`main` waits for the arm to stop and the results to be sent [s].
 SHUTDOWN_TIMEOUT = 5.0
 #: Arrays of at least this size give their memory back to the system when they are freed [bytes].
-LARGE_ARRAY = 4 * 2**20
+LARGE_ARRAY = 2**20
 #: The option of :func:`main` that starts the node with the UR driver's names.
 UR_DRIVER_NAMES = '--ur-driver-names'
 #: Parameters of mallopt, from malloc.h.

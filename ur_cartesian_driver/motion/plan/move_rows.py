@@ -121,6 +121,18 @@ class SplineRows(Rows[Primitive]):
             )
 
 
+def classes(primitives: Sequence[Primitive]) -> list[type[Primitive]]:
+    """Return the class of each primitive; no objects are made of rows."""
+    if isinstance(primitives, SplineRows):
+        return [Spline] * len(primitives)
+    if not isinstance(primitives, MoveRows):
+        return [type(primitive) for primitive in primitives]
+    found: list[type[Primitive]] = [MOVES[kind] for kind in primitives.kinds.tolist()]
+    for row, primitive in primitives.others.items():
+        found[row] = type(primitive)
+    return found
+
+
 def blend_radii(primitives: Sequence[Primitive]) -> Floats:
     """Return the blend radius of each primitive (n,) [m]; 0 = it has none."""
     if isinstance(primitives, MoveRows):

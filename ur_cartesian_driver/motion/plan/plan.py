@@ -23,6 +23,7 @@ from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.goal.goal_table import Rows
 from ur_cartesian_driver.motion.goal.joint_goal import JointTolerances
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.move_rows import classes
 from ur_cartesian_driver.motion.plan.offset_band import OffsetBand
 from ur_cartesian_driver.motion.plan.primitive import (
     Instruction,
@@ -221,9 +222,9 @@ class PlannedRows(Rows[PlannedSegment]):
         """
         found: dict[int, str] = {}
         passed = 0
-        for waypoint, primitive in zip(self.waypoints.tolist(), self.primitives, strict=True):
-            if not isinstance(primitive, Stop):
-                found |= dict.fromkeys(range(passed, waypoint + 1), type(primitive).__name__)
+        for waypoint, kind in zip(self.waypoints.tolist(), classes(self.primitives), strict=True):
+            if not issubclass(kind, Stop):
+                found |= dict.fromkeys(range(passed, waypoint + 1), kind.__name__)
                 passed = waypoint
         return found
 

@@ -40,7 +40,7 @@ from ur_cartesian_driver.planning.append.appendable_goal import (
     numbered,
     ReplannablePoint,
 )
-from ur_cartesian_driver.planning.append.planned_part import PlannedPart
+from ur_cartesian_driver.planning.append.planned_part import PlannedPart, unreported_segment
 from ur_cartesian_driver.planning.append.replaced_tail import cut_tail, cut_time, state_at
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.options import MAX_POINTS, PlanningOptions
@@ -53,6 +53,7 @@ from ur_cartesian_driver.planning.spline.spline_planner import (
     end_state,
     plan_spline,
     plan_stop,
+    rows_along,
     SplineState,
 )
 from ur_cartesian_driver.planning.spline.spline_points import point_remarks
@@ -130,23 +131,11 @@ def plan_append(
     :raises GoalRefused: the points are wrong; the text numbers points from the goal's start.
     """
     appended = replace(appended, io_commands=options.lead_times(appended.io_commands))
-    cut = cut_tail(appendable, cut_time(appendable, appended), arm)
-    if cut is appendable:
-        return _plan_behind(appendable, appended, arm, options, from_rest=from_rest)
-    assert cut.state is not None
-    part = _plan_behind(cut, appended, arm, options, from_rest=False)
-    return replace(part, cut_time=cut.state.time)
-
-
-def _plan_behind(
-    appendable: AppendableGoal,
-    appended: AppendedPoints,
-    arm: Arm,
-    options: PlanningOptions,
-    *,
-    from_rest: bool,
-) -> AppendPlan:
-    """Return the plan of points after the last one of a goal."""
+    before, cut = appendable, None
+    appendable = cut_tail(before, cut_time(before, appended), arm)
+    if appendable is not before:
+        assert appendable.state is not None
+        cut, from_rest = appendable.state.time, False
     check_appended_points(appendable, appended, options)
     options = replace(
         options,
@@ -162,7 +151,8 @@ def _plan_behind(
         return planner.append_moves(records_before, time)
     if not from_rest:
         assert appendable.state is not None
-        return planner.append_spline(appendable.state, records_before, appendable.time_offset)
+        part = planner.append_spline(appendable.state, records_before, appendable.time_offset)
+        return replace(part, cut_time=cut)
     rest = SplineState(time=time, q=appendable.q_rest)
     for delay in START_DELAYS:
         try:
@@ -413,7 +403,7 @@ class _PartPlanner:
             accelerations=begin.qdd,
             start_time=start_time,
         )
-        records = np.cumsum([1 + len(segment.outputs) for segment in complete.segments])
+        records = np.cumsum(complete.rows.records)
         part = PlannedPart(
             spline=spline,
             waypoints=plan.rows.waypoints,
@@ -437,19 +427,8 @@ class _PartPlanner:
         """Return the piece that stops the arm after the last point, and the path of the piece."""
         piece = plan_stop(end, self._arm, self._options.keep_open_deceleration)
         times = np.linspace(0.0, piece.duration, _STOP_ROWS + 1)
-        q, _, _ = JointSpline.of(end.q, [piece], velocities=end.qd, accelerations=end.qdd).rows(
-            times
-        )
-        segment = PlannedSegment(
-            primitive=piece,
-            waypoint=self._points - 1,
-            length=0.0,
-            angle=0.0,
-            duration=piece.duration,
-            joints=piece.target,
-            report_line='',
-        )
-        return segment, ReferencePath(
+        q, _, _ = rows_along(piece, end, len(times))
+        return unreported_segment(piece, self._points - 1), ReferencePath(
             poses=tcp_rows(self._arm, self._T_flange_tcp, q),
             time=end.time + times,
             point=np.full(len(times), self._points - 1, dtype=np.int32),

@@ -50,21 +50,27 @@ class PlannedPart:
 
     def piece(self, row: int, end_time: float) -> PlannedSegment:
         """Return the piece of a row, cut off at the motion time ``end_time`` [s]."""
-        end, duration = self.state(row, end_time), end_time - self.begin(row)
-        return PlannedSegment(
-            primitive=Spline(
-                target=end.q,
-                velocities=end.qd,
-                accelerations=None if self._is_cubic(row) else end.qdd,
-                duration=round(duration, _TIME_DIGITS),
-            ),
-            waypoint=int(self.waypoints[row]),
-            length=0.0,
-            angle=0.0,
-            duration=round(duration, _TIME_DIGITS),
-            joints=end.q,
-            report_line='',
+        end = self.state(row, end_time)
+        piece = Spline(
+            target=end.q,
+            velocities=end.qd,
+            accelerations=None if self._is_cubic(row) else end.qdd,
+            duration=round(end_time - self.begin(row), _TIME_DIGITS),
         )
+        return unreported_segment(piece, int(self.waypoints[row]))
 
     def _is_cubic(self, row: int) -> bool:
         return not self.spline.coefficients[row, 4:].any()
+
+
+def unreported_segment(piece: Spline, waypoint: int) -> PlannedSegment:
+    """Return a piece to a waypoint as a segment without a line in the report."""
+    return PlannedSegment(
+        primitive=piece,
+        waypoint=waypoint,
+        length=0.0,
+        angle=0.0,
+        duration=piece.duration,
+        joints=piece.target,
+        report_line='',
+    )

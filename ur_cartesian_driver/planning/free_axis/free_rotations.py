@@ -11,7 +11,7 @@ samples of the path, and ignores blends.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import degrees, inf, nan, pi, tau
 
 import numpy as np
@@ -37,7 +37,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     transform_rows,
 )
 from ur_cartesian_driver.motion.geometry.vectors import cross, dot, Vector3, vector6
-from ur_cartesian_driver.motion.goal.goal import FreeAxis, Posture, SegmentType
+from ur_cartesian_driver.motion.goal.goal import FreeAxis, Posture
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, SegmentRows
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.free_axis.rotation_lattice import (
@@ -51,11 +51,12 @@ from ur_cartesian_driver.planning.geometry.curves import goal_arcs
 from ur_cartesian_driver.planning.geometry.samples import counted
 from ur_cartesian_driver.planning.options import MAX_CLEARANCE, PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import Clearance
-from ur_cartesian_driver.planning.request.controlled_frame import SAME_TCP
+from ur_cartesian_driver.planning.request.controlled_frame import is_same_tcp
 from ur_cartesian_driver.planning.request.goal_fields import (
+    IS_JOINT_MOVE,
+    IS_OPTIMIZED,
     is_spline,
     is_timed,
-    OPTIMIZED_TYPES,
 )
 from ur_cartesian_driver.planning.request.joint_points import named_joints
 
@@ -89,7 +90,6 @@ _AXES: dict[int, Vector3] = {
     FreeAxis.Y: (0.0, 1.0, 0.0),
     FreeAxis.Z: (0.0, 0.0, 1.0),
 }
-_JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 
 
 def as_named(goal: GoalTable) -> GoalTable:
@@ -125,19 +125,11 @@ def _turned(goal: GoalTable, turns: Floats) -> GoalTable:
     return replace(goal, waypoints=points, segments=segments)
 
 
-@dataclass(frozen=True, slots=True)
-class ChosenGoal:
-    """A goal without a free axis, and the remarks on the choice of its rotations."""
-
-    goal: GoalTable
-    remarks: tuple[str, ...] = ()
-
-
 def choose_rotations(
     goal: GoalTable, state: RobotState, arm: Arm, options: PlanningOptions, density: int = 1
-) -> ChosenGoal:
+) -> tuple[GoalTable, tuple[str, ...]]:
     """
-    Return a checked goal with its rotations about the free axis chosen.
+    Return a checked goal with its rotations about the free axis chosen, and remarks on the choice.
 
     :param state: state of the robot at the start.
     :param density: factor on the number of samples; a higher one misses fewer singularities
@@ -146,22 +138,17 @@ def choose_rotations(
     """
     path = _FreePath(goal, state, options, density)
     if not path.is_open.any():  # every range is a single rotation
-        return ChosenGoal(as_named(goal))
+        return as_named(goal), ()
     if not path.can_turn:
-        return ChosenGoal(
-            as_named(goal),
-            (
-                f'free axis {path.name}: rotations as given, because a frame other than the '
-                'active TCP must not turn (allow_tcp_change is false)',
-            ),
+        return as_named(goal), (
+            f'free axis {path.name}: rotations as given, because a frame other than the active '
+            'TCP must not turn (allow_tcp_change is false)',
         )
     lattice = path.lattice(arm)
     found = _search_without_collisions(lattice, path)
     turns = path.turns(lattice.layers, found)
     chosen = _turned(goal, turns)
-    return ChosenGoal(
-        path.with_postures(chosen, lattice.layers, found), (path.remark(chosen, turns),)
-    )
+    return path.with_postures(chosen, lattice.layers, found), (path.remark(chosen, turns),)
 
 
 def _search_without_collisions(lattice: RotationLattice, path: _FreePath) -> RotationPath:
@@ -204,17 +191,14 @@ class _FreePath:
         first = int(np.argmax(free))
         #: Whether the controlled frame is or becomes the TCP; any other frame would leave its
         #: straight line if the tool turned.
-        self.can_turn = options.allow_tcp_change or (
-            T_tcp_controlled.distance_to(IDENTITY) <= SAME_TCP
-            and T_tcp_controlled.angle_to(IDENTITY) <= SAME_TCP
-        )
+        self.can_turn = options.allow_tcp_change or is_same_tcp(T_tcp_controlled, IDENTITY)
         self.tool_tips = {state.T_flange_tcp, T_flange_controlled}
         self.T_controlled_flange = T_flange_controlled.inverse()
         self.q_start = state.actual_q
         self.name = FreeAxis(int(segments.free_axes[first])).name.lower()
         self.axis = _AXES[int(segments.free_axes[first])]
         self.free = free
-        self.is_joint = np.isin(segments.types, _JOINT_TYPES)
+        self.is_joint = IS_JOINT_MOVE[segments.types]
         self.low, self.high = segments.free_minima, segments.free_maxima
         self.is_any = free & (self.low == 0.0) & (self.high == 0.0)
         #: (n,) whether there is more than one rotation to choose from.
@@ -354,7 +338,7 @@ class _FreePath:
         speeds = np.where(
             segments.velocities > 0.0, segments.velocities, self.options.linear_velocity
         )
-        known = ~self.is_joint & ~np.isin(segments.types, OPTIMIZED_TYPES) & (lengths > 0.0)
+        known = ~self.is_joint & ~IS_OPTIMIZED[segments.types] & (lengths > 0.0)
         return np.where(known, lengths / speeds, inf)
 
     # -- the choice ------------------------------------------------------------------------------

@@ -144,11 +144,7 @@ class RotationPath:
 
 
 class NoRotation(Exception):
-    """There is no way through the lattice; ``layer`` is the first one that cannot be reached."""
-
-    def __init__(self, layer: int) -> None:
-        super().__init__(layer)
-        self.layer = layer
+    """There is no way through the lattice."""
 
 
 @dataclass(slots=True)
@@ -360,7 +356,7 @@ class RotationLattice:
             total = edges[number % _BLOCK] + cost
             sources[number + 1], cost = total.argmin(axis=1), total.min(axis=1)
             if np.isinf(cost).all():
-                raise NoRotation(number)
+                raise NoRotation
         best = np.empty(len(nodes), dtype=np.int64)
         best[-1] = np.argmin(cost)
         for number in range(len(self.layers), 0, -1):
@@ -420,7 +416,7 @@ class RotationLattice:
         q = np.broadcast_to(np.array(self.q_start)[:, None, None], (6, len(cost), 1))
         rotations = np.zeros(1)
         back: list[tuple[Int64s, Floats, Floats]] = []
-        for number, layer in enumerate(self.layers):
+        for layer in self.layers:
             targets = self._coarse_nodes(layer)
             if layer.is_joint:
                 step_to = self._joint_edges(tables, layer, targets, cost, q)
@@ -428,7 +424,7 @@ class RotationLattice:
                 step_to = self._edges(tables, layer, targets, rotations, cost, q)
             cost, q, source, rotations = step_to
             if not np.isfinite(cost).any():
-                raise NoRotation(number)
+                raise NoRotation
             back.append((source, rotations, q))
         n = len(back)
         path = RotationPath(np.empty(n), np.empty(n, dtype=np.int64), np.empty((n, 6)))

@@ -11,10 +11,10 @@ has four. Where the joints turn fast,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import pi
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,8 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices, I
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, CurveSequence
 
-T = TypeVar('T', bound=np.generic)
+#: Columns of consecutive rows.
+Part = TypeVar('Part', bound=tuple[NDArray[Any], ...])
 
 #: Maximum distance between neighbouring samples [m], [rad].
 STEP_LENGTH = 0.002
@@ -34,9 +35,13 @@ MIN_SAMPLES = 8
 _MIN_REFINEMENT = 1.25
 
 
-def joined(columns: Sequence[NDArray[T]]) -> NDArray[T]:
-    """Return arrays joined into one; a single array is not copied."""
-    return columns[0] if len(columns) == 1 else np.concatenate(columns)
+def joined_columns(parts: list[Part]) -> Iterator[NDArray[Any]]:
+    """Yield the columns of consecutive rows, joined. The list is emptied to save memory."""
+    columns = [[*column] for column in zip(*parts, strict=True)]
+    parts.clear()
+    while columns:
+        column = columns.pop(0)
+        yield column[0] if len(column) == 1 else np.concatenate(column)
 
 
 def counted(counts: Indices) -> tuple[Indices, Indices]:
@@ -141,26 +146,12 @@ class CurvePieces:
         return int(segment[0]), float(fraction[0])
 
 
-@dataclass(frozen=True, slots=True)
-class PoseSamples:
-    """Rows of samples on pieces: the number of the piece, the parameter, and the pose."""
-
-    #: (n,) the number of the piece, not decreasing.
-    piece: Indices
-    #: (n,) the ``u`` of a segment's curve, or ``s`` of a blend.
-    t: Floats
-    #: (n, 7) the TCP in base.
-    poses: Floats
-
-
-def sample_poses(pieces: CurvePieces) -> PoseSamples:
-    """Return samples on Cartesian pieces; the start of a piece is a sample of the previous one."""
-    piece, t = sample_parameters(pieces)
-    return PoseSamples(piece, t, pieces.rows(piece, t))
-
-
 def sample_parameters(pieces: CurvePieces) -> tuple[Indices, Floats]:
-    """Return the piece (n,) and the parameter (n,) of each sample."""
+    """
+    Return the piece (n,) and the parameter (n,) of each sample.
+
+    The start of a piece is a sample of the previous one.
+    """
     n = pieces.sample_count
     piece, k = counted(n)
     part = k / n[piece]

@@ -36,11 +36,12 @@ from ur_cartesian_driver.motion.goal.goal_table import (
     WaypointRows,
 )
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SAME_ANGLE, SAME_POSITION
-from ur_cartesian_driver.planning.geometry.samples import CurvePieces, joined
+from ur_cartesian_driver.planning.geometry.samples import CurvePieces, joined_columns
 from ur_cartesian_driver.planning.moves.path_samples import BlendSamples, PathSamples, speed_bounds
 from ur_cartesian_driver.planning.moves.segment_drafts import SegmentDrafts
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.clearance import JointSamples
 from ur_cartesian_driver.planning.preflight.joint_path_solver import (
     JointPath,
     max_path_length,
@@ -100,8 +101,8 @@ class JointPathPlanner:
         reasons: dict[int, list[str]],
     ) -> None:
         """Store the goal; no segment is solved yet."""
-        #: All samples of the goal; set by :meth:`geometries`.
-        self.samples: PathSamples
+        #: The joints at all samples of the goal; set by :meth:`geometries`.
+        self.samples: JointSamples
         #: The samples in the goal's blends; set by :meth:`geometries`.
         self.blend_samples: BlendSamples
         self.goal, self.targets, self.kinematics, self.options = goal, targets, kinematics, options
@@ -363,8 +364,8 @@ class JointPathPlanner:
 
     def _geometries(self) -> SegmentGeometries:
         drafts, arm, times = self._drafts, self.kinematics.arm, self.goal.waypoints.times
-        of = self.samples = PathSamples(*map(joined, zip(*self._parts, strict=True)))
-        self._parts.clear()
+        of = PathSamples(*joined_columns(self._parts))
+        self.samples = JointSamples(of.segment, of.fraction, of.q)
         bounds, self.blend_samples = speed_bounds(arm, of, self.q_start)
         geometries = SegmentGeometries(
             begin=drafts.begin,

@@ -17,6 +17,8 @@ from ur_cartesian_driver.planning.preflight.joint_path_solver import JointPath
 
 # Samples whose parameters differ by less than this do not define a speed.
 _MIN_STEP = 1e-12
+# Rows per block, so that intermediate arrays stay in the CPU cache.
+_BLOCK = 8192
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,8 +62,8 @@ class PathSamples(NamedTuple):
     fraction: Floats
     #: Joint positions (n, 6) [rad].
     q: Floats
-    #: Tool poses (n, 7).
-    poses: Floats
+    #: Positions of the tool (n, 3) [m].
+    positions: Floats
     #: Distances from singularities (n, 3); inf where singularities do not matter.
     measures: Floats
     #: Index of the waypoint at the end of the curve; in a blend, of the waypoint that is rounded.
@@ -86,7 +88,7 @@ class PathSamples(NamedTuple):
             path.segments,
             path.fractions,
             path.q,
-            path.poses,
+            path.poses[:, :3].copy(),  # a view would keep the orientations
             measures,
             pieces.index[piece],
             pieces.is_blend[piece],
@@ -103,23 +105,20 @@ def speed_bounds(
 
     :param q_start: the configuration before the first sample [rad].
     """
-    joint_times = np.diff(of.q, axis=0, prepend=np.array([q_start]))
-    np.abs(joint_times, out=joint_times)  # in place: long goals have many samples
-    joint_times /= arm.model.max_joint_speed
-    joint = np.argmax(joint_times, axis=1)
-    joint_time = np.take_along_axis(joint_times, joint[:, None], axis=1)[:, 0]
+    joint, joint_time = _slowest_joints(arm, of.q, q_start)
     moves, step = of.step > _MIN_STEP, np.maximum(of.step, _MIN_STEP)
     rate = np.where(moves, joint_time / step, 0.0)
     local_time = np.where(moves, rate, np.inf)
-    distance = np.linalg.norm(np.diff(of.poses[:, :3], axis=0), axis=1)
     on_blend = np.flatnonzero(of.is_blend)
+    before = np.maximum(on_blend - 1, 0)
+    distance = np.linalg.norm(of.positions[on_blend] - of.positions[before], axis=1)
     blend_samples = BlendSamples(
         index=of.waypoint[on_blend],
         s=(of.t - 0.5 * of.step)[on_blend],
         half_step=0.5 * of.step[on_blend],
         joint_time=rate[on_blend],
         joint=joint[on_blend],
-        tool_distance=(np.append(0.0, distance) / step)[on_blend],
+        tool_distance=distance / step[on_blend],
     )
     # A sample in a blend adds half its time to each of the two segments, and bounds the rate of
     # neither: joints may reverse there.
@@ -139,3 +138,16 @@ def speed_bounds(
         times_at_limits=np.bincount(segment, joint_time[rows])[segment[at]],
     )
     return bounds, blend_samples
+
+
+def _slowest_joints(arm: Arm, q: Floats, q_start: Joints) -> tuple[Indices, Floats]:
+    """Return the joint (n,) that needs most time since the sample before, and that time [s]."""
+    joint, time = np.empty(len(q), dtype=np.intp), np.empty(len(q))
+    before = np.array([q_start])
+    for begin in range(0, len(q), _BLOCK):
+        rows = slice(begin, begin + _BLOCK)
+        times = np.abs(np.diff(q[rows], axis=0, prepend=before)) / arm.model.max_joint_speed
+        joint[rows] = np.argmax(times, axis=1)
+        time[rows] = np.take_along_axis(times, joint[rows, None], axis=1)[:, 0]
+        before = q[rows][-1:]
+    return joint, time

@@ -21,7 +21,7 @@ from ur_cartesian_driver.planning.request.blend_limits import (
     blends_are_measured,
     measured_on,
 )
-from ur_cartesian_driver.planning.request.goal_fields import is_optimized
+from ur_cartesian_driver.planning.request.goal_fields import IS_OPTIMIZED
 from ur_cartesian_driver.planning.request.ignored_fields import add_remark
 
 
@@ -157,7 +157,7 @@ def _extent(curves: CurveRows, row: int) -> str:
 
 
 def _duration(geometries: SegmentGeometries, timings: SegmentTimings, row: int) -> str:
-    if is_optimized(geometries.kinds[row]):
+    if IS_OPTIMIZED[geometries.kinds[row]]:
         return 'a time that the controller chooses and that is not predicted'
     curves, duration = geometries.path.curves, timings.durations[row]
     amount, unit = curves.angle[row], 'rad/s mean'

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
@@ -33,27 +35,30 @@ def reference_path(start: Pose, begin: int, path: BlendedPath, times: MoveTimes)
     """
     number, at = _places(path, times)
     row, is_blend = number // 2, number % 2 == 1
+    time = _times(path, times, row + is_blend, is_blend, at)
+    time[0] = 0.0
     points = begin + row + (is_blend & (at > 0.5))
-    blend_tolerance = np.where(is_blend[:, None], path.blend_tolerance[row], 0.0)
-    poses = np.concatenate([[start.row()], path.rows(number, at)])
+    blend_tolerance = np.zeros((len(at), 2))
+    blend_tolerance[is_blend] = path.blend_tolerance[row[is_blend]]
+    poses = path.rows(number, at)
+    poses[0] = start.row()
     keep_hemisphere(poses)
     # The first half of a blend belongs to the segment before it, the second to the one after it.
     behind = np.append(path.u_join[1:], 0.0)[row]
     rounded = np.where(
         at > 0.5, (2.0 * at - 1.0) * behind, 1.0 - (1.0 - 2.0 * at) * (1.0 - path.u_leave[row])
     )
-    time = _times(path, times, row + is_blend, is_blend, at)
     return ReferencePath(
         poses=poses,
-        point=np.concatenate([[begin], points]).astype(np.int32),
-        time=np.maximum.accumulate(np.concatenate([[0.0], time])),
-        blend_tolerance=np.concatenate([[(0.0, 0.0)], blend_tolerance]),
-        fraction=np.append(0.0, np.where(is_blend, rounded, at)),
+        point=points.astype(np.int32),
+        time=np.maximum.accumulate(time),
+        blend_tolerance=blend_tolerance,
+        fraction=np.where(is_blend, rounded, at),
     )
 
 
 def _places(path: BlendedPath, times: MoveTimes) -> tuple[Indices, Floats]:
-    """Return curve number and curve parameter, each (n,), of all rows but the start."""
+    """Return curve number and curve parameter, each (n,), of all rows; the first is the start."""
     curves, rows = path.curves, np.arange(len(path.u_join))
     begin, span = path.u_join, np.maximum(path.u_leave - path.u_join, 0.0)
     n = np.maximum(1, np.ceil(curves.chord_counts() * span)).astype(np.intp)
@@ -77,9 +82,9 @@ def _places(path: BlendedPath, times: MoveTimes) -> tuple[Indices, Floats]:
     # An even number of pieces puts one sample in the middle of the blend.
     n = path.blend_samples[blends] + path.blend_samples[blends] % 2
     blend, k = counted(n)
-    number = np.concatenate([2 * own, 2 * rows, 2 * blends[blend] + 1])
-    at = np.concatenate([at_knots, path.u_leave, k / n[blend]])
-    order = np.argsort(number, kind='stable')  # three sorted runs
+    number = np.concatenate([[0], 2 * own, 2 * rows, 2 * blends[blend] + 1])
+    at = np.concatenate([[0.0], at_knots, path.u_leave, k / n[blend]])
+    order = np.argsort(number, kind='stable')  # three sorted runs, and the start
     return number[order], at[order]
 
 
@@ -96,14 +101,19 @@ def _times(
     :param number: segment of each row (n,); for rows in a blend, the segment after the blend.
     """
     found, span = times.begins[number], np.maximum(path.u_leave - path.u_join, 1e-300)
-    between = np.flatnonzero(~on_blend)
-    for k in range(0, len(between), _BLOCK):
-        rows = between[k : k + _BLOCK]
+    for rows in _blocks(~on_blend):
         own = number[rows]
         part = (at[rows] - path.u_join[own]) / span[own]
         found[rows] += times.take(own).time_at(part * (times.length - times.tail)[own])
-    rows = np.flatnonzero(on_blend)
-    blend = times.take(number[rows])
-    passed = ramp_time(blend.begin_rate, blend.end_rate, at[rows], blend.bend)
-    found[rows] += passed - blend.blend_time
+    for rows in _blocks(on_blend):
+        blend = times.take(number[rows])
+        passed = ramp_time(blend.begin_rate, blend.end_rate, at[rows], blend.bend)
+        found[rows] += passed - blend.blend_time
     return found
+
+
+def _blocks(chosen: Flags) -> Iterator[Indices]:
+    """Yield the chosen rows, some of them at a time."""
+    rows = np.flatnonzero(chosen)
+    for begin in range(0, len(rows), _BLOCK):
+        yield rows[begin : begin + _BLOCK]

@@ -28,15 +28,12 @@ from ur_cartesian_driver.planning.geometry.curves import (
 )
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.blend_limits import check_blends_fit
-from ur_cartesian_driver.planning.request.goal_fields import point_field, type_table
+from ur_cartesian_driver.planning.request.goal_fields import IS_JOINT_MOVE, point_field
 from ur_cartesian_driver.planning.request.program_features import round_down, round_radii
 from ur_cartesian_driver.planning.request.validate import arc_error
 
 _LINEAR, _JOINT = SegmentType.LINEAR, SegmentType.JOINT
 _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
-#: Types of segments that are straight lines in joint space.
-JOINT_SPACE_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
-_IN_JOINT_SPACE = type_table(JOINT_SPACE_TYPES)
 #: Smallest length [m] between the two blends of a segment: more than the rounding of two poses and
 #: two radii to micrometres.
 _MIN_BLEND_GAP = 5e-6
@@ -83,7 +80,7 @@ class SegmentDrafts:
         #: (n,) type numbers; AUTO has become LINEAR, and a segment replaced by a joint move JOINT.
         self.kinds = np.where(types == SegmentType.AUTO, SegmentType.LINEAR, types)
         #: (n,) whether each segment is a straight line in joint space.
-        self.is_joint_move: Flags = _IN_JOINT_SPACE[self.kinds]
+        self.is_joint_move: Flags = IS_JOINT_MOVE[self.kinds]
         # Remarks with their rows, by which they are sorted below.
         found: list[tuple[int, str]] = []
         #: (n,) blend radii [m].

@@ -13,9 +13,7 @@ from ur_cartesian_driver.motion.goal.goal_table import SegmentRows, WaypointRows
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath
 from ur_cartesian_driver.planning.moves.path_samples import JointSpeedBounds
 from ur_cartesian_driver.planning.preflight.tightest_margins import TightestMargins
-from ur_cartesian_driver.planning.request.goal_fields import OPTIMIZED_TYPES, type_table
-
-_IS_OPTIMIZED = type_table(OPTIMIZED_TYPES)
+from ur_cartesian_driver.planning.request.goal_fields import IS_OPTIMIZED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +45,7 @@ class SegmentGeometries:
     @property
     def is_optimized(self) -> Flags:
         """(n,) whether each segment's speed is a fraction of the robot's limits."""
-        return _IS_OPTIMIZED[self.kinds]
+        return IS_OPTIMIZED[self.kinds]
 
     @property
     def unblended_fractions(self) -> Floats:

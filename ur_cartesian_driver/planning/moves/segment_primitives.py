@@ -33,14 +33,13 @@ from ur_cartesian_driver.motion.plan.primitive import (
     Stop,
 )
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
-from ur_cartesian_driver.planning.moves.segment_drafts import JOINT_SPACE_TYPES
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_change
 from ur_cartesian_driver.planning.request.goal_fields import (
+    IS_JOINT_MOVE,
     point_field,
     segment_field,
-    type_table,
 )
 from ur_cartesian_driver.planning.request.joint_points import (
     full_posture,
@@ -62,7 +61,6 @@ _CLASSES = {
 }
 #: For each type of segment, the index of its primitive in MOVES.
 _MOVE_OF = np.array([MOVES.index(_CLASSES.get(kind, MoveL)) for kind in SegmentType])
-_HAS_Q_NEAR = type_table(JOINT_SPACE_TYPES)
 
 
 def segment_primitives(
@@ -84,7 +82,7 @@ def segment_primitives(
         kinds=_MOVE_OF[kinds],
         targets=paths.targets[geometries.begin :],
         q_near=geometries.joints,
-        has_q_near=_HAS_Q_NEAR[kinds],
+        has_q_near=IS_JOINT_MOVE[kinds],
         vias=vias,
         arc_modes=geometries.segments.arc_modes,
         velocities=timings.velocities,
@@ -131,9 +129,9 @@ class _SpecialPrimitives:
             primitive = move
             if isinstance(move, MoveC):
                 primitive = self._arc(row, move, joints)
-            elif kind in JOINT_SPACE_TYPES and isinstance(self._postures.get(row), JointPositions):
+            elif IS_JOINT_MOVE[kind] and isinstance(self._postures.get(row), JointPositions):
                 primitive = replace(move, target=joints, q_near=None)
-            elif kind in JOINT_SPACE_TYPES or row in self._postures:
+            elif IS_JOINT_MOVE[kind] or row in self._postures:
                 primitive = replace(move, q_near=self._q_near(row, joints))
         primitive, reason = adapt_primitive(primitive, point, joints, self._options)
         if reason:

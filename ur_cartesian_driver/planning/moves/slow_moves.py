@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
-from ur_cartesian_driver.motion.goal.goal import SegmentType
+from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
 from ur_cartesian_driver.motion.goal.goal_table import Rows, rows_where
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SLOWER_BY, SlowStretch
@@ -29,9 +29,8 @@ from ur_cartesian_driver.planning.request.blend_limits import (
     blend_law,
     blends_are_measured,
 )
-from ur_cartesian_driver.planning.request.goal_fields import OPTIMIZED_TYPES, type_table
+from ur_cartesian_driver.planning.request.goal_fields import TAKES_TOOL_SPEED
 
-_IS_FREE = type_table((SegmentType.JOINT, *OPTIMIZED_TYPES))
 #: The path reverses if the dot product of its unit directions before and after is at most this.
 _REVERSAL = -0.98
 #: Fraction of ``slower_by`` that is tolerated in blends sampled by chords: the speed of a chord is
@@ -46,7 +45,7 @@ _SAME_TIME = 1e-6
 
 def unknown_speeds(geometries: SegmentGeometries) -> tuple[list[int], list[int]]:
     """Return the points with blends, and the ends of motions without a requested tool speed."""
-    begin, free = geometries.begin, _IS_FREE[geometries.kinds]
+    begin, free = geometries.begin, ~TAKES_TOOL_SPEED[geometries.kinds]
     return (
         [begin + row for row in rows_where(geometries.path.has_blend_after)],
         [begin + row for row in rows_where(free)],
@@ -55,7 +54,11 @@ def unknown_speeds(geometries: SegmentGeometries) -> tuple[list[int], list[int]]
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
 class SlowStretches(Rows[SlowStretch]):
-    """Slow stretches in columns, each (n,): a goal with many points can have several at each."""
+    """
+    Slow stretches in columns (n,), named like their fields: a long goal can have several a point.
+
+    Reasons have ``{point}`` and ``{speed}`` in place of numbers.
+    """
 
     first: Indices
     first_fraction: Floats
@@ -63,31 +66,21 @@ class SlowStretches(Rows[SlowStretch]):
     last_fraction: Floats
     asked: Floats
     lowest: Floats
-    causes: Shared
-    #: Texts in which the reason has ``{point}`` and ``{speed}``.
-    reasons: Shared
-    points: Indices
+    cause: Shared
+    reason: Shared
+    point: Indices
     #: Speeds in the reasons [m/s].
-    speeds: Floats
+    speed: Floats
 
     def __len__(self) -> int:
         return len(self.first)
 
     def __iter__(self) -> Iterator[SlowStretch]:
-        for first, begin, last, end, asked, lowest, cause, reason, point, speed in self._numbers(
-            *self.__dataclass_fields__
-        ):
-            yield SlowStretch(
-                first=first,
-                first_fraction=begin,
-                last=last,
-                last_fraction=end,
-                asked=asked,
-                lowest=lowest,
-                cause=cause,
-                reason=reason.format(point=point, speed=speed),
-                point=point,
-            )
+        names = tuple(self.__dataclass_fields__)
+        for row in self._numbers(*names):
+            of = dict(zip(names, row, strict=True))
+            of['reason'] = of['reason'].format(point=of['point'], speed=of.pop('speed'))
+            yield SlowStretch(**of)
 
 
 def slow_move_stretches(
@@ -121,7 +114,7 @@ class _SlowMoves:
         self._slower_by = slower_by
         requests, times = timings.requests, timings.chain.times
         curves = geometries.path.curves
-        self._free: Flags = _IS_FREE[geometries.kinds]
+        self._free: Flags = ~TAKES_TOOL_SPEED[geometries.kinds]
         #: (n,) whether each segment carries the tool along a path.
         self._carries = ~self._free & requests.limits.translates
         #: (n,) the requested speed [m/s]; NaN if the segment does not carry the tool.
@@ -134,12 +127,13 @@ class _SlowMoves:
     def stretches(self) -> SlowStretches:
         """Return the stretches in the order of the path."""
         groups = [*self._at_points(), self._cruises(), *self._blends()]
-        columns = {
-            name: np.concatenate([getattr(group, name) for group in groups])
-            for name in SlowStretches.__dataclass_fields__
-        }
-        order = np.lexsort((columns['first_fraction'], columns['first']))
-        return SlowStretches(**{name: column[order] for name, column in columns.items()})
+
+        def column(name: str) -> Shared:
+            return np.concatenate([getattr(group, name) for group in groups])
+
+        order = np.lexsort((column('first_fraction'), column('first')))
+        names = SlowStretches.__dataclass_fields__
+        return SlowStretches(**{name: column(name)[order] for name in names})
 
     # -- between the blends ----------------------------------------------------------------------
 
@@ -316,7 +310,7 @@ class _SlowMoves:
             return
         end = times.begins[rows + 1]
         begin = end - times.blend_time[rows + 1]
-        steps = np.linalg.norm(np.diff(reference.poses[:, :3], axis=0), axis=1)
+        steps = length_rows(np.diff(reference.poses[:, :3], axis=0))
         passing = np.diff(reference.time)
         speeds = np.where(passing > _SAME_TIME, steps / np.maximum(passing, _SAME_TIME), np.inf)
         middle = 0.5 * (reference.time[1:] + reference.time[:-1])
@@ -364,12 +358,10 @@ class _SlowMoves:
             last_fraction=end,
             asked=np.fmax(self._asked[first], self._asked[last]) if asked is None else asked,
             lowest=lowest,
-            causes=causes if isinstance(causes, np.ndarray) else np.full(shape, causes, object),
-            reasons=(
-                reasons if isinstance(reasons, np.ndarray) else np.full(shape, reasons, object)
-            ),
-            points=base + (first if points is None else points),
-            speeds=np.zeros(shape) if speeds is None else speeds,
+            cause=np.broadcast_to(_shared(causes), shape),
+            reason=np.broadcast_to(_shared(reasons), shape),
+            point=base + (first if points is None else points),
+            speed=np.zeros(shape) if speeds is None else speeds,
         )
 
 

@@ -17,6 +17,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,6 +39,17 @@ _BLOCK = 4096
 _RECEDING_TOLERANCE = 1e-4
 # How far a tool that works on a plane without a margin may be below it, by rounding [m].
 _ON_PLANE = 1e-6
+
+
+class JointSamples(NamedTuple):
+    """Where the arm is along the path of a goal; columns (n,)."""
+
+    #: The segment of each sample, by the number of the point at its end.
+    segment: Int32s
+    #: The fraction of this segment before the sample, 0..1.
+    fraction: Floats
+    #: Joint positions (n, 6) [rad].
+    q: Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,22 +178,17 @@ def clearance_lines(
     arm: Arm,
     tool_tips: Iterable[Pose],
     options: PlanningOptions,
-    q: Floats,
+    path: JointSamples,
     q_start: Joints,
-    segment: Int32s,
-    fraction: Floats,
 ) -> list[str]:
     """
     Return the report lines about the clearance with each of several tool tips.
 
     For parameters and errors see :meth:`Clearance.check` and :func:`clearance_remarks`.
     """
+    checks = (Clearance(arm, tip, options).check(path.q, q_start) for tip in tool_tips)
     lines = (
-        line
-        for T_flange_tip in tool_tips
-        for line in clearance_remarks(
-            Clearance(arm, T_flange_tip, options).check(q, q_start), segment, fraction
-        )
+        line for each in checks for line in clearance_remarks(each, path.segment, path.fraction)
     )
     return list(dict.fromkeys(lines))  # two tips often have the same line
 

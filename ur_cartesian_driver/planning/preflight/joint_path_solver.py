@@ -28,10 +28,8 @@ from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.samples import (
     CurvePieces,
-    joined,
-    PoseSamples,
+    joined_columns,
     sample_parameters,
-    sample_poses,
 )
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_change, TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
@@ -45,8 +43,9 @@ _MIN_ANGLE = 2e-5
 _MAX_JUMP = 0.5
 #: Configurations that differ by less than this [rad] are the same.
 _SAME = 1e-6
-#: Number of samples in the first block after a refinement.
-_FIRST_BLOCK = 64
+#: Number of samples in the first block after a refinement, and in the longest block: longer ones
+#: would only need more memory.
+_FIRST_BLOCK, _LONGEST_BLOCK = 64, 16384
 #: Number of samples on the rest of a piece that show how far a joint would leave its range.
 _SAMPLES_BEYOND = 16
 #: A block that is solved to its end is followed by one that is longer by this factor.
@@ -129,31 +128,31 @@ def solve_joint_path(kinematics: TcpKinematics, pieces: CurvePieces, q_start: Jo
 
     :param q_start: the configuration at the start of the first piece [rad].
     """
-    samples = sample_poses(pieces)
+    pieces_of, at = sample_parameters(pieces)
     found: list[_Samples] = []
 
     def joint_path(refusal: GoalRefused | None = None, segment: int = -1) -> JointPath:
-        piece, t, poses, q = map(joined, zip(*(found or [_NO_SAMPLES]), strict=True))
+        piece, t, poses, q = joined_columns(found or [_NO_SAMPLES])
         return JointPath(pieces, piece, t, poses, q, refusal, segment)
 
     q = q_start
-    row, block = 0, len(samples.t)
-    while row < len(samples.t):
-        solved, bad = _solve_block(kinematics, samples.poses[row : row + block], q)
+    row, block = 0, _LONGEST_BLOCK
+    while row < len(at):
         begin = row
+        piece, t = pieces_of[begin : begin + block], at[begin : begin + block]
+        poses = pieces.rows(piece, t)
+        solved, bad = _solve_block(kinematics, poses, q)
         for index in (*bad, len(solved)):
             stop = begin + index
             if stop > row:
-                rows, solved_rows = slice(row, stop), solved[row - begin : index]
-                found.append(
-                    (samples.piece[rows], samples.t[rows], samples.poses[rows], solved_rows)
-                )
+                rows = slice(row - begin, index)
+                found.append((piece[rows], t[rows], poses[rows], solved[rows]))
                 q, row = vector6(solved[index - 1].tolist()), stop
             if index == len(solved):
-                block *= _GROWTH
+                block = min(_GROWTH * block, _LONGEST_BLOCK)
                 break
-            refinement = _refine(kinematics, pieces, samples, row, q)
-            k = int(samples.piece[row])
+            refinement = _refine(kinematics, pieces, pieces_of, at, row, q)
+            k = int(pieces_of[row])
             if refinement.q:
                 found.append(refinement.samples(k))
                 q = refinement.q[-1]
@@ -183,18 +182,19 @@ def _solve_block(kinematics: TcpKinematics, poses: Floats, q: Joints) -> tuple[F
 def _refine(
     kinematics: TcpKinematics,
     pieces: CurvePieces,
-    samples: PoseSamples,
+    piece: Indices,
+    at: Floats,
     row: int,
     q: Joints,
 ) -> _Refinement:
     """Return samples from ``row - 1`` (excluded) to ``row``, as dense as the joints require."""
-    k = int(samples.piece[row])
+    k = int(piece[row])
     length, turn = pieces.extent(k)
-    is_first = row == 0 or samples.piece[row - 1] != k
-    t = float(pieces.begin[k]) if is_first else float(samples.t[row - 1])
+    is_first = row == 0 or piece[row - 1] != k
+    t = float(pieces.begin[k]) if is_first else float(at[row - 1])
     min_step = min(1.0, _MIN_LENGTH / max(length, 1e-300), _MIN_ANGLE / max(turn, 1e-300))
     found = _Refinement([], [], [])
-    ends = [float(samples.t[row])]
+    ends = [float(at[row])]
     while ends:
         end = ends[-1]
         pose = pieces.pose(k, end)

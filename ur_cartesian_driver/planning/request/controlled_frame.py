@@ -25,6 +25,7 @@ from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
+    IS_JOINT_MOVE,
     is_spline,
     is_timed,
     point_field,
@@ -37,9 +38,7 @@ MAX_FIXED_ANGLE = 0.01
 
 #: A controlled frame within this distance [m] and angle [rad] of the TCP counts as the TCP. The
 #: bound is a few steps of the wire, so that the reported TCP shows which of two TCPs is set.
-SAME_TCP = 5e-6
-
-_JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
+_SAME_TCP = 5e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +63,7 @@ def retarget_to_tcp(
     :raises InvalidGoal: the TCP must not change, but the tool turns.
     """
     T_flange_controlled = goal.T_flange_controlled
-    if T_flange_controlled is None or _is_same_tcp(T_flange_controlled, state.T_flange_tcp):
+    if T_flange_controlled is None or is_same_tcp(T_flange_controlled, state.T_flange_tcp):
         return RetargetedGoal(goal=goal, state=state)
     T_tcp_controlled = state.T_flange_tcp.inverse() @ T_flange_controlled
     if options.allow_tcp_change:
@@ -97,13 +96,14 @@ def tool_tips(goal: GoalTable, T_flange_active: Pose) -> tuple[Pose, ...]:
     A mounted tool can collide even if a goal controls the bare flange.
     """
     T_flange_controlled = goal.T_flange_controlled
-    if T_flange_controlled is None or _is_same_tcp(T_flange_controlled, T_flange_active):
+    if T_flange_controlled is None or is_same_tcp(T_flange_controlled, T_flange_active):
         return (T_flange_active,)
     return T_flange_active, T_flange_controlled
 
 
-def _is_same_tcp(a: Pose, b: Pose) -> bool:
-    return a.distance_to(b) <= SAME_TCP and a.angle_to(b) <= SAME_TCP
+def is_same_tcp(a: Pose, b: Pose) -> bool:
+    """Return whether two frames count as the same TCP."""
+    return a.distance_to(b) <= _SAME_TCP and a.angle_to(b) <= _SAME_TCP
 
 
 def _name(goal: GoalTable) -> str:
@@ -118,7 +118,7 @@ def _check_no_rotation(goal: GoalTable, T_base_start: Pose) -> None:
     """
     points, segments = goal.waypoints, goal.motions
     start = goal.T_base_frame.inverse() @ T_base_start
-    follows_path = ~np.isin(segments.types, _JOINT_TYPES)
+    follows_path = ~IS_JOINT_MOVE[segments.types]
     if is_timed(goal) and points.times[0] == 0.0:
         follows_path[0] = False
     for i in rows_where(follows_path):

@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import TypeVar
 
-from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6
+from ur_cartesian_driver.motion.geometry.vectors import vector3, vector6
 from ur_cartesian_driver.motion.goal.goal import Goal, Tolerance
 from ur_cartesian_driver.planning.options import PlanningOptions
 
@@ -41,23 +42,17 @@ def apply_default_tolerances(goal: G, options: PlanningOptions) -> G:
 
 def _with_defaults(tolerance: Tolerance, name: str, options: PlanningOptions) -> Tolerance:
     """Return a tolerance whose zeros are replaced by the parameters ``<name>_position`` etc."""
-    position, orientation, *rest = (
-        float(getattr(options, f'{name}_{quantity}')) for quantity in _QUANTITIES
-    )
-    if not any((position, orientation, *rest)):
+    defaults = [float(getattr(options, f'{name}_{quantity}')) for quantity in _QUANTITIES]
+    if not any(defaults):
         return tolerance
 
-    def three(values: Vector3, default: float) -> Vector3:
-        x, y, z = (value or default for value in values)
-        return (x, y, z)
-
-    def six(values: Vector6, linear: float, angular: float) -> Vector6:
-        x, y, z, rx, ry, rz = values
-        return (*three((x, y, z), linear), *three((rx, ry, rz), angular))
+    def filled(values: Iterable[float], first: int) -> list[float]:
+        """Return values, three for each quantity from the ``first`` on."""
+        return [value or defaults[first + k // 3] for k, value in enumerate(values)]
 
     return Tolerance(
-        position=three(tolerance.position, position),
-        orientation=three(tolerance.orientation, orientation),
-        twist=six(tolerance.twist, rest[0], rest[1]),
-        acceleration=six(tolerance.acceleration, rest[2], rest[3]),
+        position=vector3(filled(tolerance.position, 0)),
+        orientation=vector3(filled(tolerance.orientation, 1)),
+        twist=vector6(filled(tolerance.twist, 2)),
+        acceleration=vector6(filled(tolerance.acceleration, 4)),
     )

@@ -4,24 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
-from ur_cartesian_driver.motion.geometry.arrays import Flags
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
-
-#: Types of segments that move the tool on a straight line.
-STRAIGHT_TYPES = (
-    SegmentType.AUTO,
-    SegmentType.LINEAR,
-    SegmentType.PROCESS,
-    SegmentType.OPTIMIZED_LINEAR,
-)
-#: Types of segments whose speeds are fractions of the robot's limits.
-OPTIMIZED_TYPES = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 
 
 def type_table(types: Collection[SegmentType]) -> Flags:
@@ -29,6 +20,21 @@ def type_table(types: Collection[SegmentType]) -> Flags:
     return np.array([kind in types for kind in SegmentType])
 
 
+_OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
+#: By segment type: whether it moves the tool on a straight line; whether it is a straight line in
+#: joint space; whether its speeds are fractions of the robot's limits; and whether it takes a
+#: speed of the tool.
+IS_STRAIGHT = type_table(
+    (
+        SegmentType.AUTO,
+        SegmentType.LINEAR,
+        SegmentType.PROCESS,
+        SegmentType.OPTIMIZED_LINEAR,
+    )
+)
+IS_JOINT_MOVE = type_table((SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT))
+IS_OPTIMIZED = type_table(_OPTIMIZED)
+TAKES_TOOL_SPEED = ~type_table((SegmentType.JOINT, *_OPTIMIZED))
 #: By segment type: whether the blend behind it follows the measured laws of blends. Those of
 #: PROCESS are documented, those of OPTIMIZED types are not measured.
 FOLLOWS_BLEND_LAWS = type_table((SegmentType.LINEAR, SegmentType.JOINT, SegmentType.CIRCULAR))
@@ -42,6 +48,47 @@ def point_field(index: int, field: str = '') -> str:
 def segment_field(index: int, field: str = '') -> str:
     """Return the name of a segment's field as in the message."""
     return f'segments[{index}]' + (f'.{field}' if field else '')
+
+
+def late_point_error(
+    index: int, times: Floats | Sequence[float], remedy: str = 'increase it'
+) -> InvalidGoal:
+    """Return the refusal of a point that is not later than the one before."""
+    than = 'less than the 0 s'
+    if index > 0:
+        than = f'not later than the {times[index - 1]:g} s of points[{index - 1}]'
+    return InvalidGoal(
+        point_field(index, 'time_from_start'), f'is {times[index]:g} s, {than}', remedy
+    )
+
+
+def short_segment_error(index: int, duration: float, least: float) -> InvalidGoal:
+    """Return the refusal of a time that is too short for a piece of a spline."""
+    return InvalidGoal(
+        point_field(index, 'time_from_start'),
+        f'gives the segment {duration:g} s, less than the {least:g} s that a piece of a spline '
+        'needs',
+        'leave points out',
+    )
+
+
+def long_segment_error(index: int, duration: float, most: float) -> InvalidGoal:
+    """Return the refusal of a time that is longer than max_segment_time."""
+    return InvalidGoal(
+        point_field(index, 'time_from_start'),
+        f'gives the segment {duration:g} s, more than max_segment_time = {most:.0f} s',
+        'add points in between',
+    )
+
+
+def check_plausible(field: str, values: Iterable[float], bound: float, units: str) -> None:
+    """Refuse numbers that no robot reaches: their units are wrong."""
+    if any(abs(value) > bound for value in values):
+        raise InvalidGoal(
+            field,
+            f'contains a number beyond {bound:g}, more than any of these robots can do',
+            f'check the units ({units})',
+        )
 
 
 def resolve_execution_mode(goal: GoalTable) -> ExecutionMode:
@@ -79,8 +126,3 @@ def is_timed(goal: GoalTable) -> bool:
 def gives_joints(goal: GoalTable) -> Flags:
     """Return whether each point (n,) gives joint positions in place of a pose."""
     return np.asarray(np.isnan(goal.waypoints.poses).all(axis=1))
-
-
-def is_optimized(kind: SegmentType) -> bool:
-    """Return whether the speeds of a segment type are fractions of the robot's limits."""
-    return kind in OPTIMIZED_TYPES

@@ -12,10 +12,10 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.motion.plan.slow_stretch import name_points
-from ur_cartesian_driver.planning.request.goal_fields import is_timed, OPTIMIZED_TYPES
+from ur_cartesian_driver.planning.request.goal_fields import is_timed, TAKES_TOOL_SPEED, type_table
 
 #: Types of segments that, if the goal has times, are sent with a time and ignore acceleration.
-_TIMED_TYPES = (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT)
+_IS_TIMED = type_table((SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT))
 
 
 def ignored_remarks(goal: GoalTable, first: int = 0) -> list[str]:
@@ -27,9 +27,7 @@ def ignored_remarks(goal: GoalTable, first: int = 0) -> list[str]:
     if timed := is_timed(goal):
         add(has_twist, 'twist is ignored: UR motion commands stop or blend at a point')
     else:
-        takes_twist = (motions.velocities == 0.0) & ~np.isin(
-            motions.types, (SegmentType.JOINT, *OPTIMIZED_TYPES)
-        )
+        takes_twist = (motions.velocities == 0.0) & TAKES_TOOL_SPEED[motions.types]
         add(
             has_twist & ~takes_twist,
             'twist is ignored: the segment has a velocity, or its type takes no tool speed',
@@ -41,7 +39,7 @@ def ignored_remarks(goal: GoalTable, first: int = 0) -> list[str]:
     add(points.jerks.any(axis=1), 'jerk is ignored: no robot motion takes it')
     if timed:
         add(
-            (segments.accelerations > 0.0) & np.isin(segments.types, _TIMED_TYPES),
+            (segments.accelerations > 0.0) & _IS_TIMED[segments.types],
             'the acceleration of the segment is ignored: its time sets the speed',
         )
     if segments and segments.blend_radii[-1] > 0.0 and not goal.keep_open:

@@ -29,14 +29,24 @@ from ur_cartesian_driver.motion.goal.joint_goal import (
 from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.field_rules import check_finite
-from ur_cartesian_driver.planning.request.goal_fields import point_field
+from ur_cartesian_driver.planning.request.goal_fields import (
+    check_plausible,
+    late_point_error,
+    long_segment_error,
+    point_field,
+    short_segment_error,
+)
 from ur_cartesian_driver.planning.request.program_features import check_joint_spline
 from ur_cartesian_driver.planning.request.spline_rules import (
     MAX_ACCELERATION,
     MAX_TWIST,
     MIN_SPLINE_TIME,
 )
-from ur_cartesian_driver.planning.request.validate import check_list_lengths, check_stamp
+from ur_cartesian_driver.planning.request.validate import (
+    check_joint_name,
+    check_list_lengths,
+    check_stamp,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -80,11 +90,11 @@ def check_joint_goal(goal: JointGoal, options: PlanningOptions) -> CheckedJointG
             'send poses with FollowCartesianTrajectory',
         )
     check_joint_spline(options)
-    before = 0.0
+    times = [point.time for point in goal.points]
     for i, point in enumerate(goal.points):
-        _check_point(i, point, len(order), before, options)
-        before = point.time
-    if before == 0.0:
+        _check_point(i, point, len(order))
+        _check_time(i, times, options)
+    if times[-1] == 0.0:
         raise InvalidGoal(
             point_field(len(goal.points) - 1, 'time_from_start'),
             'is 0, so there is no time to move',
@@ -104,7 +114,7 @@ def check_joint_goal(goal: JointGoal, options: PlanningOptions) -> CheckedJointG
         )
     )
     return CheckedJointGoal(
-        times=np.array([point.time for point in goal.points]),
+        times=np.array(times),
         joints=MotionRows(q, qd, qdd),
         tolerances=JointTolerances(
             path=_bounds('path_tolerance', goal.path_tolerance, options.tf_prefix),
@@ -117,9 +127,9 @@ def check_joint_goal(goal: JointGoal, options: PlanningOptions) -> CheckedJointG
 
 def _order(names: Sequence[str], tf_prefix: str) -> list[int]:
     """Return, for each joint of the arm, its index in the goal."""
-    known = [tf_prefix + name for name in JOINT_NAMES]
     for k, name in enumerate(names):
-        _check_name(f'trajectory.joint_names[{k}]', name, names[:k], known)
+        check_joint_name(f'trajectory.joint_names[{k}]', name, names[:k], tf_prefix)
+    known = [tf_prefix + name for name in JOINT_NAMES]
     if missing := [name for name in known if name not in names]:
         raise InvalidJoints(
             f'trajectory.joint_names lacks {", ".join(missing)}; name all six joints.'
@@ -127,18 +137,7 @@ def _order(names: Sequence[str], tf_prefix: str) -> list[int]:
     return [names.index(name) for name in known]
 
 
-def _check_name(field: str, name: str, before: Sequence[str], known: Sequence[str]) -> None:
-    if name not in known:
-        raise InvalidJoints(
-            f"{field} is '{name}', not a joint of this robot; use {', '.join(known)}."
-        )
-    if name in before:
-        raise InvalidJoints(f"{field} repeats '{name}'; name each joint once.")
-
-
-def _check_point(
-    index: int, point: JointPoint, joints: int, before: float, options: PlanningOptions
-) -> None:
+def _check_point(index: int, point: JointPoint, joints: int) -> None:
     if not point.positions:
         raise InvalidGoal(point_field(index, 'positions'), 'are empty', 'give one for each joint')
     for field, values, bound in (
@@ -152,12 +151,7 @@ def _check_point(
                 where, f'has {len(values)} values for {joints} joints', 'give one for each joint'
             )
         check_finite(where, values)
-        if any(abs(value) > bound for value in values):
-            raise InvalidGoal(
-                where,
-                f'contains a number beyond {bound:g}, more than any of these robots can do',
-                'check the units (rad, s)',
-            )
+        check_plausible(where, values, bound, 'rad, s')
     if point.accelerations and not point.velocities:
         raise InvalidGoal(
             point_field(index, 'velocities'),
@@ -168,42 +162,24 @@ def _check_point(
         raise InvalidGoal(
             point_field(index, 'effort'), 'is given, but robots take none', 'leave it empty'
         )
-    _check_time(index, point.time, before, options)
 
 
-def _check_time(index: int, time: float, before: float, options: PlanningOptions) -> None:
-    field = point_field(index, 'time_from_start')
-    check_finite(field, (time,))
+def _check_time(index: int, times: Sequence[float], options: PlanningOptions) -> None:
+    time, before = times[index], times[index - 1] if index > 0 else 0.0
+    check_finite(point_field(index, 'time_from_start'), (time,))
     if time < 0.0 or (index > 0 and time <= before):
-        previous = f' of points[{index - 1}]' if index > 0 else ''
-        raise InvalidGoal(
-            field,
-            f'is {time:g} s, {"not later" if index > 0 else "less"} than the {before:g} s'
-            f'{previous}',
-            'increase it',
-        )
+        raise late_point_error(index, times)
     if time > 0.0 and time - before < MIN_SPLINE_TIME - SAME_TIME:
-        raise InvalidGoal(
-            field,
-            f'gives the segment {time - before:g} s, less than the {MIN_SPLINE_TIME:g} s that a '
-            'piece of a spline needs',
-            'leave points out',
-        )
+        raise short_segment_error(index, time - before, MIN_SPLINE_TIME)
     if time - before > options.max_segment_time:
-        raise InvalidGoal(
-            field,
-            f'gives the segment {time - before:g} s, more than max_segment_time = '
-            f'{options.max_segment_time:.0f} s',
-            'add points in between',
-        )
+        raise long_segment_error(index, time - before, options.max_segment_time)
 
 
 def _bounds(field: str, entries: Sequence[JointTolerance], tf_prefix: str) -> JointErrorBounds:
     """Return the tolerances of all joints; joints that are not named have no limits."""
-    known = [tf_prefix + name for name in JOINT_NAMES]
     names = [entry.name for entry in entries]
     for k, entry in enumerate(entries):
-        _check_name(f'{field}[{k}].name', entry.name, names[:k], known)
+        check_joint_name(f'{field}[{k}].name', entry.name, names[:k], tf_prefix)
         for name in ('position', 'velocity', 'acceleration'):
             check_finite(f'{field}[{k}].{name}', (getattr(entry, name),))
         if entry.acceleration > 0.0:
@@ -215,7 +191,7 @@ def _bounds(field: str, entries: Sequence[JointTolerance], tf_prefix: str) -> Jo
             )
     by_name = dict(zip(names, entries, strict=True))
     none = JointTolerance(name='')
-    found = [by_name.get(name, none) for name in known]
+    found = [by_name.get(tf_prefix + name, none) for name in JOINT_NAMES]
     return JointErrorBounds(
         position=vector6(each.position for each in found),
         velocity=vector6(each.velocity for each in found),

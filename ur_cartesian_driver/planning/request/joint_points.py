@@ -20,10 +20,14 @@ from ur_cartesian_driver.motion.errors import JointLimitExceeded, NotAvailable
 from ur_cartesian_driver.motion.geometry.arrays import Flags
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
-from ur_cartesian_driver.motion.goal.goal import Goal, Posture, SegmentType
+from ur_cartesian_driver.motion.goal.goal import Goal, Posture
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.goal_fields import gives_joints, point_field
+from ur_cartesian_driver.planning.request.goal_fields import (
+    gives_joints,
+    IS_JOINT_MOVE,
+    point_field,
+)
 from ur_cartesian_driver.planning.request.validate import check
 
 
@@ -78,7 +82,7 @@ def check_for_arm(goal: Goal, T_flange_tcp: Pose, arm: Arm, options: PlanningOpt
 
 def _check_calibration(goal: GoalTable, by_joints: Flags, options: PlanningOptions) -> None:
     """Refuse points whose pose must be known, if only a calibration would tell it."""
-    is_sent = np.isin(goal.motions.types, (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT))
+    is_sent = IS_JOINT_MOVE[goal.motions.types]
     for i in rows_where(by_joints & ~is_sent)[:1]:
         if not options.calibration_known:
             raise NotAvailable(

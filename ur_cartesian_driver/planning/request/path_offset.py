@@ -11,10 +11,9 @@ from ur_cartesian_driver.motion.goal.goal import DEFAULT_OFFSET_MOTION, PathOffs
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
-    OPTIMIZED_TYPES,
+    IS_OPTIMIZED,
     resolve_execution_mode,
     segment_field,
-    type_table,
 )
 from ur_cartesian_driver.planning.request.mode_rules import check_mode, GOAL_RULES
 
@@ -69,7 +68,7 @@ def _check_controller_offsets(goal: GoalTable, options: PlanningOptions) -> None
             'while it controls a force',
             'leave presses empty, and path_offset empty in goals that press',
         )
-    optimized = np.flatnonzero(type_table(OPTIMIZED_TYPES)[goal.motions.types])
+    optimized = np.flatnonzero(IS_OPTIMIZED[goal.motions.types])
     if len(optimized):
         raise NotAvailable(
             'path_offset',

@@ -14,11 +14,13 @@ from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
+    check_plausible,
     is_spline,
     is_timed,
     point_field,
     resolve_execution_mode,
     segment_field,
+    short_segment_error,
 )
 
 #: Shortest time from point to point [s].
@@ -82,23 +84,13 @@ def _check_points(goal: GoalTable) -> None:
     for i in rows_where(wrong):
         point, before = points[i], float(times[i - 1]) if i > 0 else 0.0
         if point.time > 0.0 and point.time - before < MIN_SPLINE_TIME - SAME_TIME:
-            raise InvalidGoal(
-                point_field(i, 'time_from_start'),
-                f'gives the segment {point.time - before:g} s, less than the '
-                f'{MIN_SPLINE_TIME:g} s that a piece of a spline needs',
-                'leave points out',
-            )
+            raise short_segment_error(i, point.time - before, MIN_SPLINE_TIME)
         for field, numbers, bound in (
             ('pose.position', point.pose.position, MAX_POINT_COORDINATE),
             ('twist', point.twist, MAX_TWIST),
             ('acceleration', point.acceleration, MAX_ACCELERATION),
         ):
-            if any(abs(value) > bound for value in numbers):
-                raise InvalidGoal(
-                    point_field(i, field),
-                    f'contains a number beyond {bound:g}, more than any of these robots can do',
-                    'check the units (m, rad, s)',
-                )
+            check_plausible(point_field(i, field), numbers, bound, 'm, rad, s')
 
 
 def _check_segment(index: int, segment: Segment, name: str) -> None:

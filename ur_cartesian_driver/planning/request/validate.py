@@ -12,7 +12,7 @@ Refusals name fields as the ROS messages do (``trajectory.points[2].pose.orienta
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import isfinite
 from typing import TypeAlias
@@ -57,14 +57,15 @@ from ur_cartesian_driver.planning.request.field_rules import (
 from ur_cartesian_driver.planning.request.free_axis_rules import check_free_axes
 from ur_cartesian_driver.planning.request.goal_fields import (
     gives_joints,
-    is_optimized,
+    IS_OPTIMIZED,
     is_rounded,
     is_spline,
+    IS_STRAIGHT,
     is_timed,
-    OPTIMIZED_TYPES,
+    late_point_error,
+    long_segment_error,
     point_field,
     segment_field,
-    STRAIGHT_TYPES,
 )
 from ur_cartesian_driver.planning.request.mode_rules import check_mode, GOAL_RULES
 from ur_cartesian_driver.planning.request.path_offset import check_path_offset
@@ -184,21 +185,12 @@ def _times(goal: GoalTable, options: PlanningOptions) -> None:
     # The first point may have the time 0: then the robot is already there.
     is_late = (steps > 0.0) | ((steps == 0.0) & (np.arange(len(times)) == 0))
     for i in rows_where(~is_late | (steps > options.max_segment_time))[:1]:
-        time, before = float(times[i]), float(times[i - 1]) if i > 0 else 0.0
-        if not is_late[i]:
-            previous = f' of points[{i - 1}]' if i > 0 else ''
-            raise InvalidGoal(
-                point_field(i, 'time_from_start'),
-                f'is {time:g} s, {"not later" if i > 0 else "less"} than the '
-                f'{before:g} s{previous}',
-                'increase it' + ('' if is_spline(goal) else ', or set all times to 0 for speeds'),
-            )
-        raise InvalidGoal(
-            point_field(i, 'time_from_start'),
-            f'gives the segment {time - before:g} s, '
-            f'more than max_segment_time = {options.max_segment_time:.0f} s',
-            'add points in between',
+        if is_late[i]:
+            raise long_segment_error(i, float(steps[i]), options.max_segment_time)
+        remedy = (
+            'increase it' if is_spline(goal) else 'increase it, or set all times to 0 for speeds'
         )
+        raise late_point_error(i, times, remedy)
 
 
 def _segment_rules(goal: GoalTable, options: PlanningOptions) -> None:
@@ -208,14 +200,12 @@ def _segment_rules(goal: GoalTable, options: PlanningOptions) -> None:
     has_via_fields = segments.arc_modes != ArcMode.UNCONSTRAINED
     has_via_fields |= segments.has_via & (segments.vias != IDENTITY.row()).any(axis=1)
     has_via_fields[list(segments.via_postures)] = True
-    suspect = np.isin(segments.types, OPTIMIZED_TYPES) & (
-        timed | is_fast | (not options.optimove_known)
-    )
+    suspect = IS_OPTIMIZED[segments.types] & (timed | is_fast | (not options.optimove_known))
     suspect |= timed & (segments.velocities > 0.0)
     suspect |= np.where(is_arc, ~segments.has_via, has_via_fields)
     for i in rows_where(suspect):
         segment = segments[i]
-        if is_optimized(segment.type) and not options.optimove_known:
+        if IS_OPTIMIZED[segment.type] and not options.optimove_known:
             raise NotAvailable(
                 segment_field(i, 'type'),
                 f'is {segment.type.name}, which needs PolyScope 5.21 or PolyScope X 10.8',
@@ -257,7 +247,7 @@ def _motions(goal: GoalTable, options: PlanningOptions) -> None:
         return  # a spline can wait at a point
     points, segments = goal.waypoints, goal.motions
     lengths = np.linalg.norm(np.diff(points.poses[:, :3], axis=0), axis=1)
-    suspect = np.isin(segments.types[1:], STRAIGHT_TYPES) & (lengths < 2.0 * SAME_POSITION)
+    suspect = IS_STRAIGHT[segments.types[1:]] & (lengths < 2.0 * SAME_POSITION)
     starts, ends = points.poses[:-1].copy(), points.poses[1:].copy()
     _, _, faults = goal_arcs(segments[1:], IDENTITY, starts, ends)
     suspect[[*faults]] = True
@@ -359,26 +349,27 @@ def check_posture(field: str, posture: Posture, tf_prefix: str) -> None:
             f'{field} has {len(names)} joint names but {len(values)} values; '
             'give one value for each name.'
         )
-    known = [tf_prefix + name for name in JOINT_NAMES]
     for k, (name, value) in enumerate(zip(names, values, strict=True)):
-        if name not in known:
-            raise InvalidJoints(
-                f"{field}.posture_joint_names[{k}] is '{name}', not a joint of this robot; "
-                f'use {", ".join(known)}.'
-            )
-        if name in names[:k]:
-            raise InvalidJoints(
-                f"{field}.posture_joint_names[{k}] repeats '{name}'; name each joint once."
-            )
+        check_joint_name(f'{field}.posture_joint_names[{k}]', name, names[:k], tf_prefix)
+        where = f"{field}.posture_joint_values[{k}] ('{name}')"
         if not isfinite(value):
-            raise InvalidJoints(
-                f"{field}.posture_joint_values[{k}] ('{name}') is {value}; it must be finite."
-            )
+            raise InvalidJoints(f'{where} is {value}; it must be finite.')
         if abs(value) > MAX_JOINT_VALUE:
             raise InvalidJoints(
-                f"{field}.posture_joint_values[{k}] ('{name}') is {value:g} rad, more than any "
-                'joint can turn; give radians, not degrees.'
+                f'{where} is {value:g} rad, more than any joint can turn; give radians, not '
+                'degrees.'
             )
+
+
+def check_joint_name(field: str, name: str, before: Sequence[str], tf_prefix: str) -> None:
+    """Refuse the name of an unknown joint, and one that is among those ``before``."""
+    known = [tf_prefix + each for each in JOINT_NAMES]
+    if name not in known:
+        raise InvalidJoints(
+            f"{field} is '{name}', not a joint of this robot; use {', '.join(known)}."
+        )
+    if name in before:
+        raise InvalidJoints(f"{field} repeats '{name}'; name each joint once.")
 
 
 def arc_error(index: int, fault: str) -> InvalidGoal:
@@ -409,7 +400,7 @@ def duplicate_point_error(goal: GoalTable, index: int) -> InvalidGoal:
 
 def _speeds(index: int, segment: Segment, timed: bool) -> None:
     kind = SegmentType(segment.type)
-    if timed and is_optimized(kind):
+    if timed and IS_OPTIMIZED[kind]:
         raise InvalidGoal(
             segment_field(index, 'type'),
             f'is {kind.name}, which cannot meet the time of points[{index}]',
@@ -421,7 +412,7 @@ def _speeds(index: int, segment: Segment, timed: bool) -> None:
             f'is {segment.velocity:g}, but the times of the goal set its speed',
             'set it, or all times, to 0',
         )
-    if is_optimized(kind):
+    if IS_OPTIMIZED[kind]:
         for field in ('velocity', 'acceleration'):
             value = getattr(segment, field)
             if value > 1.0:

@@ -32,7 +32,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
-from ur_cartesian_driver.planning.geometry.samples import sample_poses
+from ur_cartesian_driver.planning.geometry.samples import sample_parameters
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
@@ -105,22 +105,22 @@ class RoundedMotion:
         """The path of the tool, whose rows name the segments of the goal."""
         path = self.path
         pieces = spline_pieces(path.spline, self.sample_count, 0, self.places)
-        samples = sample_poses(pieces)
-        point, fraction = pieces.locate(samples.piece, samples.t)
-        begin, durations = path.spline.times[samples.piece], np.diff(path.spline.times)
-        poses = np.concatenate([path.poses[:1], samples.poses])
+        piece, t = sample_parameters(pieces)
+        point, fraction = pieces.locate(piece, t)
+        begin, durations = path.spline.times[piece], np.diff(path.spline.times)
+        poses = np.concatenate([path.poses[:1], pieces.rows(piece, t)])
         keep_hemisphere(poses)
         return ReferencePath(
             poses=poses,
             point=np.append(point[:1], point),
-            time=np.append(0.0, begin + samples.t * durations[samples.piece]),
+            time=np.append(0.0, begin + t * durations[piece]),
             fraction=np.append(0.0, fraction),
         )
 
     @cached_property
     def joint_spline(self) -> JointSpline:
         """The joints over time."""
-        return JointSpline.through(self.polynomials.times, self.polynomials.joints, quintic=True)
+        return self.polynomials.spline
 
 
 def plan_rounded_path(

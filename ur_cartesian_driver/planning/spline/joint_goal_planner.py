@@ -18,21 +18,19 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded, NotAvailable
-from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.geometry.polynomials import evaluate, MotionRows
-from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, keep_hemisphere
+from ur_cartesian_driver.motion.geometry.pose_rows import keep_hemisphere
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import ContactEnd, Press, START_OF_MOTION
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, WaypointRows, zeros
 from ur_cartesian_driver.motion.goal.joint_goal import JointGoal
-from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
-from ur_cartesian_driver.motion.plan.move_rows import SplineRows
-from ur_cartesian_driver.motion.plan.plan import LateLines, Plan, PlannedRows, ReferencePath
+from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.samples import counted
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
+from ur_cartesian_driver.planning.preflight.clearance import clearance_lines, JointSamples
 from ur_cartesian_driver.planning.preflight.start_checks import check_approach, check_reported_tcp
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.default_tolerances import apply_default_tolerances
@@ -45,7 +43,7 @@ from ur_cartesian_driver.planning.request.point_events.safe_outputs import add_s
 from ur_cartesian_driver.planning.request.point_events.stops import Stops
 from ur_cartesian_driver.planning.request.program_features import check_program
 from ur_cartesian_driver.planning.request.validate import check_measurable_tolerances
-from ur_cartesian_driver.planning.spline.joint_polynomials import to_ticks
+from ur_cartesian_driver.planning.spline.joint_polynomials import JointKnots, piece_rows, to_ticks
 from ur_cartesian_driver.planning.spline.spline_limits import (
     RateSamples,
     stretch_remark,
@@ -63,22 +61,12 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Trajectory:
+class _Trajectory(JointKnots):
     """The joints at the ends of n pieces; the first piece begins where the arm rests."""
 
-    #: (n + 1,) times of the ends [s], in whole microseconds.
-    times: Floats
-    #: Positions, velocities and accelerations at the ends, each (n + 1, 6).
-    joints: MotionRows
-    quintic: bool
     #: The number of the point at the end of the first piece.
     first: int
     remarks: tuple[str, ...]
-
-    @property
-    def spline(self) -> JointSpline:
-        """The joints over time, as a spline."""
-        return JointSpline.through(self.times, self.joints, quintic=self.quintic)
 
     def stretched(self, factor: float) -> _Trajectory:
         """Return the same path with all times multiplied by a factor, in whole microseconds."""
@@ -91,25 +79,15 @@ class _Trajectory:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Samples:
+class _Samples(RateSamples):
     """Joints and tool along a trajectory; row 0 is the start."""
 
     #: (m,) the piece of each sample.
     piece: Indices
-    #: (m,) the fraction of the piece's time at the sample.
-    u: Floats
-    #: (m,) the times of the samples [s].
-    times: Floats
-    #: Joint positions, velocities and accelerations, each (m, 6).
-    joints: MotionRows
+    #: (m, 6) joint positions [rad].
+    q: Floats
     #: (m, 7) poses of the TCP in base.
     poses: Floats
-    #: (m, 6) twists of the TCP in base.
-    twists: Floats
-    #: (m, 6) accelerations of the TCP in base.
-    accelerations: Floats
-    #: (m,) the point to which the sample's piece leads.
-    points: Int32s
 
 
 def plan_joint_goal(
@@ -134,29 +112,20 @@ def plan_joint_goal(
     samples = _sampled(given, state, arm)
     _check_ranges(samples, arm)
     trajectory, remark = _fit_to_limits(given, samples, arm, options)
-    clearance = clearance_lines(
-        arm,
-        (state.T_flange_tcp,),
-        options,
-        samples.joints.x[1:],
-        state.actual_q,
-        samples.points[1:],
-        samples.u[1:],
-    )
+    path = JointSamples(samples.points[1:], samples.u[1:], samples.q[1:])
+    clearance = clearance_lines(arm, (state.T_flange_tcp,), options, path, state.actual_q)
     poses = samples.poses.copy()
     keep_hemisphere(poses)
-    durations = np.diff(trajectory.times)
-    begin = trajectory.times[samples.piece]
+    begin, durations = trajectory.times[samples.piece], np.diff(trajectory.times)
+    reference = ReferencePath(
+        poses=poses,
+        point=samples.points,
+        time=begin + samples.u * durations[samples.piece],
+        fraction=samples.u,
+    )
     factor = trajectory.times[-1] / given.times[-1]
     table, segments, reference = Stops(table, options).insert(
-        stretch_times(table, factor),
-        _segments(trajectory, samples, durations),
-        ReferencePath(
-            poses=poses,
-            point=samples.points,
-            time=begin + samples.u * durations[samples.piece],
-            fraction=samples.u,
-        ),
+        stretch_times(table, factor), _segments(trajectory, reference), reference
     )
     return Plan(
         goal=table,
@@ -303,14 +272,15 @@ def _sampled(trajectory: _Trajectory, state: RobotState, arm: Arm) -> _Samples:
     piece, number = (np.concatenate([[0], rows]) for rows in counted(count))
     u = number / count[piece]
     t = u * np.diff(times)[piece]
-    joints = evaluate(spline.coefficients[piece], t)
-    twists, accelerations = tool_rates(arm, state.T_flange_tcp, *joints)
+    q, qd, qdd = evaluate(spline.coefficients[piece], t)
+    twists, accelerations = tool_rates(arm, state.T_flange_tcp, q, qd, qdd)
     return _Samples(
         piece=piece,
         u=u,
-        times=times[piece] + t,
-        joints=joints,
-        poses=tcp_rows(arm, state.T_flange_tcp, joints.x),
+        q=q,
+        qd=qd,
+        qdd=qdd,
+        poses=tcp_rows(arm, state.T_flange_tcp, q),
         twists=twists,
         accelerations=accelerations,
         points=(trajectory.first + piece).astype(np.int32),
@@ -319,7 +289,7 @@ def _sampled(trajectory: _Trajectory, state: RobotState, arm: Arm) -> _Samples:
 
 def _check_ranges(samples: _Samples, arm: Arm) -> None:
     low, high = np.array(arm.model.position_limits).T
-    q = samples.joints.x
+    q = samples.q
     outside = (q < low - _ROUNDING) | (q > high + _ROUNDING)
     if not outside.any():
         return
@@ -336,18 +306,7 @@ def _fit_to_limits(
     trajectory: _Trajectory, samples: _Samples, arm: Arm, options: PlanningOptions
 ) -> tuple[_Trajectory, tuple[str, ...]]:
     """Return the trajectory, slowed if the limits require it, and a remark on the slowing."""
-    found = worst_excess_of(
-        RateSamples(
-            points=samples.points,
-            u=samples.u,
-            twists=samples.twists,
-            accelerations=samples.accelerations,
-            qd=samples.joints.v,
-            qdd=samples.joints.a,
-        ),
-        arm.model,
-        options,
-    )
+    found = worst_excess_of(samples, arm.model, options)
     if found is None:
         return trajectory, ()
     if options.on_too_fast != 'slow':
@@ -357,50 +316,19 @@ def _fit_to_limits(
     return slowed, (stretch_remark(found.factor, found.speed_limit, slowed.times[-1]),)
 
 
-def _segments(trajectory: _Trajectory, samples: _Samples, durations: Floats) -> PlannedRows:
-    n = len(durations)
-    ends = np.searchsorted(samples.piece, np.arange(n), side='right') - 1
-    steps = np.stack(
-        [
-            np.linalg.norm(np.diff(samples.poses[:, :3], axis=0), axis=1),
-            angle_rows(samples.poses[:-1, 3:], samples.poses[1:, 3:]),
-        ],
-        axis=1,
-    )
-    lengths, angles = np.diff(np.cumsum(steps, axis=0)[ends - 1], axis=0, prepend=0.0).T
-    q, qd, qdd = (rows[1:] for rows in trajectory.joints)
-    turns = np.abs(np.diff(trajectory.joints.x, axis=0)).max(axis=1)
+def _segments(trajectory: _Trajectory, reference: ReferencePath) -> PlannedRows:
+    turns = np.abs(np.diff(trajectory.joints.x, axis=0)).max(axis=1).tolist()
+    passes = (np.abs(trajectory.joints.v[1:]).max(axis=1) > 0.0).tolist()
     kind = 'quintic' if trajectory.quintic else 'cubic'
 
-    def lines() -> list[str]:
+    def lines(sizes: Floats) -> list[str]:
         return [
             f'point {trajectory.first + i}: joints in a {kind} piece, up to {turn:.3f} rad, '
             f'{length:.3f} m of the tool in {time:.3f} s, '
             f'{"passes through" if moves else "stops there"}'
-            for i, (turn, length, time, moves) in enumerate(
-                zip(
-                    turns.tolist(),
-                    lengths.tolist(),
-                    durations.tolist(),
-                    (np.abs(qd).max(axis=1) > 0.0).tolist(),
-                    strict=True,
-                )
+            for i, (turn, moves, (length, _, time)) in enumerate(
+                zip(turns, passes, sizes.tolist(), strict=True)
             )
         ]
 
-    return PlannedRows(
-        waypoints=(trajectory.first + np.arange(n)).astype(np.int32),
-        lengths=lengths,
-        angles=angles,
-        durations=durations,
-        blend_entries=zeros(n, 5),
-        joints=q,
-        primitives=SplineRows(
-            targets=q,
-            velocities=qd,
-            accelerations=qdd,
-            durations=durations,
-            quintic=np.full(n, trajectory.quintic),
-        ),
-        report_lines=LateLines.at_once(n, lines),
-    )
+    return piece_rows(reference, trajectory, trajectory.first + np.arange(len(turns)), lines)

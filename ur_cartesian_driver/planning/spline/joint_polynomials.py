@@ -34,6 +34,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     length_rows,
 )
 from ur_cartesian_driver.motion.goal.goal_table import zeros
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.move_rows import SplineRows
 from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows, ReferencePath
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
@@ -56,16 +57,27 @@ _BLOCK = 256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class JointPolynomials:
-    """The joints over time, in n pieces."""
+class JointKnots:
+    """The joints at the ends of n pieces."""
 
-    #: (n + 1,) times of the pieces' ends [s], in whole ticks.
+    #: (n + 1,) times of the ends [s], in whole ticks.
     times: Floats
     #: Joint positions, velocities and accelerations at the ends, each (n + 1, 6).
     joints: MotionRows
+    quintic: bool
+
+    @property
+    def spline(self) -> JointSpline:
+        """The joints over time."""
+        return JointSpline.through(self.times, self.joints, quintic=self.quintic)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointPolynomials(JointKnots):
+    """Pieces that keep the tool on a tool spline."""
+
     #: (n,) the piece of the tool spline to which each joint piece belongs.
     piece: Indices
-    quintic: bool
     #: (n, 2) maximum deviation of the tool from the tool spline [m], [rad].
     deviations: Floats
 
@@ -82,7 +94,7 @@ class JointPolynomials:
 
 def piece_rows(
     reference: ReferencePath,
-    polynomials: JointPolynomials,
+    knots: JointKnots,
     waypoints: Indices,
     lines: Callable[[Floats], Sequence[str]],
 ) -> PlannedRows:
@@ -94,26 +106,27 @@ def piece_rows(
     :param lines: returns the line of the report for each piece, from lengths [m], turns [rad] and
         times [s] of the pieces (n, 3).
     """
-    durations = np.round(np.diff(polynomials.times), 6)
+    durations = np.round(np.diff(knots.times), 6)
     a, b = reference.poses[:-1], reference.poses[1:]
     lengths, angles = (
-        np.diff(np.interp(polynomials.times, reference.time, np.append(0.0, np.cumsum(steps))))
+        np.diff(np.interp(knots.times, reference.time, np.append(0.0, np.cumsum(steps))))
         for steps in (distance_rows(a, b), angle_rows(a[:, 3:], b[:, 3:]))
     )
     n = len(durations)
+    q, qd, qdd = (rows[1:] for rows in knots.joints)
     return PlannedRows(
         waypoints=waypoints.astype(np.int32),
         lengths=lengths,
         angles=angles,
         durations=durations,
         blend_entries=zeros(n, 5),
-        joints=polynomials.joints.x[1:],
+        joints=q,
         primitives=SplineRows(
-            targets=polynomials.joints.x[1:],
-            velocities=polynomials.joints.v[1:],
-            accelerations=polynomials.joints.a[1:],
+            targets=q,
+            velocities=qd,
+            accelerations=qdd,
             durations=durations,
-            quintic=np.full(n, polynomials.quintic),
+            quintic=np.full(n, knots.quintic),
         ),
         report_lines=LateLines.at_once(
             n, lambda: lines(np.stack([lengths, angles, durations], axis=1))

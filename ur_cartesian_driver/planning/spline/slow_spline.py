@@ -14,7 +14,6 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Int64s
-from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.slow_stretch import (
     SlowCause,
     SLOWER_BY,
@@ -54,10 +53,8 @@ def slow_spline_stretches(
     :param slower_by: a speed is too low if it is more than this fraction below the requested one.
     """
     piece, u, times = _places(path)
-    joints = JointSpline.through(
-        polynomials.times, polynomials.joints, quintic=polynomials.quintic
-    )
-    tool, _ = tool_rates(kinematics.arm, kinematics.T_flange_tcp, *joints.rows(times))
+    joints = polynomials.spline.rows(times)
+    tool, _ = tool_rates(kinematics.arm, kinematics.T_flange_tcp, *joints)
     velocities = tool[:, :3]
     speeds = np.linalg.norm(velocities, axis=1)
     asked = _asked_speeds(path, piece, u, twists, stretch)

@@ -37,6 +37,7 @@ from ur_cartesian_driver.planning.geometry.samples import (
 )
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline, ToolSplinePath
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.clearance import JointSamples
 from ur_cartesian_driver.planning.preflight.joint_path_solver import (
     JointPath,
     max_path_length,
@@ -92,6 +93,11 @@ class SplinePath:
         begin = self.spline.times[self.piece]
         times: Floats = begin + self.u * (self.spline.times[self.piece + 1] - begin)
         return times
+
+    @property
+    def samples(self) -> JointSamples:
+        """The samples behind the start."""
+        return JointSamples(self.points[1:], self.fractions[1:], self.q[1:])
 
     @property
     def reference(self) -> ReferencePath:

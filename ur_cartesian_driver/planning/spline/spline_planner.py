@@ -30,19 +30,14 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector6, vector6
 from ur_cartesian_driver.motion.goal.goal import PIECES_PER_HORIZON
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
-from ur_cartesian_driver.motion.plan.plan import (
-    Plan,
-    PlannedRows,
-    PlannedSegment,
-    ReferencePath,
-)
+from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import Spline
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowStretch, SpeedLimit
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.min_speed import slower_by
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
+from ur_cartesian_driver.planning.preflight.clearance import clearance_lines, JointSamples
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
 from ur_cartesian_driver.planning.spline.joint_polynomials import (
@@ -75,15 +70,6 @@ class SplineState:
     qd: Vector6 = ZERO6
     #: Joint accelerations [rad/s^2]; after a cubic piece, these are taken as 0.
     qdd: Vector6 = ZERO6
-
-    @classmethod
-    def after(cls, segment: PlannedSegment, time: float) -> SplineState:
-        """Return the state at the end of a piece that ends at a time [s]."""
-        piece = segment.primitive
-        assert isinstance(piece, Spline)
-        return cls(
-            time=time, q=piece.target, qd=piece.velocities, qdd=piece.accelerations or ZERO6
-        )
 
     @property
     def is_moving(self) -> bool:
@@ -215,7 +201,14 @@ def _max_piece_time(goal: GoalTable) -> float:
 
 def end_state(plan: Plan) -> SplineState:
     """Return the state at the end of a plan of spline pieces."""
-    return SplineState.after(plan.segments[-1], float(plan.reference.time[-1]))
+    piece = plan.segments[-1].primitive
+    assert isinstance(piece, Spline)
+    return SplineState(
+        time=float(plan.reference.time[-1]),
+        q=piece.target,
+        qd=piece.velocities,
+        qdd=piece.accelerations or ZERO6,
+    )
 
 
 def plan_stop(state: SplineState, arm: Arm, deceleration: float) -> Spline:
@@ -238,7 +231,7 @@ def plan_stop(state: SplineState, arm: Arm, deceleration: float) -> Spline:
         piece = Spline(
             target=vector6(target.tolist()), velocities=ZERO6, accelerations=ZERO6, duration=T
         )
-        q, qd, _ = _rows_of(state, piece)
+        q, qd, _ = rows_along(piece, state, _SAMPLES)
         joint = _joint_outside_range(arm, q)
         if joint is None and (np.abs(qd) <= speed * (1.0 + 1e-9)).all():
             return piece
@@ -249,9 +242,10 @@ def plan_stop(state: SplineState, arm: Arm, deceleration: float) -> Spline:
     )
 
 
-def _rows_of(state: SplineState, piece: Spline) -> tuple[Floats, Floats, Floats]:
+def rows_along(piece: Spline, state: SplineState, samples: int) -> tuple[Floats, Floats, Floats]:
+    """Return joint positions and their rates at times evenly along a piece that begins so."""
     spline = JointSpline.of(state.q, [piece], velocities=state.qd, accelerations=state.qdd)
-    return spline.rows(np.linspace(0.0, piece.duration, _SAMPLES))
+    return spline.rows(np.linspace(0.0, piece.duration, samples))
 
 
 def _joint_outside_range(arm: Arm, q: Floats) -> int | None:
@@ -328,13 +322,15 @@ def _clearance_remarks(
     options: PlanningOptions,
 ) -> list[str]:
     """Return the remarks on clearance, including the stop after a moving end."""
-    q, points, u = path.q[1:], path.points[1:], path.fractions[1:]
+    samples = path.samples
     if end.is_moving:
-        on = _rows_of(end, plan_stop(end, arm, options.keep_open_deceleration))[0]
-        q = np.concatenate([q, on])
-        points = np.concatenate([points, np.full(len(on), points[-1])])
-        u = np.concatenate([u, np.ones(len(on))])
-    return clearance_lines(arm, tool_tips, options, q, start.q, points, u)
+        on = rows_along(plan_stop(end, arm, options.keep_open_deceleration), end, _SAMPLES)[0]
+        samples = JointSamples(
+            np.append(samples.segment, np.full(len(on), samples.segment[-1])),
+            np.append(samples.fraction, np.ones(len(on))),
+            np.concatenate([samples.q, on]),
+        )
+    return clearance_lines(arm, tool_tips, options, samples, start.q)
 
 
 def stretch_times(goal: GoalTable, factor: float) -> GoalTable:

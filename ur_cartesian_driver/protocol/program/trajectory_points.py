@@ -133,7 +133,10 @@ def encode_rows(rows: PlannedRows, dialect: Dialect = NEWEST_DIALECT) -> bytes:
     if isinstance(moves, SplineRows):
         fields[first], fine[first] = spline_fields(moves), moves.durations > 0.0
     elif isinstance(moves, MoveRows):
-        fields[first], fine[first] = move_fields(moves), are_plain_moves(moves)
+        for begin in range(0, len(moves), _CHUNK):  # all at once would need twice the memory
+            part = slice(begin, begin + _CHUNK)
+            fields[first[part]] = move_fields(moves[part])
+        fine[first] = are_plain_moves(moves)
         others |= {int(first[row]): move for row, move in moves.others.items()}
     else:
         others |= zip(first.tolist(), moves, strict=True)
