@@ -161,14 +161,12 @@ class _Relay:
             self._publisher.publish(self._last)
 
 
-def same_request(
-    row: Service, driver: DriverNode, request: Message, timeout: float = ANSWER_TIMEOUT
-) -> Future[ServiceAnswer]:
+def same_request(row: Service, driver: DriverNode, request: Message) -> Future[ServiceAnswer]:
     """Call the driver's service with the values of the fields that both requests have."""
     ours = row.source_type.Request()
     for field in ours.get_fields_and_field_types().keys() & request.get_fields_and_field_types():
         setattr(ours, field, getattr(request, field))
-    return driver.call(row.source_type, row.source, ours, timeout)
+    return driver.call(row.source_type, row.source, ours, row.timeout)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -182,6 +180,8 @@ class Service(UrName):
     source_type: Any
     #: Starts the driver's call for a request; gets the row, too.
     call: Call = same_request
+    #: How long the driver may take to answer [s].
+    timeout: float = ANSWER_TIMEOUT
     #: Writes the text of an answer into the fields of the response.
     #:
     #: :raises ValueError: the text is not what the response can say.
