@@ -98,8 +98,8 @@ class _ModeServer:
 
         def end(handle: Any) -> Message:
             self._run = None
-            end_goal(handle, succeeded=success and not handle.is_cancel_requested)
             succeeded = success and not handle.is_cancel_requested
+            end_goal(handle, succeeded=succeeded)
             return self._action.Result(success=succeeded, message=text)
 
         self._server.finish(handle, end)
