@@ -29,8 +29,8 @@ from ur_cartesian_driver.msg import (
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros import CartesianDriverNode
 from ur_cartesian_driver.ros.client import GoalClient, load_goal
+from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS, STATE_QOS
 from ur_cartesian_driver.ros.parameters.parameter_table import ParameterError
-from ur_cartesian_driver.ros.state.state_publisher import LATCHED_QOS, STATE_QOS
 
 pytestmark = pytest.mark.slow
 

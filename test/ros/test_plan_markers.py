@@ -22,7 +22,7 @@ from ur_cartesian_driver.ros.message_fields import pose_from_message
 from ur_cartesian_driver.ros.messages import marker_messages
 from ur_cartesian_driver.ros.messages.marker_messages import COLOURS, plan_markers
 from ur_cartesian_driver.ros.messages.state_messages import link_transforms
-from ur_cartesian_driver.ros.state.state_publisher import LATCHED_QOS
+from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS
 
 ARM = Arm(MODELS['ur5e'])
 HOME = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
@@ -55,8 +55,8 @@ def test_path_points_and_ends_are_those_of_the_plan(made):
     path = found['path', 0]
     np.testing.assert_allclose(array(path.points), made.reference.poses[:, :3])
     kinds = {tuple(np.round(255 * np.array((c.r, c.g, c.b))).astype(int)) for c in path.colors}
-    expected = {PAGE._TYPES[kind][1] for kind in ('MoveL', 'MoveJ')}
-    assert kinds == {*expected, PAGE._BLEND}
+    expected = {PAGE.MOTIONS[kind][1] for kind in ('MoveL', 'MoveJ')}
+    assert kinds == {*expected, PAGE.BLEND}
     points = array(found['points', 0].points)
     np.testing.assert_allclose(points, [w.pose.position for w in made.goal.waypoints])
     for number, row in ((0, 0), (1, -1)):
@@ -67,7 +67,7 @@ def test_path_points_and_ends_are_those_of_the_plan(made):
 def test_colours_are_those_of_the_page():
     assert {
         name: tuple(round(255 * v) for v in (c.r, c.g, c.b)) for name, c in COLOURS.items()
-    } == {name: colour for name, (_, colour) in PAGE._TYPES.items()}
+    } == {name: colour for name, (_, colour) in PAGE.MOTIONS.items()}
 
 
 def test_long_paths_are_thinned_out_and_keep_their_ends(made, monkeypatch):

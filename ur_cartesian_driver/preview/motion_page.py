@@ -58,7 +58,8 @@ _ARM, _TOOL, _POINT, _START, _OUTPUT, _PLANE, _REFUSED, _TRAIL = (
     (210, 30, 30),
     (230, 60, 160),
 )
-_TYPES: dict[str, tuple[str, Colour]] = {
+#: Name and colour of each motion.
+MOTIONS: dict[str, tuple[str, Colour]] = {
     'MoveL': ('line', (30, 110, 220)),
     'MoveP': ('process', (20, 150, 90)),
     'MoveC': ('arc', (230, 130, 20)),
@@ -69,7 +70,8 @@ _TYPES: dict[str, tuple[str, Colour]] = {
 }
 #: Direction to the camera if the path gives none.
 _ASIDE = np.array((0.65, 0.65, 0.4))
-_BLEND: Colour = (240, 200, 60)
+#: Colour of blends.
+BLEND: Colour = (240, 200, 60)
 _LOW, _MIDDLE, _HIGH = np.array([(205, 40, 40), (235, 190, 40), (40, 150, 70)], dtype=np.float64)
 #: Pattern of the scene in viser's page; name of the settings in it.
 _DATA = re.compile(r'window\.__VISER_EMBED_DATA__="([^"]*)";')
@@ -182,12 +184,12 @@ def _place(text: str, path: Floats) -> Floats | None:
 def _by_type(plan: Plan) -> _Colouring:
     kinds, reference = plan.rows.kinds, plan.reference
     colours = np.array(
-        [_TYPES[kinds[point]][1] for point in reference.point[1:].tolist()], dtype=np.uint8
+        [MOTIONS[kinds[point]][1] for point in reference.point[1:].tolist()], dtype=np.uint8
     ).reshape(-1, 3)
     on_blend = reference.blend_tolerance[1:].any(axis=1)
-    colours[on_blend] = _BLEND
-    legend = [_TYPES[kind] for kind in dict.fromkeys(kinds.values())]
-    return _Colouring('type', colours, [*legend, *([('blend', _BLEND)] if on_blend.any() else [])])
+    colours[on_blend] = BLEND
+    legend = [MOTIONS[kind] for kind in dict.fromkeys(kinds.values())]
+    return _Colouring('type', colours, [*legend, *([('blend', BLEND)] if on_blend.any() else [])])
 
 
 def _by_speed(plan: Plan) -> _Colouring:

@@ -14,10 +14,12 @@ from geometry_msgs.msg import Pose as PoseMessage
 
 from ur_cartesian_driver.goal_files.goal_reading import nanoseconds, pose_from_message, seconds
 from ur_cartesian_driver.goal_files.goal_schema import Message
+from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import Pose
 
 __all__ = [
     'Message',
+    'age_of',
     'class_of',
     'duration_message',
     'nanoseconds',
@@ -26,6 +28,7 @@ __all__ = [
     'quaternion_message',
     'seconds',
     'vector_message',
+    'wrong_stamp',
 ]
 
 _MAX_SECONDS = 2**31 - 1
@@ -35,6 +38,22 @@ def duration_message(time: float) -> Duration:
     """Return seconds as a duration, rounded to 1 ns; infinity becomes the largest duration."""
     sec, nanosec = divmod(round(min(time, _MAX_SECONDS) * 1_000_000_000), 1_000_000_000)
     return Duration(sec=sec, nanosec=nanosec)
+
+
+def age_of(stamp: Message, now: int) -> float | None:
+    """Return the age of a stamp [s] at a time [ns]; None if it is zero, and so not given."""
+    sent = nanoseconds(stamp)
+    return None if sent == 0 else (now - sent) / 1_000_000_000
+
+
+def wrong_stamp(age: float, bound: str) -> InvalidGoal:
+    """Return the refusal of a message whose stamp is too old, or in the future."""
+    return InvalidGoal(
+        'header.stamp',
+        f'is {abs(age):.3f} s {"old" if age > 0.0 else "in the future"}, {bound}',
+        'compare the clocks of both computers, or leave the stamp 0: then the age counts '
+        'from the receipt',
+    )
 
 
 def pose_message(pose: Pose) -> PoseMessage:

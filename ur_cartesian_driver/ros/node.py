@@ -16,8 +16,6 @@ from typing import Any
 
 import rclpy
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
@@ -31,6 +29,7 @@ from ur_cartesian_driver.ros.goals.path_offset_subscriber import PathOffsetSubsc
 from ur_cartesian_driver.ros.live.freedrive_service import FreedriveService
 from ur_cartesian_driver.ros.live.live_target_subscriber import LiveTargetSubscriber
 from ur_cartesian_driver.ros.live.servo_state_publisher import ServoStatePublisher
+from ur_cartesian_driver.ros.node_endpoints import steady_timer
 from ur_cartesian_driver.ros.parameters.node_parameters import as_overrides, declare_parameters
 from ur_cartesian_driver.ros.parameters.parameter_table import ParameterError, ParameterValue
 from ur_cartesian_driver.ros.services.append_service import AppendService
@@ -130,18 +129,13 @@ class CartesianDriverNode(Node):
         self._components.append(self.contact_action)
         self._publisher.start()
         self._call_services = CommandServices(self, self.driver, self._is_idle)
-        self.create_timer(
+        steady_timer(
+            self,
             min(HEARTBEAT_PERIOD, settings.driver.node_timeout / 4.0),
             self.driver.heartbeat,
-            # Runs during other callbacks, by a clock that does not stop with simulated time.
-            callback_group=MutuallyExclusiveCallbackGroup(),
-            clock=Clock(clock_type=ClockType.STEADY_TIME),
+            MutuallyExclusiveCallbackGroup(),  # so that it runs during other callbacks
         )
-        self._neighbour_timer = self.create_timer(
-            DISCOVERY_TIME,
-            self._warn_of_neighbours,
-            clock=Clock(clock_type=ClockType.STEADY_TIME),
-        )
+        self._neighbour_timer = steady_timer(self, DISCOVERY_TIME, self._warn_of_neighbours)
 
     def _is_idle(self) -> bool:
         """Return whether no goal or session depends on the present TCP, payload and gravity."""

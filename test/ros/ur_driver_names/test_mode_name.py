@@ -10,6 +10,7 @@ import pytest
 
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode, SafetyMode
 from ur_cartesian_driver.msg import DriverStatus
+from ur_cartesian_driver.ros.ur_driver_names import mode_action
 from ur_cartesian_driver.ros.ur_driver_names.mode_action import ModeRun
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 
@@ -168,6 +169,27 @@ def test_a_goal_is_cancelled(helper):
     helper.ur.cell.await_(handle.cancel_goal_async())
     status, result = helper.ur.result(handle)
     assert (status, result.success) == (GoalStatus.STATUS_CANCELED, False)
+
+
+def test_a_cancel_during_the_last_step_ends_without_success(monkeypatch):
+    class Goal:
+        is_cancel_requested, state = True, ''
+
+        def canceled(self):
+            # As rclpy's: no cancel is pending any more.
+            self.is_cancel_requested, self.state = False, 'canceled'
+
+    results = []
+    server = SimpleNamespace(finish=lambda goal, end: results.append(end(goal)))
+    monkeypatch.setattr(mode_action, 'DeferredActionServer', lambda *_, **__: server)
+    driver: Any = SimpleNamespace(node=None, on_status=lambda take: None)
+    row: Any = SimpleNamespace(name='set_mode')
+    action = SimpleNamespace(Result=SimpleNamespace)
+    served = mode_action._ModeServer(row, driver, NamesSettings(), action)
+    goal = Goal()
+    served._finish(goal, True, 'reached')
+    (result,) = results
+    assert (goal.state, result.success) == ('canceled', False)
 
 
 @pytest.mark.parametrize('mode', [mode for mode in RobotMode if mode not in MODES])

@@ -57,39 +57,31 @@ class ExpectedEffect:
     """The robot state that confirms a command."""
 
     is_reached: Callable[[RobotState], bool]
-    timeout: float
     #: Name of this state, for error texts.
     target_mode: str
+    timeout: float = EFFECT_TIMEOUT
 
 
 #: The effects of dashboard commands that take time.
 EXPECTED_EFFECTS: Mapping[str, ExpectedEffect] = {
     'power on': ExpectedEffect(
-        lambda r: r.robot_mode in (RobotMode.IDLE, RobotMode.RUNNING), POWER_TIMEOUT, 'IDLE'
+        lambda r: r.robot_mode in (RobotMode.IDLE, RobotMode.RUNNING), 'IDLE', POWER_TIMEOUT
     ),
-    'power off': ExpectedEffect(
-        lambda r: r.robot_mode is RobotMode.POWER_OFF, EFFECT_TIMEOUT, 'POWER_OFF'
-    ),
+    'power off': ExpectedEffect(lambda r: r.robot_mode is RobotMode.POWER_OFF, 'POWER_OFF'),
     'brake release': ExpectedEffect(
-        lambda r: r.robot_mode is RobotMode.RUNNING, POWER_TIMEOUT, 'RUNNING'
+        lambda r: r.robot_mode is RobotMode.RUNNING, 'RUNNING', POWER_TIMEOUT
     ),
     'unlock protective stop': ExpectedEffect(
-        lambda r: r.safety_mode is not SafetyMode.PROTECTIVE_STOP, EFFECT_TIMEOUT, 'unlocked'
+        lambda r: r.safety_mode is not SafetyMode.PROTECTIVE_STOP, 'unlocked'
     ),
     'restart safety': ExpectedEffect(
         lambda r: r.safety_mode not in (SafetyMode.VIOLATION, SafetyMode.FAULT),
-        POWER_TIMEOUT,
         'restarted',
+        POWER_TIMEOUT,
     ),
-    'play': ExpectedEffect(
-        lambda r: r.runtime_state is RuntimeState.PLAYING, EFFECT_TIMEOUT, 'PLAYING'
-    ),
-    'pause': ExpectedEffect(
-        lambda r: r.runtime_state is RuntimeState.PAUSED, EFFECT_TIMEOUT, 'PAUSED'
-    ),
-    'stop': ExpectedEffect(
-        lambda r: r.runtime_state is RuntimeState.STOPPED, EFFECT_TIMEOUT, 'STOPPED'
-    ),
+    'play': ExpectedEffect(lambda r: r.runtime_state is RuntimeState.PLAYING, 'PLAYING'),
+    'pause': ExpectedEffect(lambda r: r.runtime_state is RuntimeState.PAUSED, 'PAUSED'),
+    'stop': ExpectedEffect(lambda r: r.runtime_state is RuntimeState.STOPPED, 'STOPPED'),
 }
 
 

@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.goal.known_frames import Frames
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter
-from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer
+from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer, end_goal
 from ur_cartesian_driver.ros.goals.goal_actions import GoalAction, installed_actions
 from ur_cartesian_driver.ros.goals.goal_context import GoalContext
 from ur_cartesian_driver.ros.goals.goal_run import goal_key, GoalHandle, GoalRun
@@ -165,12 +165,11 @@ class GoalServer:
     def _end(self, run: GoalRun, outcome: Outcome) -> Message:
         """Put a goal into its final state and return its result; called by the executor."""
         try:
-            if outcome.succeeded:
-                run.handle.succeed()
-            elif outcome.code is ErrorCode.CANCELLED and run.handle.is_cancel_requested:
-                run.handle.canceled()
-            else:
-                run.handle.abort()
+            end_goal(
+                run.handle,
+                succeeded=outcome.succeeded,
+                cancelled=outcome.code is ErrorCode.CANCELLED,
+            )
         finally:
             with self._lock:
                 self._runs.pop(run.key, None)

@@ -61,3 +61,17 @@ class DeferredActionServer(ActionServer):
         """Destroy the server; it sends no more results."""
         self._destroyed = True
         super().destroy()  # type: ignore[no-untyped-call]  # rclpy's
+
+
+def end_goal(goal_handle: GoalHandle, *, succeeded: bool, cancelled: bool = True) -> None:
+    """
+    Put a goal into its final state.
+
+    :param cancelled: whether a requested cancel, if there is one, has ended the goal.
+    """
+    if succeeded:
+        goal_handle.succeed()
+    elif cancelled and goal_handle.is_cancel_requested:
+        goal_handle.canceled()
+    else:
+        goal_handle.abort()

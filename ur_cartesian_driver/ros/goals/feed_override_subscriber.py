@@ -4,12 +4,11 @@
 
 from __future__ import annotations
 
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
 from ur_cartesian_driver.ros.goals.action_server import GoalServer
-from ur_cartesian_driver.ros.goals.path_offset_subscriber import OFFSET_QOS
+from ur_cartesian_driver.ros.node_endpoints import newest_subscription
 
 
 class FeedOverrideSubscriber:
@@ -23,13 +22,7 @@ class FeedOverrideSubscriber:
     def __init__(self, node: Node, server: GoalServer) -> None:
         """Subscribe."""
         self._server = server
-        self._subscription = node.create_subscription(
-            Float64,
-            '~/feed_override',
-            self.give,
-            OFFSET_QOS,
-            callback_group=MutuallyExclusiveCallbackGroup(),
-        )
+        self._subscription = newest_subscription(node, Float64, '~/feed_override', self.give)
 
     def give(self, message: Float64) -> None:
         """Pass a fraction of the planned speed to the running motion."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.errors import InvalidGoal
@@ -37,38 +37,10 @@ AnyGoal: TypeAlias = Goal | JointGoal
 MakeFeedback: TypeAlias = Callable[[Progress], Message]
 
 
-class GoalAction(Protocol):
-    """One action: its type, its name, and its messages."""
-
-    #: The class of the action.
-    action_type: Any
-    #: The name of the action, relative to the node.
-    name: str
-
-    def is_validation(self, request: Message) -> bool:
-        """Return whether a goal is only to be checked."""
-
-    def goal(self, request: Message, context: GoalContext, received: int) -> AnyGoal:
-        """
-        Return the goal of a message.
-
-        :param received: time of receipt on the node's clock [ns].
-        :raises GoalRefused: the message is malformed, or the pose of a frame is not known.
-        """
-
-    def resolved(self, goal: Any, request: Message, context: GoalContext) -> AnyGoal:
-        """Return a goal with the present poses of its frames."""
-
-    def feedback_of(self, request: Message, plan: Plan, context: GoalContext) -> MakeFeedback:
-        """Return the function that makes the feedback messages of a plan."""
-
-    def result(self, outcome: Outcome) -> Message:
-        """Return the result message of an outcome."""
-
-
 class CartesianAction:
     """Follow the path of a tool: ``~/follow_cartesian_trajectory``."""
 
+    #: The class of the action, and its name relative to the node.
     action_type: Any = FollowCartesianTrajectory
     name = '~/follow_cartesian_trajectory'
 
@@ -77,7 +49,12 @@ class CartesianAction:
         return bool(request.validate_only)
 
     def goal(self, request: Message, context: GoalContext, received: int) -> Goal:
-        """Return the goal of a message."""
+        """
+        Return the goal of a message.
+
+        :param received: time of receipt on the node's clock [ns].
+        :raises GoalRefused: the message is malformed, or the pose of a frame is not known.
+        """
         return goal_from_message(
             request,
             context.frames,
@@ -86,7 +63,7 @@ class CartesianAction:
             time_tolerance=context.settings.node.goal_time_tolerance,
         )
 
-    def resolved(self, goal: Goal, request: Message, context: GoalContext) -> Goal:
+    def resolved(self, goal: Any, request: Message, context: GoalContext) -> AnyGoal:
         """Return a goal with the present poses of its frames."""
         return resolve_frames(
             goal,
@@ -131,7 +108,7 @@ class JointAction:
             request, now=received, time_tolerance=context.settings.node.goal_time_tolerance
         )
 
-    def resolved(self, goal: JointGoal, request: Message, context: GoalContext) -> JointGoal:
+    def resolved(self, goal: AnyGoal, request: Message, context: GoalContext) -> AnyGoal:
         """Return the goal unchanged, because joints have no frames."""
         return goal
 
@@ -171,6 +148,9 @@ class JointUntilAction(JointAction):
             message.TRIGGERED if outcome.touched else message.NOT_TRIGGERED
         )
         return message
+
+
+GoalAction: TypeAlias = CartesianAction | JointAction
 
 
 def installed_actions() -> list[GoalAction]:

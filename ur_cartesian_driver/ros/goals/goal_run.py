@@ -15,9 +15,6 @@ from dataclasses import replace
 import threading
 from typing import Any, TypeAlias
 
-from rclpy.action.server import RCLError
-from rclpy.exceptions import InvalidHandle
-
 from ur_cartesian_driver.driver import MotionHandle
 from ur_cartesian_driver.motion.errors import (
     Cancelled,
@@ -36,6 +33,7 @@ from ur_cartesian_driver.ros.goals.arm_arbiter import ArmRequest
 from ur_cartesian_driver.ros.goals.goal_actions import AnyGoal, GoalAction
 from ur_cartesian_driver.ros.goals.goal_context import GoalContext
 from ur_cartesian_driver.ros.message_fields import nanoseconds
+from ur_cartesian_driver.ros.node_endpoints import SHUT_DOWN_ERRORS
 
 GoalHandle: TypeAlias = Any
 
@@ -262,7 +260,7 @@ class GoalRun:
             self._begun.wait()
             message = make(progress)
             # The node, or all of ROS, may be shutting down; the motion is then cancelled anyway.
-            with contextlib.suppress(InvalidHandle, RCLError):
+            with contextlib.suppress(*SHUT_DOWN_ERRORS):
                 self.handle.publish_feedback(message)
 
         return publish

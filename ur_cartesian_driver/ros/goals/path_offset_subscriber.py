@@ -10,16 +10,13 @@ stays in effect until it is stale.
 from __future__ import annotations
 
 from geometry_msgs.msg import Vector3Stamped
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal, RobotNotReady
 from ur_cartesian_driver.ros.goals.action_server import GoalServer
-from ur_cartesian_driver.ros.message_fields import nanoseconds
+from ur_cartesian_driver.ros.message_fields import age_of, wrong_stamp
+from ur_cartesian_driver.ros.node_endpoints import newest_subscription
 
-#: Only the newest offset is used, and a lost one is not sent again.
-OFFSET_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 #: The values of ``frame_id`` that mean the frame of the path.
 FRAMES = ('', 'path')
 #: How far a stamp may lie in the future, because clocks differ [s].
@@ -34,13 +31,7 @@ class PathOffsetSubscriber:
     def __init__(self, node: Node, server: GoalServer) -> None:
         """Subscribe."""
         self._clock, self._logger, self._server = node.get_clock(), node.get_logger(), server
-        self._subscription = node.create_subscription(
-            Vector3Stamped,
-            '~/path_offset',
-            self._take,
-            OFFSET_QOS,
-            callback_group=MutuallyExclusiveCallbackGroup(),
-        )
+        self._subscription = newest_subscription(node, Vector3Stamped, '~/path_offset', self._take)
 
     def _take(self, message: Vector3Stamped) -> None:
         try:
@@ -64,18 +55,11 @@ class PathOffsetSubscriber:
                 f"is '{header.frame_id}', but offsets are in the frame of the path",
                 "leave it empty, or set it to 'path'",
             )
-        stamp = nanoseconds(header.stamp)
-        age = (self._clock.now().nanoseconds - stamp) / 1_000_000_000 if stamp else 0.0
+        age = age_of(header.stamp, self._clock.now().nanoseconds) or 0.0
         motion = self._server.running_motion
         if motion is None:
             raise RobotNotReady('No goal moves the arm.')
         timeout = motion.offset_timeout
         if timeout is not None and not -MAX_STAMP_AHEAD <= age <= timeout:
-            raise InvalidGoal(
-                'header.stamp',
-                f'is {abs(age):.3f} s {"old" if age > 0.0 else "in the future"}, '
-                f'path_offset.timeout is {timeout:g} s',
-                'compare the clocks of both computers, or leave the stamp 0: then the age counts '
-                'from the receipt',
-            )
+            raise wrong_stamp(age, f'path_offset.timeout is {timeout:g} s')
         motion.set_path_offset(along=vector.x, across=vector.y, normal=vector.z, age=max(0.0, age))

@@ -6,19 +6,12 @@ from __future__ import annotations
 
 import contextlib
 
-from rclpy.action.server import RCLError
-from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from visualization_msgs.msg import MarkerArray
 
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.ros.messages.marker_messages import plan_markers
-
-#: Late subscribers get the newest plan at once.
-LATCHED_QOS = QoSProfile(
-    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
-)
+from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS, SHUT_DOWN_ERRORS
 
 
 class PlanMarkerPublisher:
@@ -35,5 +28,5 @@ class PlanMarkerPublisher:
 
     def publish(self, plan: Plan) -> None:
         """Publish a plan, unless the node is shutting down."""
-        with contextlib.suppress(InvalidHandle, RCLError):
+        with contextlib.suppress(*SHUT_DOWN_ERRORS):
             self._topic.publish(plan_markers(plan, self._base, self._clock.now().to_msg()))

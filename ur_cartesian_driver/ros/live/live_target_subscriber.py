@@ -24,22 +24,25 @@ import threading
 from time import monotonic
 
 from geometry_msgs.msg import PoseStamped
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.driver.live_session import check_pose, LiveSession
-from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, RobotNotReady
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.state.rtde_state import SafetyStatus
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter, ArmRequest
-from ur_cartesian_driver.ros.message_fields import Message, nanoseconds, pose_from_message
+from ur_cartesian_driver.ros.message_fields import (
+    age_of,
+    Message,
+    nanoseconds,
+    pose_from_message,
+    wrong_stamp,
+)
+from ur_cartesian_driver.ros.node_endpoints import newest_subscription
 
-#: Only the newest target is used, and a lost one is not sent again.
-TARGET_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 #: Stops after which an operator has to check the robot.
 SAFETY_STOPS = (
     SafetyStatus.PROTECTIVE_STOPPED
@@ -70,16 +73,9 @@ def target_from_message(
     """
     pose = pose_from_message(message.pose)
     check_pose(pose)
-    stamp = nanoseconds(message.header.stamp)
-    age = (now - stamp) / 1_000_000_000 if stamp else 0.0
+    age = age_of(message.header.stamp, now) or 0.0
     if abs(age) > max_age:
-        raise InvalidGoal(
-            'header.stamp',
-            f'is {abs(age):.3f} s {"old" if age > 0.0 else "in the future"}, '
-            f'live_target_max_age is {max_age:g} s',
-            'compare the clocks of both computers, or leave the stamp 0: then the age counts '
-            'from the receipt',
-        )
+        raise wrong_stamp(age, f'live_target_max_age is {max_age:g} s')
     return frames.T_base_frame(message.header.frame_id, snapshot) @ pose, max(0.0, age)
 
 
@@ -130,13 +126,7 @@ class LiveTargetSubscriber:
         self._closing = False
         self._thread = threading.Thread(target=self._run, name='live targets', daemon=True)
         self._thread.start()
-        self._subscription = node.create_subscription(
-            PoseStamped,
-            '~/live_target',
-            self._store,
-            TARGET_QOS,
-            callback_group=MutuallyExclusiveCallbackGroup(),
-        )
+        self._subscription = newest_subscription(node, PoseStamped, '~/live_target', self._store)
 
     def close(self) -> None:
         """Stop the arm, and wait until it is at rest; the node destroys the subscription."""

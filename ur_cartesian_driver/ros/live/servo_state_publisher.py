@@ -8,18 +8,13 @@ import contextlib
 from math import inf
 from time import monotonic
 
-from rclpy.action.server import RCLError
-from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.motion.state.servo_report import ServoActivity, ServoReport
 from ur_cartesian_driver.msg import ServoState
 from ur_cartesian_driver.ros.messages.state_messages import servo_state_message
-
-#: The same QoS as for the other state topics.
-SERVO_STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+from ur_cartesian_driver.ros.node_endpoints import SHUT_DOWN_ERRORS, STATE_QOS
 
 
 class ServoStatePublisher:
@@ -32,7 +27,7 @@ class ServoStatePublisher:
         :param rate: the largest rate [Hz], above 0.
         """
         self._clock, self._period, self._due = node.get_clock(), 1.0 / rate, -inf
-        self._topic = node.create_publisher(ServoState, '~/servo_state', SERVO_STATE_QOS)
+        self._topic = node.create_publisher(ServoState, '~/servo_state', STATE_QOS)
         driver.add_servo_listener(self._publish)
 
     def _publish(self, report: ServoReport) -> None:
@@ -42,5 +37,5 @@ class ServoStatePublisher:
             return
         self._due = max(self._due + self._period, now)
         # The node, or all of ROS, may have been shut down meanwhile.
-        with contextlib.suppress(InvalidHandle, RCLError):
+        with contextlib.suppress(*SHUT_DOWN_ERRORS):
             self._topic.publish(servo_state_message(report, self._clock.now().to_msg()))

@@ -21,7 +21,7 @@ from ur_cartesian_driver.goal_files.goal_reading import (
 from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints, Replacement
-from ur_cartesian_driver.ros.message_fields import Message
+from ur_cartesian_driver.ros.message_fields import age_of, Message
 
 
 def goal_from_message(
@@ -47,7 +47,7 @@ def goal_from_message(
     return resolve_frames(
         replace(
             goal,
-            age=_age(trajectory.header.stamp, now),
+            age=age_of(trajectory.header.stamp, now),
             goal_time_tolerance=goal.goal_time_tolerance or time_tolerance,
         ),
         trajectory,
@@ -101,9 +101,3 @@ def resolve_frames(
         snapshot,
         at=stamp if stamp <= now else 0,
     )
-
-
-def _age(stamp: Message, now: int) -> float | None:
-    """Return the age of a stamp [s]; None if it is zero."""
-    sent = nanoseconds(stamp)
-    return None if sent == 0 else (now - sent) / 1_000_000_000

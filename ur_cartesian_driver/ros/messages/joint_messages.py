@@ -17,12 +17,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.geometry.vectors import subtract6, Vector6
 from ur_cartesian_driver.motion.goal.joint_goal import JointGoal, JointPoint, JointTolerance
-from ur_cartesian_driver.ros.message_fields import (
-    duration_message,
-    Message,
-    nanoseconds,
-    seconds,
-)
+from ur_cartesian_driver.ros.message_fields import age_of, duration_message, Message, seconds
 
 #: Codes that become INVALID_GOAL: the goal was refused before anything moved, was preempted (for
 #: both, ros2_control's joint trajectory controller reports the same), or was cancelled.
@@ -50,7 +45,6 @@ def joint_goal_from_message(message: Message, *, now: int, time_tolerance: float
     """
     _check_other_fields(message)
     trajectory = message.trajectory
-    sent = nanoseconds(trajectory.header.stamp)
     return JointGoal(
         joint_names=tuple(trajectory.joint_names),
         points=tuple(
@@ -63,7 +57,7 @@ def joint_goal_from_message(message: Message, *, now: int, time_tolerance: float
             )
             for point in trajectory.points
         ),
-        age=None if sent == 0 else (now - sent) / 1_000_000_000,
+        age=age_of(trajectory.header.stamp, now),
         path_tolerance=tuple(_tolerances(message.path_tolerance)),
         goal_tolerance=tuple(_tolerances(message.goal_tolerance)),
         goal_time_tolerance=seconds(message.goal_time_tolerance) or time_tolerance,

@@ -14,6 +14,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.plan.plan import Plan
+from ur_cartesian_driver.preview.motion_page import BLEND, MOTIONS
 from ur_cartesian_driver.ros.message_fields import pose_message
 
 #: Largest number of drawn samples of a path, and of drawn points.
@@ -30,16 +31,8 @@ def _colour(red: int, green: int, blue: int) -> ColorRGBA:
 
 
 #: Colours of the motions, the same as on the page that shows a plan.
-COLOURS = {
-    'MoveL': _colour(30, 110, 220),
-    'MoveP': _colour(20, 150, 90),
-    'MoveC': _colour(230, 130, 20),
-    'MoveJ': _colour(150, 60, 190),
-    'OptimoveL': _colour(0, 160, 190),
-    'OptimoveJ': _colour(200, 60, 140),
-    'Spline': _colour(60, 80, 200),
-}
-BLEND_COLOUR = _colour(240, 200, 60)
+COLOURS = {kind: _colour(*colour) for kind, (_, colour) in MOTIONS.items()}
+BLEND_COLOUR = _colour(*BLEND)
 POINT_COLOUR = _colour(50, 60, 70)
 _AXES = (
     ((1.0, 0.0, 0.0), _colour(220, 50, 50)),

@@ -35,7 +35,7 @@ from ur_cartesian_driver.motion.goal.known_frames import (
     TOOL0,
 )
 from ur_cartesian_driver.motion.state.io_signals import AnalogChannel, Signals
-from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RobotState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.servo_report import ServoReport
 from ur_cartesian_driver.msg import DriverStatus, IOStates, ServoState, ToolData
 from ur_cartesian_driver.msg import Pulse as PulseMessage
@@ -182,16 +182,18 @@ def _unknown(name: str, value: Any) -> Any:
 
 def robot_mode_message(state: RobotState | None) -> RobotModeMessage:
     """Return the mode of the robot with its name."""
-    if state is None:
-        return RobotModeMessage(mode=RobotModeMessage.UNKNOWN, name='UNKNOWN')
-    return RobotModeMessage(mode=int(state.robot_mode), name=RobotMode(state.robot_mode).name)
+    return _mode_message(RobotModeMessage, None if state is None else state.robot_mode)
 
 
 def safety_mode_message(state: RobotState | None) -> SafetyModeMessage:
     """Return the safety mode with its name."""
-    if state is None:
-        return SafetyModeMessage(mode=SafetyModeMessage.UNKNOWN, name='UNKNOWN')
-    return SafetyModeMessage(mode=int(state.safety_mode), name=SafetyMode(state.safety_mode).name)
+    return _mode_message(SafetyModeMessage, None if state is None else state.safety_mode)
+
+
+def _mode_message(kind: Any, mode: IntEnum | None) -> Any:
+    if mode is None:
+        return kind(mode=kind.UNKNOWN, name='UNKNOWN')
+    return kind(mode=int(mode), name=mode.name)
 
 
 def io_states_message(signals: Signals, stamp: Time) -> IOStates:

@@ -17,64 +17,24 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from ur_cartesian_driver import srv
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.motion.errors import DriverError, LocalProtocolError
 from ur_cartesian_driver.motion.goal.goal import OutputKind
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
-from ur_cartesian_driver.robot.services.service_calls import (
-    DashboardCall,
-    DashboardLineCall,
-    DownloadProgramCall,
-    HandBackCall,
-    ListProgramsCall,
-    RecoverCall,
-    RunScriptCall,
-    SCRIPT_TIMEOUT,
-    SendProgramCall,
-    ServiceAnswer,
-    ServiceCall,
-    SetGravityCall,
-    SetOutputCall,
-    SetPayloadCall,
-    SetSpeedSliderCall,
-    SetTcpCall,
-    SettingCall,
-    UploadProgramCall,
-    ZeroFtSensorCall,
-)
+from ur_cartesian_driver.robot.services import service_calls as calls
+from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, ServiceCall
 from ur_cartesian_driver.ros.message_fields import pose_from_message
 from ur_cartesian_driver.ros.services.deferred_service import completed_answer, DeferredService
-from ur_cartesian_driver.srv import (
-    DownloadProgram,
-    GenerateFlightReport,
-    GenerateSupportFile,
-    Load,
-    Popup,
-    RawRequest,
-    Recover,
-    RunScript,
-    SetIO,
-    SetOperationalMode,
-    SetSpeedSliderFraction,
-    SetTCP,
-    SetUserRole,
-    UploadProgram,
-)
-from ur_cartesian_driver.srv import (
-    SetGravity as SetGravityService,
-)
-from ur_cartesian_driver.srv import (
-    SetPayload as SetPayloadService,
-)
 
 #: The driver call of each service without request fields; the response is a sentence or a value.
 TRIGGER_SERVICES: Mapping[str, ServiceCall] = {
-    'resend_robot_program': SendProgramCall(),
-    'hand_back_control': HandBackCall(),
-    'zero_ftsensor': ZeroFtSensorCall(),
-    'dashboard/get_programs': ListProgramsCall(),
+    'resend_robot_program': calls.SendProgramCall(),
+    'hand_back_control': calls.HandBackCall(),
+    'zero_ftsensor': calls.ZeroFtSensorCall(),
+    'dashboard/get_programs': calls.ListProgramsCall(),
     **{
-        f'dashboard/{name}': DashboardCall(command=command)
+        f'dashboard/{name}': calls.DashboardCall(command=command)
         for name, command in {
             'power_on': 'power on',
             'power_off': 'power off',
@@ -106,12 +66,12 @@ TRIGGER_SERVICES: Mapping[str, ServiceCall] = {
 
 
 def _tcp(request: Any) -> ServiceCall:
-    return SetTcpCall(T_flange_tcp=pose_from_message(request.tcp))
+    return calls.SetTcpCall(T_flange_tcp=pose_from_message(request.tcp))
 
 
 def _payload(request: Any) -> ServiceCall:
     cog = request.center_of_gravity
-    return SetPayloadCall(
+    return calls.SetPayloadCall(
         mass=request.mass,
         cog=(cog.x, cog.y, cog.z),
         inertia=tuple(request.inertia),
@@ -121,7 +81,7 @@ def _payload(request: Any) -> ServiceCall:
 
 def _gravity(request: Any) -> ServiceCall:
     gravity = request.gravity
-    return SetGravityCall(gravity=(gravity.x, gravity.y, gravity.z))
+    return calls.SetGravityCall(gravity=(gravity.x, gravity.y, gravity.z))
 
 
 def _output(request: Any) -> ServiceCall:
@@ -129,75 +89,67 @@ def _output(request: Any) -> ServiceCall:
         kind, domain = OutputKind(request.output), AnalogDomain(request.analog_domain)
     except ValueError as error:
         raise LocalProtocolError(f'output or analog_domain: {error}.') from None
-    return SetOutputCall(kind=kind, pin=request.pin, value=request.value, domain=domain)
+    return calls.SetOutputCall(kind=kind, pin=request.pin, value=request.value, domain=domain)
+
+
+def _dashboard(command: str, field: str) -> Callable[[Any], ServiceCall]:
+    """Return the conversion of a request with one field, the argument of a dashboard command."""
+    return lambda request: calls.DashboardCall(command=command, argument=getattr(request, field))
 
 
 #: For each service with request fields: the type of the service, and the function that converts a
 #: request to a driver call.
 REQUEST_SERVICES: Mapping[str, tuple[Any, Callable[[Any], ServiceCall]]] = {
     'recover': (
-        Recover,
-        lambda request: RecoverCall(unlock_protective_stop=request.unlock_protective_stop),
+        srv.Recover,
+        lambda request: calls.RecoverCall(unlock_protective_stop=request.unlock_protective_stop),
     ),
     'run_script': (
-        RunScript,
-        lambda request: RunScriptCall(
-            script=request.script, timeout=request.timeout or SCRIPT_TIMEOUT
+        srv.RunScript,
+        lambda request: calls.RunScriptCall(
+            script=request.script, timeout=request.timeout or calls.SCRIPT_TIMEOUT
         ),
     ),
-    'set_tcp': (SetTCP, _tcp),
-    'set_payload': (SetPayloadService, _payload),
-    'set_gravity': (SetGravityService, _gravity),
-    'set_io': (SetIO, _output),
+    'set_tcp': (srv.SetTCP, _tcp),
+    'set_payload': (srv.SetPayload, _payload),
+    'set_gravity': (srv.SetGravity, _gravity),
+    'set_io': (srv.SetIO, _output),
     'set_speed_slider': (
-        SetSpeedSliderFraction,
-        lambda request: SetSpeedSliderCall(fraction=request.speed_slider_fraction),
+        srv.SetSpeedSliderFraction,
+        lambda request: calls.SetSpeedSliderCall(fraction=request.speed_slider_fraction),
     ),
-    'dashboard/load_program': (
-        Load,
-        lambda request: DashboardCall(command='load', argument=request.filename),
-    ),
-    'dashboard/load_installation': (
-        Load,
-        lambda request: DashboardCall(command='load installation', argument=request.filename),
-    ),
-    'dashboard/popup': (
-        Popup,
-        lambda request: DashboardCall(command='popup', argument=request.message),
-    ),
+    'dashboard/load_program': (srv.Load, _dashboard('load', 'filename')),
+    'dashboard/load_installation': (srv.Load, _dashboard('load installation', 'filename')),
+    'dashboard/popup': (srv.Popup, _dashboard('popup', 'message')),
     'dashboard/set_operational_mode': (
-        SetOperationalMode,
-        lambda request: DashboardCall(
-            command='set operational mode', argument=request.operational_mode
-        ),
+        srv.SetOperationalMode,
+        _dashboard('set operational mode', 'operational_mode'),
     ),
-    'dashboard/set_user_role': (
-        SetUserRole,
-        lambda request: DashboardCall(command='setUserRole', argument=request.user_role),
-    ),
+    'dashboard/set_user_role': (srv.SetUserRole, _dashboard('setUserRole', 'user_role')),
     'dashboard/generate_flight_report': (
-        GenerateFlightReport,
-        lambda request: DashboardCall(
-            command='generate flight report', argument=request.report_type
-        ),
+        srv.GenerateFlightReport,
+        _dashboard('generate flight report', 'report_type'),
     ),
     'dashboard/generate_support_file': (
-        GenerateSupportFile,
-        lambda request: DashboardCall(command='generate support file', argument=request.dir_path),
+        srv.GenerateSupportFile,
+        _dashboard('generate support file', 'dir_path'),
     ),
     'dashboard/upload_program': (
-        UploadProgram,
-        lambda request: UploadProgramCall(program=request.program),
+        srv.UploadProgram,
+        lambda request: calls.UploadProgramCall(program=request.program),
     ),
     'dashboard/update_program': (
-        UploadProgram,
-        lambda request: UploadProgramCall(program=request.program, replaces=True),
+        srv.UploadProgram,
+        lambda request: calls.UploadProgramCall(program=request.program, replaces=True),
     ),
     'dashboard/download_program': (
-        DownloadProgram,
-        lambda request: DownloadProgramCall(program_name=request.program_name),
+        srv.DownloadProgram,
+        lambda request: calls.DownloadProgramCall(program_name=request.program_name),
     ),
-    'dashboard/raw_request': (RawRequest, lambda request: DashboardLineCall(line=request.query)),
+    'dashboard/raw_request': (
+        srv.RawRequest,
+        lambda request: calls.DashboardLineCall(line=request.query),
+    ),
 }
 
 
@@ -228,7 +180,7 @@ class CommandServices:
 
     def _call(self, call: ServiceCall, _: Any = None) -> Future[ServiceAnswer]:
         # A goal that is being planned depends on the settings that it found.
-        if isinstance(call, SettingCall) and not self._is_idle():
+        if isinstance(call, calls.SettingCall) and not self._is_idle():
             return completed_answer(
                 'A goal that is being planned or executed depends on the present value; wait for '
                 'its end or cancel it, then try again.'

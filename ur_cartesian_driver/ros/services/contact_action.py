@@ -13,7 +13,7 @@ from rclpy.node import Node
 from ur_cartesian_driver.action import DetectToolContact
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.robot.services.service_calls import EndContactWatchCall, ServiceAnswer
-from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer
+from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer, end_goal
 
 
 class ContactAction:
@@ -69,10 +69,5 @@ class ContactAction:
 
 
 def _end(handle: Any, success: bool, text: str) -> Any:
-    if success:
-        handle.succeed()
-    elif handle.is_cancel_requested:
-        handle.canceled()
-    else:
-        handle.abort()
+    end_goal(handle, succeeded=success)
     return DetectToolContact.Result(success=success, message=text)

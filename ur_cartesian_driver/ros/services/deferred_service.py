@@ -15,12 +15,11 @@ from concurrent.futures import Future
 import contextlib
 from typing import Any
 
-from rclpy.action.server import RCLError
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
+from ur_cartesian_driver.ros.node_endpoints import SHUT_DOWN_ERRORS
 
 
 class DeferredService:
@@ -58,7 +57,7 @@ class DeferredService:
         if isinstance(answer, ServiceAnswer):
             answer = self._kind.Response(success=answer.ok, message=answer.text)
         # The node, or all of ROS, may have been shut down meanwhile.
-        with contextlib.suppress(InvalidHandle, RCLError):
+        with contextlib.suppress(*SHUT_DOWN_ERRORS):
             self._send_now(answer, header)
 
 

@@ -20,10 +20,8 @@ from typing import Any
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, WrenchStamped
-from rclpy.action.server import RCLError
-from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, String
 
@@ -47,15 +45,10 @@ from ur_cartesian_driver.ros.messages.state_messages import (
     tool_data_message,
     wrench_message,
 )
+from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS, SHUT_DOWN_ERRORS, STATE_QOS
 from ur_cartesian_driver.ros.parameters.node_parameters import Settings
 from ur_cartesian_driver.ros.state.diagnostics import diagnostics_message
 
-#: Reliable, so that subscribers of either reliability get the topics.
-STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-#: Late subscribers get the last value at once.
-LATCHED_QOS = QoSProfile(
-    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
-)
 #: The QoS that tf2 requires.
 TF_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 #: Enough for all messages that a subscriber may not have received yet.
@@ -111,7 +104,7 @@ class StatePublisher:
         while not self._closed.wait(max(0.0, due - monotonic())):
             try:
                 self._publish(monotonic())
-            except (InvalidHandle, RCLError):
+            except SHUT_DOWN_ERRORS:
                 return  # ROS was shut down under the node
             except Exception as error:
                 # One bad value must not silence all topics for good.

@@ -7,13 +7,11 @@ from __future__ import annotations
 from concurrent.futures import Future
 from typing import Any
 
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from std_srvs.srv import SetBool
 
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
 from ur_cartesian_driver.ros.message_fields import Message
-from ur_cartesian_driver.ros.state.state_publisher import STATE_QOS
+from ur_cartesian_driver.ros.node_endpoints import STATE_QOS, steady_timer
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import Served, UrName
@@ -50,11 +48,7 @@ class _FreedriveSwitch:
         self._is_wanted = self._is_calling = False
         #: What the driver has confirmed; None = unknown.
         self._confirmed: bool | None = False
-        self._watchdog = driver.node.create_timer(
-            settings.freedrive_timeout,
-            self._late,
-            clock=Clock(clock_type=ClockType.STEADY_TIME),
-        )
+        self._watchdog = steady_timer(driver.node, settings.freedrive_timeout, self._late)
         self._watchdog.cancel()
         driver.client(SetBool, row.source)  # its discovery takes time
         self._subscription = driver.node.create_subscription(kind, row.name, self._take, STATE_QOS)

@@ -23,13 +23,13 @@ from ur_cartesian_driver.protocol.dashboard import (
     parse_reply,
 )
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
+from ur_cartesian_driver.robot.services.dashboard_connection import REPORT_TIMEOUTS
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
 from ur_cartesian_driver.ros.message_fields import Message
 from ur_cartesian_driver.ros.services.deferred_service import completed_answer
-from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
+from ur_cartesian_driver.ros.ur_driver_names.driver_node import ANSWER_TIMEOUT, DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import (
     Call,
-    same_request,
     Service,
     UrName,
 )
@@ -45,15 +45,9 @@ from ur_cartesian_driver.srv import (
 
 DASHBOARD = 'dashboard_client'
 _NO_FIELDS = 'std_srvs/srv/Trigger'
-#: How long the robot may take to write a report, or a file for its manufacturer [s].
-FLIGHT_REPORT_TIMEOUT, SUPPORT_FILE_TIMEOUT = 240.0, 660.0
 
 Fill = Callable[[Message, str], None]
 Argument = Callable[[Message], str]
-
-
-def _nothing(response: Message, value: str) -> None:
-    """Fill in nothing: the response has only the words."""
 
 
 def _split(value: str) -> tuple[str, str]:
@@ -196,8 +190,7 @@ def _row(
     *,
     kind: str = '',
     source_type: Any = Trigger,
-    call: Call = same_request,
-    fill: Fill = _nothing,
+    **fields: Any,
 ) -> UrName:
     """
     Return the row of a service that the driver has too.
@@ -205,6 +198,7 @@ def _row(
     :param command: of the dashboard, whose reply is the text of the response; empty = the text of
         the driver's answer is.
     :param kind: the type, without its package; empty = it is called like the driver's.
+    :param fields: further ones of the row.
     """
     same_kind = _NO_FIELDS if source_type is Trigger else source_type.__name__
     return Service(
@@ -212,29 +206,19 @@ def _row(
         type=_type(kind or same_kind),
         source=f'dashboard/{name}',
         source_type=source_type,
-        call=call,
-        fill=fill,
         words=_words(command) if command else str,
+        **fields,
     )
 
 
-def _slow_request(timeout: float) -> Call:
-    """Return the call of a command that may take some minutes more than the others."""
-    return lambda row, driver, request: same_request(row, driver, request, timeout)
+def _inner_text(field: str, part: str) -> Call:
+    """Return the call for a request with a text in a part of a field, the driver's whole field."""
 
+    def call(row: Service, driver: DriverNode, request: Message) -> Future[ServiceAnswer]:
+        text = getattr(getattr(request, field), part)
+        return driver.call(row.source_type, row.source, row.source_type.Request(**{field: text}))
 
-def _set_operational_mode(
-    row: Service, driver: DriverNode, request: Message
-) -> Future[ServiceAnswer]:
-    mode = request.operational_mode.mode
-    return driver.call(
-        row.source_type, row.source, SetOperationalMode.Request(operational_mode=mode)
-    )
-
-
-def _set_user_role(row: Service, driver: DriverNode, request: Message) -> Future[ServiceAnswer]:
-    role = request.user_role.role
-    return driver.call(row.source_type, row.source, SetUserRole.Request(user_role=role))
+    return call
 
 
 def _line(name: str, kind: str, command: str, argument: Argument) -> UrName:
@@ -277,21 +261,26 @@ def _services() -> Iterable[UrName]:
         'set_operational_mode',
         'set operational mode',
         source_type=SetOperationalMode,
-        call=_set_operational_mode,
+        call=_inner_text('operational_mode', 'mode'),
     )
-    yield _row('set_user_role', 'setUserRole', source_type=SetUserRole, call=_set_user_role)
+    yield _row(
+        'set_user_role',
+        'setUserRole',
+        source_type=SetUserRole,
+        call=_inner_text('user_role', 'role'),
+    )
     yield _row(
         'generate_flight_report',
         'generate flight report',
         source_type=GenerateFlightReport,
-        call=_slow_request(FLIGHT_REPORT_TIMEOUT),
+        timeout=ANSWER_TIMEOUT + REPORT_TIMEOUTS['generate flight report'],
         fill=_report_id,
     )
     yield _row(
         'generate_support_file',
         'generate support file',
         source_type=GenerateSupportFile,
-        call=_slow_request(SUPPORT_FILE_TIMEOUT),
+        timeout=ANSWER_TIMEOUT + REPORT_TIMEOUTS['generate support file'],
         fill=_file_name,
     )
     yield _row('raw_request', source_type=RawRequest)

@@ -13,14 +13,12 @@ from time import monotonic
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 from ur_cartesian_driver.msg import DriverStatus, IOStates
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
 from ur_cartesian_driver.ros.message_fields import Message
-from ur_cartesian_driver.ros.state.state_publisher import LATCHED_QOS
+from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS, steady_timer
 
 #: How long the driver may take to answer; its own bound is 40 s for most services [s].
 ANSWER_TIMEOUT = 60.0
@@ -76,12 +74,7 @@ class DriverNode:
         self._clients: dict[str, Any] = {}
         self._calls: list[_PendingCall] = []
         self._is_closed = False
-        node.create_timer(
-            CHECK_PERIOD,
-            self._look_at_calls,
-            callback_group=self._group,
-            clock=Clock(clock_type=ClockType.STEADY_TIME),
-        )
+        steady_timer(node, CHECK_PERIOD, self._look_at_calls, self._group)
 
     @property
     def status(self) -> DriverStatus | None:

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from concurrent.futures import Future
+from typing import Any
 
 from std_srvs.srv import Trigger
 
@@ -16,7 +16,12 @@ from ur_cartesian_driver.ros.message_fields import Message, seconds, vector_mess
 from ur_cartesian_driver.ros.services.deferred_service import completed_answer
 from ur_cartesian_driver.ros.ur_driver_names.dashboard_services import fill_version
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
-from ur_cartesian_driver.ros.ur_driver_names.offered_name import same_request, Service, UrName
+from ur_cartesian_driver.ros.ur_driver_names.offered_name import (
+    Call,
+    same_request,
+    Service,
+    UrName,
+)
 from ur_cartesian_driver.ros.ur_driver_names.state_topics import IO
 from ur_cartesian_driver.srv import (
     RunScript,
@@ -144,54 +149,54 @@ def _version(row: Service, driver: DriverNode, request: Message) -> Future[Servi
     return completed_answer(text, ok=True)
 
 
-def _services() -> Iterable[UrName]:
-    for name in ('resend_robot_program', 'hand_back_control', 'zero_ftsensor'):
-        yield Service(
-            name=f'{IO}/{name}',
-            type='std_srvs/srv/Trigger',
-            source=name,
-            source_type=Trigger,
-        )
-    for name, call in (('set_io', _set_io), ('set_analog_output', _set_analog_output)):
-        yield Service(
-            name=f'{IO}/{name}',
-            type='ur_msgs/srv/SetIO' if name == 'set_io' else 'ur_msgs/srv/SetAnalogOutput',
-            source='set_io',
-            source_type=SetIO,
-            call=call,
-        )
-    yield Service(
-        name=f'{IO}/set_payload',
-        type='ur_msgs/srv/SetPayload',
-        source='set_payload',
-        source_type=SetPayload,
-        call=_set_payload,
+def _row(
+    name: str,
+    source_type: Any,
+    call: Call = same_request,
+    *,
+    kind: str = '',
+    source: str = '',
+    controller: str = IO,
+) -> UrName:
+    """
+    Return the row of a service.
+
+    :param kind: the name of its type; empty = it is called like the driver's.
+    :param source: the driver's service; empty = it has the same name.
+    """
+    package = 'std_srvs' if source_type is Trigger else 'ur_msgs'
+    return Service(
+        name=f'{controller}/{name}',
+        type=f'{package}/srv/{kind or source_type.__name__}',
+        source=source or name,
+        source_type=source_type,
+        call=call,
     )
+
+
+IO_SERVICES = (
+    _row('resend_robot_program', Trigger),
+    _row('hand_back_control', Trigger),
+    _row('zero_ftsensor', Trigger),
+    _row('set_io', SetIO, _set_io),
+    _row('set_analog_output', SetIO, _set_analog_output, kind='SetAnalogOutput', source='set_io'),
+    _row('set_payload', SetPayload, _set_payload),
+    _row('set_gravity', SetGravity, _set_gravity),
     # Its newest release has a controller of its own for it.
-    for controller in (IO, 'gravity_update_controller'):
-        yield Service(
-            name=f'{controller}/set_gravity',
-            type='ur_msgs/srv/SetGravity',
-            source='set_gravity',
-            source_type=SetGravity,
-            call=_set_gravity,
-        )
-    for name in ('set_speed_slider', 'set_speed_slider_fraction'):
-        yield Service(
-            name=f'{IO}/{name}',
-            type='ur_msgs/srv/SetSpeedSliderFraction',
-            source='set_speed_slider',
-            source_type=SetSpeedSliderFraction,
-            call=_set_speed_slider,
-        )
-    yield Service(
+    _row('set_gravity', SetGravity, _set_gravity, controller='gravity_update_controller'),
+    _row('set_speed_slider', SetSpeedSliderFraction, _set_speed_slider),
+    _row(
+        'set_speed_slider_fraction',
+        SetSpeedSliderFraction,
+        _set_speed_slider,
+        source='set_speed_slider',
+    ),
+    Service(
         name='ur_configuration_controller/get_robot_software_version',
         type='ur_msgs/srv/GetRobotSoftwareVersion',
         source='status',
         source_type=None,
         call=_version,
         fill=fill_version,
-    )
-
-
-IO_SERVICES = tuple(_services())
+    ),
+)

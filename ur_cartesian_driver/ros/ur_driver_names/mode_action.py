@@ -20,7 +20,7 @@ from std_srvs.srv import Trigger
 
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode, SafetyMode
 from ur_cartesian_driver.msg import DriverStatus
-from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer
+from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer, end_goal
 from ur_cartesian_driver.ros.message_fields import Message
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode, DriverSilent
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
@@ -98,13 +98,8 @@ class _ModeServer:
 
         def end(handle: Any) -> Message:
             self._run = None
-            if handle.is_cancel_requested:
-                handle.canceled()
-            elif success:
-                handle.succeed()
-            else:
-                handle.abort()
             succeeded = success and not handle.is_cancel_requested
+            end_goal(handle, succeeded=succeeded)
             return self._action.Result(success=succeeded, message=text)
 
         self._server.finish(handle, end)

@@ -13,14 +13,12 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.qos import QoSProfile
 
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
 from ur_cartesian_driver.ros.message_fields import Message
+from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS, STATE_QOS, steady_timer
 from ur_cartesian_driver.ros.services.deferred_service import DeferredService
-from ur_cartesian_driver.ros.state.state_publisher import LATCHED_QOS, STATE_QOS
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import ANSWER_TIMEOUT, DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 
@@ -129,11 +127,7 @@ class _Relay:
         else:
             driver.on_status(lambda _: self._listen_if_heard())
         if row.repeated:
-            driver.node.create_timer(
-                1.0 / settings.io_publish_rate,
-                self._repeat,
-                clock=Clock(clock_type=ClockType.STEADY_TIME),
-            )
+            steady_timer(driver.node, 1.0 / settings.io_publish_rate, self._repeat)
 
     def _listen(self, qos: QoSProfile) -> None:
         self._subscription = self._driver.subscribe(
@@ -161,14 +155,12 @@ class _Relay:
             self._publisher.publish(self._last)
 
 
-def same_request(
-    row: Service, driver: DriverNode, request: Message, timeout: float = ANSWER_TIMEOUT
-) -> Future[ServiceAnswer]:
+def same_request(row: Service, driver: DriverNode, request: Message) -> Future[ServiceAnswer]:
     """Call the driver's service with the values of the fields that both requests have."""
     ours = row.source_type.Request()
     for field in ours.get_fields_and_field_types().keys() & request.get_fields_and_field_types():
         setattr(ours, field, getattr(request, field))
-    return driver.call(row.source_type, row.source, ours, timeout)
+    return driver.call(row.source_type, row.source, ours, row.timeout)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -182,6 +174,8 @@ class Service(UrName):
     source_type: Any
     #: Starts the driver's call for a request; gets the row, too.
     call: Call = same_request
+    #: How long the driver may take to answer [s].
+    timeout: float = ANSWER_TIMEOUT
     #: Writes the text of an answer into the fields of the response.
     #:
     #: :raises ValueError: the text is not what the response can say.

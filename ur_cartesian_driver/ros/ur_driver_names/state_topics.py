@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped, WrenchStamped
@@ -17,7 +17,12 @@ from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import ByDriver, Topic, UrName
 
 IO = 'io_and_status_controller'
-_WRENCH = 'force_torque_sensor_broadcaster'
+_SPEED, _FORCE, _POSE = (
+    'speed_scaling_state_broadcaster',
+    'force_torque_sensor_broadcaster',
+    'tcp_pose_broadcaster',
+)
+_GEOMETRY, _MODES = 'geometry_msgs/msg', 'ur_dashboard_msgs/msg'
 
 
 def _same(kind: Any, message: Message, settings: NamesSettings) -> Message:
@@ -81,63 +86,38 @@ def _tool_data(kind: Any, message: Message, settings: NamesSettings) -> Message:
     )
 
 
-def _topics() -> Iterable[UrName]:
-    yield ByDriver(name='joint_states', type='sensor_msgs/msg/JointState')
-    yield Topic(
-        name=f'{IO}/io_states',
-        type='ur_msgs/msg/IOStates',
-        source='io_states',
-        source_type=IOStates,
-        convert=_io_states,
-        repeated=True,
-    )
-    yield Topic(
-        name=f'{IO}/tool_data',
-        type='ur_msgs/msg/ToolDataMsg',
-        source='tool_data',
-        source_type=ToolData,
-        convert=_tool_data,
-        repeated=True,
-    )
-    for name, kind in (('robot_mode', RobotMode), ('safety_mode', SafetyMode)):
-        yield Topic(
-            name=f'{IO}/{name}',
-            type=f'ur_dashboard_msgs/msg/{kind.__name__}',
-            source=name,
-            source_type=kind,
-            convert=_mode,
-            latched=True,
-        )
-    yield Topic(
-        name=f'{IO}/robot_program_running',
-        type='std_msgs/msg/Bool',
-        source='robot_program_running',
-        source_type=Bool,
-        convert=_same,
-        latched=True,
-    )
-    yield Topic(
-        name='speed_scaling_state_broadcaster/speed_scaling',
-        type='std_msgs/msg/Float64',
-        source='speed_scaling',
-        source_type=Float64,
-        convert=_percent,
-    )
-    for name in ('wrench', 'ft_data'):
-        yield Topic(
-            name=f'{_WRENCH}/{name}',
-            type='geometry_msgs/msg/WrenchStamped',
-            source='wrench',
-            source_type=WrenchStamped,
-            convert=_wrench,
-        )
-    yield Topic(
-        name='tcp_pose_broadcaster/pose',
-        type='geometry_msgs/msg/PoseStamped',
-        source='tcp_pose',
-        source_type=PoseStamped,
-        convert=_same,
+def _topic(
+    name: str,
+    kind: str,
+    source_type: Any,
+    convert: Callable[[Any, Message, NamesSettings], Message | None] = _same,
+    source: str = '',
+    **flags: Any,
+) -> UrName:
+    """
+    Return the row of a topic.
+
+    :param source: the driver's topic; empty = it has the last part of the name.
+    """
+    return Topic(
+        name=name,
+        type=kind,
+        source=source or name.rpartition('/')[2],
+        source_type=source_type,
+        convert=convert,
+        **flags,
     )
 
 
-STATE_TOPICS = tuple(_topics())
+STATE_TOPICS = (
+    ByDriver(name='joint_states', type='sensor_msgs/msg/JointState'),
+    _topic(f'{IO}/io_states', 'ur_msgs/msg/IOStates', IOStates, _io_states, repeated=True),
+    _topic(f'{IO}/tool_data', 'ur_msgs/msg/ToolDataMsg', ToolData, _tool_data, repeated=True),
+    _topic(f'{IO}/robot_mode', f'{_MODES}/RobotMode', RobotMode, _mode, latched=True),
+    _topic(f'{IO}/safety_mode', f'{_MODES}/SafetyMode', SafetyMode, _mode, latched=True),
+    _topic(f'{IO}/robot_program_running', 'std_msgs/msg/Bool', Bool, latched=True),
+    _topic(f'{_SPEED}/speed_scaling', 'std_msgs/msg/Float64', Float64, _percent),
+    _topic(f'{_FORCE}/wrench', f'{_GEOMETRY}/WrenchStamped', WrenchStamped, _wrench),
+    _topic(f'{_FORCE}/ft_data', f'{_GEOMETRY}/WrenchStamped', WrenchStamped, _wrench, 'wrench'),
+    _topic(f'{_POSE}/pose', f'{_GEOMETRY}/PoseStamped', PoseStamped, source='tcp_pose'),
+)

@@ -21,12 +21,11 @@ from action_msgs.msg import GoalStatus
 from rclpy.action.client import ActionClient
 from rclpy.action.server import CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer
+from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer, end_goal
 from ur_cartesian_driver.ros.message_fields import class_of, duration_message, Message, nanoseconds
+from ur_cartesian_driver.ros.node_endpoints import steady_timer
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import Served, UrName
@@ -157,12 +156,7 @@ class GoalForwarder(ABC):
             goal_callback=self._judge,
             cancel_callback=self._cancel,
         )
-        node.create_timer(
-            LOOK_PERIOD,
-            self._look_for_driver,
-            callback_group=group,
-            clock=Clock(clock_type=ClockType.STEADY_TIME),
-        )
+        steady_timer(node, LOOK_PERIOD, self._look_for_driver, group)
 
     # -- how the two actions differ; by default they do not --------------------------------------
 
@@ -249,12 +243,11 @@ class GoalForwarder(ABC):
                 return
 
         def finish(handle: Any) -> Message:
-            if status == GoalStatus.STATUS_SUCCEEDED:
-                handle.succeed()
-            elif status == GoalStatus.STATUS_CANCELED and handle.is_cancel_requested:
-                handle.canceled()
-            else:
-                handle.abort()
+            end_goal(
+                handle,
+                succeeded=status == GoalStatus.STATUS_SUCCEEDED,
+                cancelled=status == GoalStatus.STATUS_CANCELED,
+            )
             return result
 
         self._server.finish(run.handle, finish)

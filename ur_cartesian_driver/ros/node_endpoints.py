@@ -1,0 +1,52 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Common parts of topics, services and timers: QoS, the steady clock, the end of ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.action.server import RCLError
+from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.exceptions import InvalidHandle
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+from rclpy.timer import Timer
+
+#: Reliable, so that subscribers of either reliability get the topics.
+STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+#: Late subscribers get the last value at once.
+LATCHED_QOS = QoSProfile(
+    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+#: Raised in our threads while the node, or all of ROS, is being shut down.
+SHUT_DOWN_ERRORS = (InvalidHandle, RCLError)
+
+
+def steady_timer(
+    node: Node,
+    period: float,
+    callback: Callable[[], None],
+    group: CallbackGroup | None = None,
+) -> Timer:
+    """Create a timer whose clock does not stop with simulated time; the period is in [s]."""
+    return node.create_timer(
+        period, callback, callback_group=group, clock=Clock(clock_type=ClockType.STEADY_TIME)
+    )
+
+
+def newest_subscription(
+    node: Node, kind: Any, name: str, callback: Callable[[Any], None]
+) -> Subscription:
+    """Subscribe to a stream: only its newest message is used, and a lost one is not sent again."""
+    return node.create_subscription(
+        kind,
+        name,
+        callback,
+        QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
+        callback_group=MutuallyExclusiveCallbackGroup(),
+    )
