@@ -11,7 +11,6 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.protocol.framing import (
-    checked_int32,
     FIXED_POINT,
     FrameBuffer,
     from_fixed,
@@ -63,7 +62,7 @@ def test_every_word_round_trips_through_its_value(raw):
 @pytest.mark.parametrize('value', [2**31, -(2**31) - 1])
 def test_a_raw_word_beyond_int32_is_refused(value):
     with pytest.raises(LocalProtocolError, match='count'):
-        checked_int32(value, 'count')
+        to_fixed(value, 'count', scale=1)
 
 
 def frames():

@@ -65,20 +65,6 @@ def range_error(value: float, field: str, scale: int = FIXED_POINT) -> LocalProt
     )
 
 
-def checked_int32(value: int, field: str) -> int:
-    """
-    Return an integer that is sent unscaled, after checking that it fits into an int32.
-
-    :raises LocalProtocolError: the value does not fit.
-    """
-    if not INT32_MIN <= value <= INT32_MAX:
-        raise LocalProtocolError(
-            f'{field} is {value}, but only integers from {INT32_MIN} to {INT32_MAX} can be sent '
-            'to the robot.'
-        )
-    return value
-
-
 def hex_text(data: bytes) -> str:
     """Return bytes as hexadecimal digits for an error text, truncated if there are many."""
     text = data[:_MAX_QUOTED].hex()
