@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Trajectory points as 21 numbers: converts motion primitives and outputs to these and back.
+Trajectory points as 21 numbers, made from motion primitives and outputs.
 
 URCL has this table since 2.12. Velocity comes before acceleration on the wire, unlike in
 URScript. The factors on the wire are S = 1,000,000 and T, which equals S except in dialect 2.0.
@@ -76,16 +76,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import IntEnum
-from typing import cast, TypeAlias, TypeVar
+from typing import TypeAlias
 
 import numpy as np
 
-from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.rotation_rows import log_rows
-from ur_cartesian_driver.motion.geometry.vectors import Vector6, vector6, ZERO6
-from ur_cartesian_driver.motion.goal.goal import ArcMode, ContactEnd, InputKind, OutputKind
+from ur_cartesian_driver.motion.geometry.vectors import Vector6, ZERO6
 from ur_cartesian_driver.motion.plan.move_rows import ARC, MoveRows, MOVES, SplineRows
 from ur_cartesian_driver.motion.plan.primitive import (
     AwaitInput,
@@ -94,7 +93,6 @@ from ur_cartesian_driver.motion.plan.primitive import (
     ChangePayload,
     EndPress,
     Instruction,
-    LEAD_PIECES,
     LeadLaw,
     MoveC,
     MoveJ,
@@ -113,7 +111,6 @@ from ur_cartesian_driver.motion.plan.primitive import (
     Target,
     Wait,
 )
-from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 
 class MotionType(IntEnum):
@@ -218,8 +215,6 @@ class PointField(IntEnum):
 #: The 21 numbers of a point in the order of the table, before scaling.
 PointFields: TypeAlias = tuple[float, ...]
 
-_E = TypeVar('_E', bound=IntEnum)
-
 _TARGET_NAMES = tuple(f'target[{i}]' for i in range(6))
 _MOVE_NAMES = (
     *_TARGET_NAMES,
@@ -269,7 +264,6 @@ _ARC_TYPES = {
     (True, False): MotionType.MOVEC_POSE_JOINT,
     (True, True): MotionType.MOVEC,
 }
-_MOVES = {types[is_pose]: (cls, is_pose) for cls, types in _TYPES.items() for is_pose in (0, 1)}
 #: Last index into ``MOVES`` of a move with a duration; the moves after it have none.
 _LAST_TIMED = MOVES.index(MoveL)
 _POSE_TYPES = np.array([_TYPES[move][1] if move in _TYPES else MotionType.MOVEC for move in MOVES])
@@ -284,12 +278,10 @@ _STOPS: dict[type[Stop], MotionType] = {
 }
 #: Types whose word 18 is not the duration of a move.
 _WITH_DELAY = frozenset((MotionType.SWITCH_OUTPUT, *_STOPS.values()))
-_ARCS = {motion: kinds for kinds, motion in _ARC_TYPES.items()}
 #: The motion types of arcs; the types of all other moves with a velocity and an acceleration.
-ARC_TYPES, MOVE_TYPES = frozenset(_ARCS), frozenset(_MOVES)
-_OPTIMOVES = frozenset(
-    motion for motion, (cls, _) in _MOVES.items() if cls in (OptimoveJ, OptimoveL)
-)
+ARC_TYPES = frozenset(_ARC_TYPES.values())
+MOVE_TYPES = frozenset(kind for kinds in _TYPES.values() for kind in kinds)
+_OPTIMOVES = frozenset((*_TYPES[OptimoveJ], *_TYPES[OptimoveL]))
 
 
 def motion_type(primitive: Instruction) -> MotionType:
@@ -456,147 +448,11 @@ def _stop_fields(stop: Stop) -> PointFields:
             return (*(0.0,) * 18, stop.duration, 0, kind)
 
 
-def _stop(fields: Sequence[float], kind: MotionType) -> Stop:
-    if kind is MotionType.AWAIT_INPUT:
-        return AwaitInput(
-            input=_enum_member(InputKind, fields[12], 'kind of input (word 12)'),
-            pin=int(fields[13]),
-            threshold=fields[14],
-            below=bool(fields[15]),
-            timeout=fields[18],
-            go_on=bool(fields[16]),
-        )
-    if kind is MotionType.CHANGE_PAYLOAD:
-        return ChangePayload(
-            mass=fields[0],
-            center_of_gravity=(fields[1], fields[2], fields[3]),
-            inertia=vector6(fields[6:12]),
-            transition_time=fields[18],
-        )
-    if kind is MotionType.CALL_FUNCTION:
-        return CallFunction(number=int(fields[12]), arguments=vector6(fields[:6]))
-    if kind is MotionType.PRESS_LAW:
-        return PressLaw(
-            wrench=vector6(fields[:6]),
-            limits=vector6(fields[6:12]),
-            damping=fields[12],
-            gain_scaling=fields[13],
-            zero_sensor=bool(fields[14]),
-            contact=_enum_member(ContactEnd, fields[15], 'end by contact (word 15)'),
-        )
-    if kind is MotionType.BEGIN_PRESS:
-        return BeginPress(
-            T_base_task=Pose.from_rotation_vector(vector6(fields[:6])),
-            compliant=vector6(fields[6:12]),
-            follows_tool=bool(fields[12]),
-        )
-    return EndPress() if kind is MotionType.END_PRESS else Wait(duration=fields[18])
-
-
 def _spline_fields(piece: Spline) -> PointFields:
     kind = SplineKind.CUBIC if piece.accelerations is None else SplineKind.QUINTIC
     accelerations = piece.accelerations or ZERO6
     numbers = (*piece.target, *piece.velocities, *accelerations, piece.duration)
     return (*numbers, kind, MotionType.SPLINE)
-
-
-def from_fields(fields: Sequence[float]) -> Instruction:
-    """
-    Return the primitive or output that 21 numbers encode.
-
-    :raises RemoteProtocolError: the motion type, or another enumerated number, is unknown.
-    """
-    kind = _enum_member(MotionType, fields[20], 'motion type (word 20)')
-    if kind is MotionType.SPLINE:
-        return _spline(fields)
-    if kind is MotionType.SWITCH_OUTPUT:
-        return _output(fields)
-    if kind in _STOPS.values():
-        return _stop(fields, kind)
-    return _arc(fields, *_ARCS[kind]) if kind in _ARCS else _move(fields, kind)
-
-
-def _spline(fields: Sequence[float]) -> Spline:
-    kind = _enum_member(SplineKind, fields[19], 'spline kind (word 19)')
-    return Spline(
-        target=vector6(fields[:6]),
-        velocities=vector6(fields[6:12]),
-        accelerations=vector6(fields[12:18]) if kind is SplineKind.QUINTIC else None,
-        duration=fields[18],
-    )
-
-
-def _output(fields: Sequence[float]) -> OutputRecord:
-    if fields[12] == FollowKind.LAW:
-        return SpeedLaw(
-            gain=fields[0],
-            offset=fields[1],
-            minimum=fields[2],
-            maximum=fields[3],
-            filter_time=fields[4],
-        )
-    if fields[12] == FollowKind.LEAD:
-        return LeadLaw(
-            lead=fields[13],
-            distance=fields[15],
-            speeds=tuple(fields[: LEAD_PIECES + 1]),
-            turns=bool(fields[17]),
-        )
-    if fields[12] == FollowKind.PULSE_LAW:
-        return PulseLaw(
-            distance=1e-3 * fields[0],
-            phase=fields[1],
-            width=fields[2],
-            count=round(1e6 * fields[3]),
-            slot=round(fields[4]),
-            output=_enum_member(OutputKind, fields[5], 'kind of output (word 5)'),
-            pin=round(fields[6]),
-        )
-    follows_speed, begins_pulses = (
-        fields[12] == kind for kind in (FollowKind.BEGIN, FollowKind.PULSES)
-    )
-    trigger_pose = Pose.from_rotation_vector(vector6(fields[:6])) if fields[16] else None
-    return SwitchOutput(
-        output=OutputKind.STANDARD_ANALOG
-        if follows_speed
-        else OutputKind.STANDARD_DIGITAL
-        if begins_pulses
-        else _enum_member(OutputKind, fields[12], 'kind of output (word 12)'),
-        pin=int(fields[13]),
-        value=fields[14],
-        domain=_enum_member(AnalogDomain, fields[15], 'domain (word 15)'),
-        trigger_pose=trigger_pose,
-        trigger_direction=vector6(fields[6:12]),
-        starts_beyond=bool(fields[17]),
-        delay=fields[18],
-        follows_speed=follows_speed,
-        begins_pulses=begins_pulses,
-    )
-
-
-def _arc(fields: Sequence[float], target_is_pose: bool, via_is_pose: bool) -> MoveC:
-    return MoveC(
-        target=_target(fields[:6], target_is_pose),
-        via=_target(fields[6:12], via_is_pose),
-        velocity=fields[12],
-        acceleration=fields[13],
-        blend_radius=fields[19],
-        mode=_enum_member(ArcMode, fields[14], 'arc mode (word 14)'),
-    )
-
-
-def _move(fields: Sequence[float], kind: MotionType) -> Primitive:
-    cls, is_pose = _MOVES[kind]
-    # Optimoves and MoveP have no duration.
-    duration = {'duration': fields[18]} if cls in (MoveJ, MoveL) else {}
-    return cast(type[MoveJ], cls)(
-        target=_target(fields[:6], bool(is_pose)),
-        q_near=vector6(fields[6:12]) if is_pose and fields[14] else None,
-        velocity=fields[12],
-        acceleration=fields[13],
-        blend_radius=fields[19],
-        **duration,
-    )
 
 
 def check_fields(fields: PointFields) -> None:
@@ -638,15 +494,3 @@ def field_names(kind: float) -> Sequence[str]:
 
 def _numbers(target: Target) -> Vector6:
     return target.rotation_vector() if isinstance(target, Pose) else target
-
-
-def _target(numbers: Sequence[float], is_pose: bool) -> Target:
-    vector = vector6(numbers)
-    return Pose.from_rotation_vector(vector) if is_pose else vector
-
-
-def _enum_member(enum: type[_E], number: float, what: str) -> _E:
-    for member in enum:
-        if member == number:
-            return member
-    raise RemoteProtocolError(f'{number:g} is an unknown {what}.')
