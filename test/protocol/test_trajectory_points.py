@@ -242,6 +242,35 @@ FIELD_ERRORS = [
         'delay is -0.1',
     ),
     (SwitchOutput(output=OutputKind.STANDARD_ANALOG, pin=0, value=float('nan')), 'value is nan'),
+    (Wait(duration=-1.0), 'duration is -1.0 s'),
+    (Wait(duration=3e3), 'duration is 3000.0 s'),
+    (
+        AwaitInput(
+            input=InputKind.STANDARD_ANALOG, pin=0, threshold=3e3, below=False, timeout=1.0
+        ),
+        'threshold is 3000.0',
+    ),
+    (
+        AwaitInput(
+            input=InputKind.STANDARD_ANALOG, pin=0, threshold=0.5, below=False, timeout=-1.0
+        ),
+        'timeout is -1.0 s',
+    ),
+    (ChangePayload(mass=3e3, center_of_gravity=(0.0, 0.0, 0.0)), 'mass is 3000.0'),
+    (ChangePayload(mass=1.0, center_of_gravity=(0.0, 3e3, 0.0)), 'center_of_gravity[1] is'),
+    (
+        ChangePayload(mass=1.0, center_of_gravity=(0.0, 0.0, 0.0), transition_time=-0.5),
+        'transition_time is -0.5 s',
+    ),
+    (CallFunction(number=1, arguments=(0.0, 0.0, 3e3, 0.0, 0.0, 0.0)), 'arguments[2] is 3000.0'),
+    (CallFunction(number=3000), 'number is 3000'),
+    (
+        PressLaw(wrench=ZERO6, limits=(3e3,) * 6, damping=0.1, gain_scaling=1.0),
+        'limits[0] is 3000.0',
+    ),
+    (PressLaw(wrench=ZERO6, limits=ZERO6, damping=0.1, gain_scaling=3e3), 'gain_scaling is'),
+    (BeginPress(T_base_task=Pose((0.0, 0.0, 3e3)), compliant=ZERO6), 'T_base_task[2] is 3000.0'),
+    (BeginPress(T_base_task=Pose(), compliant=(3e3,) * 6), 'compliant[0] is 3000.0'),
 ]
 
 

@@ -74,7 +74,7 @@ Words that the table does not list are zeros:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from typing import TypeAlias
 
@@ -215,29 +215,41 @@ class PointField(IntEnum):
 #: The 21 numbers of a point in the order of the table, before scaling.
 PointFields: TypeAlias = tuple[float, ...]
 
-_TARGET_NAMES = tuple(f'target[{i}]' for i in range(6))
+
+def _indexed(name: str, count: int = 6) -> tuple[str, ...]:
+    return tuple(f'{name}[{i}]' for i in range(count))
+
+
+def _stop_names(*groups: Sequence[str], time: str = 'word 18') -> tuple[str, ...]:
+    """Return the names of a stop whose words from 0, 6 and 12 on are groups; the rest is 0."""
+    names = [f'word {i}' for i in range(18)]
+    for first, group in zip((0, 6, 12), groups, strict=False):
+        names[first : first + len(group)] = group
+    return (*names, time, 'word 19', 'motion type')
+
+
 _MOVE_NAMES = (
-    *_TARGET_NAMES,
-    *(f'words 6-11[{i}]' for i in range(6)),
+    *_indexed('target'),
+    *_indexed('words 6-11'),
     'velocity',
     'acceleration',
     'mode',
-    *(f'words 15-17[{i}]' for i in range(3)),
+    *_indexed('words 15-17', 3),
     'duration',
     'blend_radius',
     'motion type',
 )
 _SPLINE_NAMES = (
-    *_TARGET_NAMES,
-    *(f'velocities[{i}]' for i in range(6)),
-    *(f'accelerations[{i}]' for i in range(6)),
+    *_indexed('target'),
+    *_indexed('velocities'),
+    *_indexed('accelerations'),
     'duration',
     'kind',
     'motion type',
 )
 _OUTPUT_NAMES = (
-    *(f'trigger_pose[{i}]' for i in range(6)),
-    *(f'trigger_direction[{i}]' for i in range(6)),
+    *_indexed('trigger_pose'),
+    *_indexed('trigger_direction'),
     'output',
     'pin',
     'value',
@@ -248,6 +260,29 @@ _OUTPUT_NAMES = (
     'word 19',
     'motion type',
 )
+
+#: Names of the 21 numbers, for errors; all other motion types are moves.
+_NAMES: Mapping[float, Sequence[str]] = {
+    MotionType.SPLINE: _SPLINE_NAMES,
+    MotionType.SWITCH_OUTPUT: _OUTPUT_NAMES,
+    MotionType.WAIT: _stop_names(time='duration'),
+    MotionType.AWAIT_INPUT: _stop_names(
+        (), (), ('input', 'pin', 'threshold', 'below', 'go_on'), time='timeout'
+    ),
+    MotionType.CHANGE_PAYLOAD: _stop_names(
+        ('mass', *_indexed('center_of_gravity', 3)), _indexed('inertia'), time='transition_time'
+    ),
+    MotionType.CALL_FUNCTION: _stop_names(_indexed('arguments'), (), ('number',)),
+    MotionType.PRESS_LAW: _stop_names(
+        _indexed('wrench'),
+        _indexed('limits'),
+        ('damping', 'gain_scaling', 'zero_sensor', 'contact'),
+    ),
+    MotionType.BEGIN_PRESS: _stop_names(
+        _indexed('T_base_task'), _indexed('compliant'), ('follows_tool',)
+    ),
+    MotionType.END_PRESS: _stop_names(),
+}
 
 #: Class -> its motion type for a target in joint positions, and its type for a target pose.
 _TYPES: dict[type[Primitive], tuple[MotionType, MotionType]] = {
@@ -463,21 +498,18 @@ def check_fields(fields: PointFields) -> None:
     """
     duration, blend, kind = fields[18], fields[19], fields[20]
     if kind in _WITH_DELAY and not duration >= 0.0:
-        raise LocalProtocolError(f'delay is {duration!r} s, but must not be negative.')
+        name = field_names(kind)[PointField.DURATION]
+        raise LocalProtocolError(f'{name} is {duration!r} s, but must not be negative.')
     if kind == MotionType.SPLINE or kind in _WITH_DELAY:
         return
     velocity, acceleration = fields[12], fields[13]
-    if velocity < 0.0 or acceleration < 0.0 or blend < 0.0:
-        name, value = next(
-            (name, value)
-            for name, value in (
-                ('velocity', velocity),
-                ('acceleration', acceleration),
-                ('blend_radius', blend),
-            )
-            if value < 0.0
-        )
-        raise LocalProtocolError(f'{name} is {value!r}, but must not be negative.')
+    for name, value in (
+        ('velocity', velocity),
+        ('acceleration', acceleration),
+        ('blend_radius', blend),
+    ):
+        if value < 0.0:
+            raise LocalProtocolError(f'{name} is {value!r}, but must not be negative.')
     if kind in _OPTIMOVES and not (0.0 < velocity <= 1.0 and 0.0 < acceleration <= 1.0):
         raise LocalProtocolError(
             f'velocity is {velocity!r} and acceleration is {acceleration!r}, but an optimove '
@@ -487,9 +519,7 @@ def check_fields(fields: PointFields) -> None:
 
 def field_names(kind: float) -> Sequence[str]:
     """Return the names of the 21 numbers of a motion type, for errors."""
-    if kind == MotionType.SPLINE:
-        return _SPLINE_NAMES
-    return _OUTPUT_NAMES if kind == MotionType.SWITCH_OUTPUT else _MOVE_NAMES
+    return _NAMES.get(kind, _MOVE_NAMES)
 
 
 def _numbers(target: Target) -> Vector6:

@@ -56,6 +56,7 @@ from ur_cartesian_driver.protocol.framing import FIXED_POINT, INT32_MAX
 from ur_cartesian_driver.protocol.program.point_fields import (
     ARC_TYPES,
     check_fields,
+    field_names,
     MotionType,
     MOVE_TYPES,
     PointField,
@@ -142,15 +143,16 @@ class Dialect:
             raise self._unsupported(f'{MotionType(int(kind)).name} (motion type {kind:g})')
         if not self.supports_q_near and fields[14] and kind in MOVE_TYPES:
             raise self._unsupported('q_near')
+        name = field_names(kind)[PointField.DURATION]
         if 0.0 < duration < self.min_duration:
             raise LocalProtocolError(
-                f'duration is {duration!r} s, but wire dialect {self.name} has a resolution of '
+                f'{name} is {duration!r} s, but wire dialect {self.name} has a resolution of '
                 f'{1.0 / self.time_scale:g} s; a duration rounded to 0 would mean that the '
                 'velocity applies.'
             )
         if duration > self.max_duration:
             raise LocalProtocolError(
-                f'duration is {duration!r} s, but one point can take at most {self.max_duration} '
+                f'{name} is {duration!r} s, but one point can take at most {self.max_duration} '
                 f's in wire dialect {self.name}.'
             )
         check_fields(fields)
