@@ -44,7 +44,9 @@ def test_the_tables_hold_all_names():
 
 
 def test_the_registers_of_the_servo_exist():
-    assert registers.register_name(registers.POINTS_BEGUN) == 'output_int_register_26'
+    assert (
+        registers.register_name(registers.OutputInteger.POINTS_BEGUN) == 'output_int_register_26'
+    )
     assert registers.six_register_names(registers.InputDouble.DESIRED_JOINT_POSITIONS) == tuple(
         f'input_double_register_{i}' for i in range(24, 30)
     )

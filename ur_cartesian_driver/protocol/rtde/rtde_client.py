@@ -33,7 +33,7 @@ of the connection is in `rtde_server`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import TypeAlias
@@ -263,28 +263,22 @@ class RtdeClientCodec:
             return [reply]
         if self.state is RtdeState.START and isinstance(reply, DataPackage):
             return [*self._ready(), *self._frame(frame)]
-        expected, handle = self._handlers().get(self.state, (None, None))
-        if handle is None or PackageType(frame[2]) is not expected:
-            return self._handle_unexpected(reply)
-        return handle(reply)
-
-    def _handlers(
-        self,
-    ) -> dict[RtdeState, tuple[PackageType, Callable[[RtdeReply], list[RtdeEvent]]]]:
-        """Return the expected type of package, and its handler, for each state."""
-        return {
-            RtdeState.PROTOCOL_VERSION: (
-                PackageType.REQUEST_PROTOCOL_VERSION,
-                self._on_protocol_version,
-            ),
-            RtdeState.CONTROLLER_VERSION: (
-                PackageType.GET_URCONTROL_VERSION,
-                self._on_controller_version,
-            ),
-            RtdeState.OUTPUTS: (PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS, self._on_outputs),
-            RtdeState.INPUTS: (PackageType.CONTROL_PACKAGE_SETUP_INPUTS, self._on_inputs),
-            RtdeState.START: (PackageType.CONTROL_PACKAGE_START, self._on_start),
-        }
+        match self.state, reply:
+            case RtdeState.PROTOCOL_VERSION, Acknowledgement(
+                type=PackageType.REQUEST_PROTOCOL_VERSION
+            ):
+                return self._on_protocol_version(reply)
+            case RtdeState.CONTROLLER_VERSION, ControllerVersion():
+                return self._on_controller_version(reply)
+            case RtdeState.OUTPUTS, SetupOutputsReply():
+                return self._on_outputs(reply)
+            case RtdeState.INPUTS, SetupInputsReply():
+                return self._on_inputs(reply)
+            case RtdeState.START | RtdeState.READY, Acknowledgement(
+                type=PackageType.CONTROL_PACKAGE_START
+            ):
+                return self._on_start(reply)
+        return self._handle_unexpected(reply)
 
     def _send_request(self, state: RtdeState, request: RtdeRequest) -> list[RtdeEvent]:
         """Queue a request and expect its reply."""
@@ -294,13 +288,6 @@ class RtdeClientCodec:
         return []
 
     def _handle_unexpected(self, reply: RtdeReply) -> list[RtdeEvent]:
-        is_late_start = (
-            self.state is RtdeState.READY
-            and isinstance(reply, Acknowledgement)
-            and reply.type is PackageType.CONTROL_PACKAGE_START
-        )
-        if is_late_start:  # the data overtook the reply
-            return self._on_start(reply)
         if self.state is not RtdeState.READY:
             self._unexpected += 1
             if self._unexpected > MAX_UNEXPECTED_PACKAGES:
@@ -310,8 +297,8 @@ class RtdeClientCodec:
                 )
         return []
 
-    def _on_protocol_version(self, reply: RtdeReply) -> list[RtdeEvent]:
-        if _require_accepted(reply):
+    def _on_protocol_version(self, reply: Acknowledgement) -> list[RtdeEvent]:
+        if reply.accepted:
             return self._send_request(RtdeState.CONTROLLER_VERSION, GetControllerVersion())
         if self._version == 1:
             raise RemoteProtocolError(
@@ -320,8 +307,7 @@ class RtdeClientCodec:
         self._version = 1
         return self._send_request(RtdeState.PROTOCOL_VERSION, RequestProtocolVersion(version=1))
 
-    def _on_controller_version(self, reply: RtdeReply) -> list[RtdeEvent]:
-        assert isinstance(reply, ControllerVersion)
+    def _on_controller_version(self, reply: ControllerVersion) -> list[RtdeEvent]:
         self._controller = reply
         limit = max_frequency(reply)
         if self._frequency > limit:
@@ -339,8 +325,7 @@ class RtdeClientCodec:
             SetupOutputs(names=tuple(map(self._wire_name, self._outputs)), frequency=frequency),
         )
 
-    def _on_outputs(self, reply: RtdeReply) -> list[RtdeEvent]:
-        assert isinstance(reply, SetupOutputsReply)
+    def _on_outputs(self, reply: SetupOutputsReply) -> list[RtdeEvent]:
         names = self._outputs
         _check_count(reply.types, names)
         missing = [n for n, text in zip(names, reply.types, strict=True) if text == NOT_FOUND]
@@ -363,8 +348,7 @@ class RtdeClientCodec:
             RtdeState.INPUTS, SetupInputs(names=tuple(map(self._wire_name, self._inputs)))
         )
 
-    def _on_inputs(self, reply: RtdeReply) -> list[RtdeEvent]:
-        assert isinstance(reply, SetupInputsReply)
+    def _on_inputs(self, reply: SetupInputsReply) -> list[RtdeEvent]:
         names = self._inputs
         _check_count(reply.types, names)
         answers = list(zip(names, reply.types, strict=True))
@@ -376,8 +360,9 @@ class RtdeClientCodec:
         self._input_recipe = Recipe(names, types, reply.recipe_id)
         return self._send_request(RtdeState.START, StartStreaming())
 
-    def _on_start(self, reply: RtdeReply) -> list[RtdeEvent]:
-        if not _require_accepted(reply):
+    def _on_start(self, reply: Acknowledgement) -> list[RtdeEvent]:
+        """Process the reply to S, which data may have overtaken."""
+        if not reply.accepted:
             raise RemoteProtocolError('The robot refused to start the RTDE data.')
         return [] if self.state is RtdeState.READY else self._ready()
 
@@ -394,10 +379,6 @@ class RtdeClientCodec:
                 inputs=self._input_recipe,
             )
         ]
-
-
-def _require_accepted(reply: RtdeReply) -> bool:
-    return isinstance(reply, Acknowledgement) and reply.accepted
 
 
 def _check_count(types: Sequence[str], names: Sequence[str]) -> None:
