@@ -17,15 +17,18 @@ from multiprocessing.connection import Connection
 import selectors
 import signal
 import socket
+import struct
 import threading
 import time
 
 from processes import answer_calls, Child, child, HOST
 
-from ur_cartesian_driver.protocol.program.reverse import ControlMode, ReverseDecoder
+from ur_cartesian_driver.protocol.framing import RecordDecoder
+from ur_cartesian_driver.protocol.program.reverse import ControlMode, MESSAGE_SIZE
 
 TAP_HOST = '127.0.0.2'
 PORTS = ('reverse_port', 'trajectory_port', 'script_command_port')
+_WORDS = struct.Struct('>8i')
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,14 +159,14 @@ class RelayDirection:
         """Take the sockets; ``port_name`` is the port's name if the bytes come from the driver."""
         self.target = target
         self.port_name = port_name
-        self._messages = ReverseDecoder()
+        self._messages = RecordDecoder(MESSAGE_SIZE, 'reverse message', _WORDS.unpack)
 
     def add_marks(self, marks: list[Mark], now: int, data: bytes) -> None:
         """Add what came from the driver to the marks."""
         if self.port_name == 'reverse_port':
             marks += [
-                Mark(now, self.port_name, len(data), message.mode, message.payload[0])
-                for message in self._messages.feed(data)
+                Mark(now, self.port_name, len(data), mode=words[7], action=words[1])
+                for words in self._messages.feed(data)
             ]
         elif self.port_name:
             marks.append(Mark(now, self.port_name, len(data)))

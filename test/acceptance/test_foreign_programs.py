@@ -58,8 +58,8 @@ async def check_refusal(cell, needs, **fields):
     outcome = await run_goal(cell, **fields)
     assert outcome.code is ErrorCode.ROBOT_NOT_READY
     assert outcome.text == (
-        f'The goal has {needs}, for which the robot has to run the program of this driver, and '
-        'the program that runs has not shown to be that; call resend_robot_program '
+        f"The goal has {needs}, for which the robot has to run this driver's program, and "
+        'the running program has not identified itself as ours; call resend_robot_program '
         '(headless_mode), or play a program whose External Control node fetches it from here.'
     )
     assert cell.q == before

@@ -5,6 +5,7 @@
 from math import cos, pi, sin
 
 import pytest
+from wire_decoding import decode_point
 
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
@@ -13,7 +14,6 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.plan.primitive import MoveC, MoveJ, MoveL
 from ur_cartesian_driver.protocol.program.point_fields import motion_type, MotionType
-from ur_cartesian_driver.protocol.program.trajectory_points import decode_point
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow, pytest.mark.exhaustive]
 

@@ -88,7 +88,7 @@ class ExternalController:
                 if isinstance(event, HandshakeDone)
             ]
             data = client.data_to_send()
-        return ready[0].inputs[0]
+        return ready[0].inputs
 
     def __getattr__(self, name):
         """Return a field of the newest packet."""
@@ -345,7 +345,7 @@ def test_program_follows_a_client_over_tcp_in_real_time(ur_sim):
         while time < 1.5:
             for event in client.feed(rtde.recv(65536)):
                 if isinstance(event, HandshakeDone):
-                    inputs = event.inputs[0]
+                    inputs = event.inputs
                     primary.sendall(PROGRAM.read_bytes())
                 elif isinstance(event, DataReceived):
                     _, q, _, _, _, state, mode, *_ = event.values

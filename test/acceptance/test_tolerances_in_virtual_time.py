@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from robot_cell import REVERSE, RTDE, run_cell
 from virtual_network import deliver
+from wire_decoding import decode_reverse
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -22,7 +23,8 @@ from ur_cartesian_driver.motion.geometry.vectors import vector3, vector6
 from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType, Tolerance, Waypoint
 from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.protocol.program.reverse import ReverseDecoder, TrajectoryAction
+from ur_cartesian_driver.protocol.framing import RecordDecoder
+from ur_cartesian_driver.protocol.program.reverse import MESSAGE_SIZE, TrajectoryAction
 from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES
 from ur_cartesian_driver.protocol.rtde.rtde_packages import RtdeFrameBuffer
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe
@@ -118,7 +120,7 @@ def times_of_pushed(notes, quantity, axis, limit):
 
 
 def times_of_cancel(notes):
-    messages = ReverseDecoder()
+    messages = RecordDecoder(MESSAGE_SIZE, 'reverse message', decode_reverse)
     for time, data in notes:
         for message in messages.feed(data):
             if message.payload[0] == TrajectoryAction.CANCEL:

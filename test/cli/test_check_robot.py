@@ -193,8 +193,8 @@ def test_something_else_at_the_ports_is_said(check):
     ],
 )
 def test_inputs_of_another_client_are_named(check, ur_sim, purpose, lower, text):
-    further = [['input_int_register_0']] if lower else []
-    codec = RtdeClientCodec(['timestamp'], inputs=INPUT_GROUPS[purpose], input_groups=further)
+    further = ['input_int_register_0'] if lower else []
+    codec = RtdeClientCodec(['timestamp'], inputs=[*INPUT_GROUPS[purpose], *further])
     with socket.create_connection(('127.0.0.1', ur_sim.ports.rtde)) as other:
         other.sendall(codec.start())
         while codec.state is not RtdeState.READY:

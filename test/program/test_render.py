@@ -19,7 +19,6 @@ from ur_cartesian_driver.protocol.program.registers import (
     InputInteger,
     OutputDouble,
     OutputInteger,
-    POINTS_BEGUN,
     ServoMode,
     SyncState,
 )
@@ -75,7 +74,7 @@ def test_every_wire_constant_comes_from_its_enum(prefix, members):
 
 
 def test_the_progress_register_is_the_one_that_the_driver_reads():
-    assert f'REGISTER_POINTS_BEGUN = {int(POINTS_BEGUN)}' in text().splitlines()
+    assert f'REGISTER_POINTS_BEGUN = {int(OutputInteger.POINTS_BEGUN)}' in text().splitlines()
 
 
 def test_statements_contain_no_numbers_of_the_protocol():

@@ -149,7 +149,7 @@ def test_the_client_understands_the_recorded_controllers(name, in_pieces):
     assert ready.protocol_version == connection['protocol_version']
     assert ready.outputs.names == tuple(connection['output_recipe'])
     assert ready.outputs.types == tuple(OUTPUT_TYPES[n] for n in connection['output_recipe'])
-    assert [recipe.names for recipe in ready.inputs] == [tuple(connection['input_recipe'])]
+    assert ready.inputs.names == tuple(connection['input_recipe'])
     values = [
         frame['fields']['values']
         for frame in connection['frames']

@@ -54,8 +54,11 @@ def test_functions_variables_and_threads_make_a_prelude(tmp_path):
         ('def f(:\nend', "line 1: a name is missing before ':'."),
         ('def f():\n\n  x = {}\nend', "line 3: '{' has no meaning here."),
         ('\ndef f():\n', "line 3: the 'def' of line 2 has no 'end'."),
-        ('gap = 1\nmovej(gap)', 'line 2: only functions (def), threads and assignments may stand'),
-        ('x[0] = 1', 'line 1: only functions (def), threads and assignments may stand outside'),
+        (
+            'gap = 1\nmovej(gap)',
+            'line 2: only functions (def), threads and assignments are allowed',
+        ),
+        ('x[0] = 1', 'line 1: only functions (def), threads and assignments are allowed at'),
         ('def f():\nend\ndef f():\nend', 'line 3: f is defined in line 1, too.'),
         ('f = 1\ndef f():\nend', 'line 2: f is defined in line 1, too.'),
         ('def sync():\nend', 'line 1: sync is a function of the controller that the driver uses'),

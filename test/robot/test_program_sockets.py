@@ -14,6 +14,7 @@ from time import monotonic, sleep
 from unittest.mock import Mock
 
 import pytest
+from wire_decoding import decode_reverse
 
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.protocol.program import reverse
@@ -322,8 +323,7 @@ def test_keepalives_are_those_of_what_the_program_does(busy, mode):
             here.sockets.is_executing = busy
             keeping = asyncio.create_task(here.sockets.keep_alive())
             messages = [
-                reverse.ReverseMessage.decode(await reader.readexactly(reverse.MESSAGE_SIZE))
-                for _ in range(3)
+                decode_reverse(await reader.readexactly(reverse.MESSAGE_SIZE)) for _ in range(3)
             ]
             keeping.cancel()
             assert {message.mode for message in messages} == {mode}
@@ -338,7 +338,7 @@ def test_closing_tells_the_program_to_stop_first():
             reader, _ = (await here.connect())['reverse_port']
             here.sockets.close()
             data = await asyncio.wait_for(reader.read(), 5.0)
-            assert reverse.ReverseMessage.decode(data).mode is reverse.ControlMode.STOPPED
+            assert decode_reverse(data).mode is reverse.ControlMode.STOPPED
 
     asyncio.run(scene())
 

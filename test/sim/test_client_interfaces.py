@@ -11,6 +11,7 @@ import socket
 import time
 
 import pytest
+from realtime_packets import read_packet
 from robot_ports import FREE
 
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RuntimeState, SafetyMode
@@ -19,7 +20,7 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     RobotStateFrame,
     VersionMessage,
 )
-from ur_cartesian_driver.protocol.client_interfaces.realtime import RealtimeData, RealtimeDecoder
+from ur_cartesian_driver.protocol.client_interfaces.realtime import RealtimeData
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.sim.simulator_config import HOME
 
@@ -41,11 +42,8 @@ def client(robot: SimulatedRobot, interface: str) -> Iterator[socket.socket]:
 
 def packets(robot: SimulatedRobot, count: int) -> list[RealtimeData]:
     """Read from the real-time interface."""
-    decoder, read = RealtimeDecoder(), []
     with client(robot, 'realtime') as connection:
-        while len(read) < count:
-            read += decoder.feed(connection.recv(65536))
-    return read[:count]
+        return [read_packet(connection.recv(1220, socket.MSG_WAITALL)) for _ in range(count)]
 
 
 def until(happened: Callable[[], bool]) -> None:

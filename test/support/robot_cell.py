@@ -22,6 +22,7 @@ import os
 from typing import Any, TypeVar
 
 from virtual_network import HOST, LoopClock, ProgramNetwork, VirtualLoop
+from wire_decoding import decode_reverse
 
 from ur_cartesian_driver.driver.ipc import state_memory
 from ur_cartesian_driver.driver.ipc.channel import (
@@ -47,7 +48,7 @@ from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.loop.robot_loop import RobotLoop
 from ur_cartesian_driver.execution.goal.motion_job import job_from_plan
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.protocol.program.reverse import MESSAGE_SIZE, ReverseMessage
+from ur_cartesian_driver.protocol.program.reverse import MESSAGE_SIZE
 from ur_cartesian_driver.protocol.program.script_sender import REQUEST
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
 from ur_cartesian_driver.robot.connection_status import ConnectionStatus
@@ -334,7 +335,7 @@ class RobotCell:
         (end,) = self.loop.open_ends(REVERSE)
         data = end.received
         return [
-            ReverseMessage.decode(bytes(data[i : i + MESSAGE_SIZE]))
+            decode_reverse(bytes(data[i : i + MESSAGE_SIZE]))
             for i in range(first * MESSAGE_SIZE, len(data), MESSAGE_SIZE)
         ]
 

@@ -64,7 +64,7 @@ class GuideCell:
                 if isinstance(event, HandshakeDone)
             ]
             data = self._client.data_to_send()
-        self._inputs = ready[0].inputs[0]
+        self._inputs = ready[0].inputs
         self._effective_speed = EffectiveSpeed()
         self._inbox, self._outbox = deque(), deque()
         #: Where the arm was in each cycle.

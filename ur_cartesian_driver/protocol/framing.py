@@ -52,11 +52,6 @@ def to_fixed(value: float, field: str, scale: int = FIXED_POINT) -> int:
     return whole - 1 if rest <= -0.5 else whole
 
 
-def from_fixed(raw: int, scale: int = FIXED_POINT) -> float:
-    """Return the value that an int32 encodes."""
-    return raw / scale
-
-
 def range_error(value: float, field: str, scale: int = FIXED_POINT) -> LocalProtocolError:
     """Return the error for a value that does not fit into an int32."""
     return LocalProtocolError(
@@ -65,37 +60,10 @@ def range_error(value: float, field: str, scale: int = FIXED_POINT) -> LocalProt
     )
 
 
-def checked_int32(value: int, field: str) -> int:
-    """
-    Return an integer that is sent unscaled, after checking that it fits into an int32.
-
-    :raises LocalProtocolError: the value does not fit.
-    """
-    if not INT32_MIN <= value <= INT32_MAX:
-        raise LocalProtocolError(
-            f'{field} is {value}, but only integers from {INT32_MIN} to {INT32_MAX} can be sent '
-            'to the robot.'
-        )
-    return value
-
-
 def hex_text(data: bytes) -> str:
     """Return bytes as hexadecimal digits for an error text, truncated if there are many."""
     text = data[:_MAX_QUOTED].hex()
     return f'{text}... ({len(data)} bytes)' if len(data) > _MAX_QUOTED else text or 'no bytes'
-
-
-def checked_size(data: bytes, size: int, what: str) -> bytes:
-    """
-    Return a record after checking its size.
-
-    :raises RemoteProtocolError: the record has a different size.
-    """
-    if len(data) != size:
-        raise RemoteProtocolError(
-            f'A {what} has {size} bytes, but {len(data)} arrived: {hex_text(data)}.'
-        )
-    return data
 
 
 class RecordDecoder(Generic[T]):
@@ -152,11 +120,6 @@ class ResultDecoder(RecordDecoder[E]):
                 ) from None
 
         super().__init__(4, what, decode)
-
-
-def encode_result(result: IntEnum) -> bytes:
-    """Return the 4 bytes of a result."""
-    return result.to_bytes(4, 'big', signed=True)
 
 
 class FrameBuffer:

@@ -65,7 +65,11 @@ class EventLog:
         self._last_gap = 0.0
 
     def note(self, text: str, *, is_robot_error: bool = False) -> None:
-        """Note an event that happens now; ``is_robot_error``: an error that the robot reports."""
+        """
+        Note an event that happens now.
+
+        :param is_robot_error: whether the robot reported the event as an error.
+        """
         self._entries.append(EventLogEntry(self._clock(), text, is_robot_error))
 
     def note_report(self, robot: RobotState) -> None:

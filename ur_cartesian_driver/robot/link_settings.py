@@ -155,7 +155,7 @@ class LinkSettings:
 
     @property
     def other_program(self) -> str:
-        """The program that runs instead of ours, as a clause."""
+        """Clause that says which program runs instead of ours."""
         return f'wire_dialect says that another one, {self.wire_dialect}, runs'
 
     def _check_dialect(self) -> None:

@@ -79,8 +79,8 @@ class LinkStatus:
                 self._attempts.failed(now.message)
             else:
                 self._log_info(now.message)
-        idle = (ConnectionState.READY, ConnectionState.EXECUTING)
-        if now.state is ConnectionState.READY and before.state not in idle:
+        accepted = (ConnectionState.READY, ConnectionState.EXECUTING)
+        if now.state is ConnectionState.READY and before.state not in accepted:
             self._log_info('The robot program is connected: ready for goals.')
 
     def _log_info(self, text: str) -> None:

@@ -62,8 +62,8 @@ def compile_prelude(text: str, name: str) -> Prelude:
         where = f'script_prelude: {name}, line {statement.line}:'
         if defined is None:
             raise ValueError(
-                f'{where} only functions (def), threads and assignments may stand outside of '
-                'functions; move it into one.'
+                f'{where} only functions (def), threads and assignments are allowed at the top '
+                'level; move this line into a function.'
             )
         is_variable = isinstance(statement, AssignStatement)
         if defined in lines and not (is_variable and defined in variables):

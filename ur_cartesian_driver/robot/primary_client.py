@@ -119,7 +119,7 @@ class PrimaryClient:
             if request.is_wanted() and self._connection is not None:
                 self._connection.send(request.data)
 
-    def _repeats_refused(self) -> bool:
+    def _repeat_refused(self) -> bool:
         """Connect again after a refusal; return False if no request is recent enough to repeat."""
         if not (refused := self._recent(self._sent)):
             return False
@@ -208,16 +208,12 @@ class PrimaryClient:
 
     def _on_message(self, message: primary.PrimaryFrame) -> None:
         match message:
-            case primary.ErrorCodeMessage(code=code) if (
-                code == READ_ONLY_CODE and self._repeats_refused()
-            ):
-                pass
-            case primary.ErrorCodeMessage(level=level) if (
-                primary.ReportLevel.WARNING <= level <= primary.ReportLevel.CRITICAL_FAULT
-            ):
-                self._listener.error(
-                    f'the robot reports {message.label} {to_single_line(message.text)}'.rstrip()
-                )
+            case primary.ErrorCodeMessage(level=level, code=code):
+                if code == READ_ONLY_CODE and self._repeat_refused():
+                    return
+                if primary.ReportLevel.WARNING <= level <= primary.ReportLevel.CRITICAL_FAULT:
+                    text = f'the robot reports {message.label} {to_single_line(message.text)}'
+                    self._listener.error(text.rstrip())
             case primary.RuntimeExceptionMessage():
                 self._listener.error(
                     f'the robot program failed in line {message.line}, column '

@@ -386,7 +386,11 @@ class TcpListener:
 
 
 def plain_address(text: str) -> str:
-    """Return an address in plain form: an IPv4 client of an IPv6 port has another form, too."""
+    """
+    Return an address in canonical form.
+
+    On an IPv6 port, an IPv4 client appears as ``::ffff:a.b.c.d``.
+    """
     try:
         address = ipaddress.ip_address(text)
     except ValueError:

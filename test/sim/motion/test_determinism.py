@@ -54,7 +54,7 @@ def packets(body, changes, cycles=400):
     slider, sent = dict(changes), b''
     for cycle in range(cycles):
         if cycle in slider:
-            session.feed(ready[0].inputs[0].pack([1, slider[cycle]]))
+            session.feed(ready[0].inputs.pack([1, slider[cycle]]))
         controller.step()
         sent += b''.join(session.packages())
     return sent, list(controller.messages.log)

@@ -21,13 +21,11 @@ Source: the manufacturer's public tables of the client interfaces.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from itertools import accumulate
 import struct
-from typing import Any, cast, Final
+from typing import Final
 
-from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3, ZERO6
-from ur_cartesian_driver.protocol.framing import FrameBuffer, hex_text
 
 #: Versions (major, minor) that changed the size of the packet, and the new size [bytes].
 _PACKET_SIZES: Final = (
@@ -41,7 +39,6 @@ _PACKET_SIZES: Final = (
     ((5, 10), 1220),
 )
 PACKET_SIZES: Final = frozenset(size for _, size in _PACKET_SIZES)
-_SIZE = struct.Struct('>i')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,7 +112,7 @@ class RealtimeData:
                 f'A real-time packet has {sorted(PACKET_SIZES)} bytes, not {size}.'
             )
         numbers = [number for field in fields(self) for number in _flat(getattr(self, field.name))]
-        count = _count(size)
+        count = (size - 4) // 8
         return struct.pack(f'>i{count}d', size, *numbers[:count])
 
 
@@ -132,59 +129,5 @@ def packet_size(version: tuple[int, ...]) -> int:
     return found
 
 
-def decode_packet(data: bytes) -> RealtimeData:
-    """
-    Return the content of one packet with its size field; unknown fields at its end are ignored.
-
-    :raises RemoteProtocolError: the size field is impossible, or is not the number of bytes.
-    """
-    stated = _SIZE.unpack_from(data)[0] if len(data) >= _SIZE.size else 0
-    if stated != len(data) or stated < min(PACKET_SIZES) or (stated - _SIZE.size) % 8:
-        raise RemoteProtocolError(
-            f'A real-time packet of {len(data)} bytes gives its size as {stated}: '
-            f'{hex_text(data)}.'
-        )
-    count = min(_count(stated), _ENDS[-1])
-    numbers = struct.unpack_from(f'>{count}d', data, _SIZE.size)
-    values: dict[str, Any] = {}
-    for field, length, end in zip(fields(RealtimeData), _LENGTHS, _ENDS, strict=True):
-        if end <= count:
-            values[field.name] = numbers[end - 1] if length == 1 else numbers[end - length : end]
-    return RealtimeData(**values)
-
-
-class RealtimeDecoder:
-    """Decodes the controller's stream."""
-
-    def __init__(self) -> None:
-        """Start empty."""
-        self._frames = FrameBuffer(
-            size_width=_SIZE.size,
-            min_size=min(PACKET_SIZES),
-            max_size=4 * max(PACKET_SIZES),
-            what='real-time packet',
-        )
-
-    def feed(self, data: bytes) -> list[RealtimeData]:
-        """
-        Take bytes from the controller (``b''`` = end of stream) and return the packets in them.
-
-        :raises RemoteProtocolError: a size is impossible, or the stream ended inside a packet.
-        """
-        return [decode_packet(packet) for packet in self._frames.feed(data)]
-
-
 def _flat(value: float | tuple[float, ...]) -> tuple[float, ...]:
     return value if isinstance(value, tuple) else (value,)
-
-
-def _count(size: int) -> int:
-    return (size - _SIZE.size) // 8
-
-
-#: Number of doubles in each field; running total of these numbers.
-_LENGTHS: Final = [
-    len(cast(tuple[float, ...], field.default)) if isinstance(field.default, tuple) else 1
-    for field in fields(RealtimeData)
-]
-_ENDS: Final = list(accumulate(_LENGTHS))

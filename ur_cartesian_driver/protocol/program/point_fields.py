@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Trajectory points as 21 numbers: converts motion primitives and outputs to these and back.
+Trajectory points as 21 numbers, made from motion primitives and outputs.
 
 URCL has this table since 2.12. Velocity comes before acceleration on the wire, unlike in
 URScript. The factors on the wire are S = 1,000,000 and T, which equals S except in dialect 2.0.
@@ -74,18 +74,17 @@ Words that the table does not list are zeros:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
-from typing import cast, TypeAlias, TypeVar
+from typing import TypeAlias
 
 import numpy as np
 
-from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.rotation_rows import log_rows
-from ur_cartesian_driver.motion.geometry.vectors import Vector6, vector6, ZERO6
-from ur_cartesian_driver.motion.goal.goal import ArcMode, ContactEnd, InputKind, OutputKind
+from ur_cartesian_driver.motion.geometry.vectors import Vector6, ZERO6
 from ur_cartesian_driver.motion.plan.move_rows import ARC, MoveRows, MOVES, SplineRows
 from ur_cartesian_driver.motion.plan.primitive import (
     AwaitInput,
@@ -94,7 +93,6 @@ from ur_cartesian_driver.motion.plan.primitive import (
     ChangePayload,
     EndPress,
     Instruction,
-    LEAD_PIECES,
     LeadLaw,
     MoveC,
     MoveJ,
@@ -113,7 +111,6 @@ from ur_cartesian_driver.motion.plan.primitive import (
     Target,
     Wait,
 )
-from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 
 class MotionType(IntEnum):
@@ -218,31 +215,41 @@ class PointField(IntEnum):
 #: The 21 numbers of a point in the order of the table, before scaling.
 PointFields: TypeAlias = tuple[float, ...]
 
-_E = TypeVar('_E', bound=IntEnum)
 
-_TARGET_NAMES = tuple(f'target[{i}]' for i in range(6))
+def _indexed(name: str, count: int = 6) -> tuple[str, ...]:
+    return tuple(f'{name}[{i}]' for i in range(count))
+
+
+def _stop_names(*groups: Sequence[str], time: str = 'word 18') -> tuple[str, ...]:
+    """Return the names of a stop whose words from 0, 6 and 12 on are groups; the rest is 0."""
+    names = [f'word {i}' for i in range(18)]
+    for first, group in zip((0, 6, 12), groups, strict=False):
+        names[first : first + len(group)] = group
+    return (*names, time, 'word 19', 'motion type')
+
+
 _MOVE_NAMES = (
-    *_TARGET_NAMES,
-    *(f'words 6-11[{i}]' for i in range(6)),
+    *_indexed('target'),
+    *_indexed('words 6-11'),
     'velocity',
     'acceleration',
     'mode',
-    *(f'words 15-17[{i}]' for i in range(3)),
+    *_indexed('words 15-17', 3),
     'duration',
     'blend_radius',
     'motion type',
 )
 _SPLINE_NAMES = (
-    *_TARGET_NAMES,
-    *(f'velocities[{i}]' for i in range(6)),
-    *(f'accelerations[{i}]' for i in range(6)),
+    *_indexed('target'),
+    *_indexed('velocities'),
+    *_indexed('accelerations'),
     'duration',
     'kind',
     'motion type',
 )
 _OUTPUT_NAMES = (
-    *(f'trigger_pose[{i}]' for i in range(6)),
-    *(f'trigger_direction[{i}]' for i in range(6)),
+    *_indexed('trigger_pose'),
+    *_indexed('trigger_direction'),
     'output',
     'pin',
     'value',
@@ -253,6 +260,29 @@ _OUTPUT_NAMES = (
     'word 19',
     'motion type',
 )
+
+#: Names of the 21 numbers, for errors; all other motion types are moves.
+_NAMES: Mapping[float, Sequence[str]] = {
+    MotionType.SPLINE: _SPLINE_NAMES,
+    MotionType.SWITCH_OUTPUT: _OUTPUT_NAMES,
+    MotionType.WAIT: _stop_names(time='duration'),
+    MotionType.AWAIT_INPUT: _stop_names(
+        (), (), ('input', 'pin', 'threshold', 'below', 'go_on'), time='timeout'
+    ),
+    MotionType.CHANGE_PAYLOAD: _stop_names(
+        ('mass', *_indexed('center_of_gravity', 3)), _indexed('inertia'), time='transition_time'
+    ),
+    MotionType.CALL_FUNCTION: _stop_names(_indexed('arguments'), (), ('number',)),
+    MotionType.PRESS_LAW: _stop_names(
+        _indexed('wrench'),
+        _indexed('limits'),
+        ('damping', 'gain_scaling', 'zero_sensor', 'contact'),
+    ),
+    MotionType.BEGIN_PRESS: _stop_names(
+        _indexed('T_base_task'), _indexed('compliant'), ('follows_tool',)
+    ),
+    MotionType.END_PRESS: _stop_names(),
+}
 
 #: Class -> its motion type for a target in joint positions, and its type for a target pose.
 _TYPES: dict[type[Primitive], tuple[MotionType, MotionType]] = {
@@ -269,7 +299,6 @@ _ARC_TYPES = {
     (True, False): MotionType.MOVEC_POSE_JOINT,
     (True, True): MotionType.MOVEC,
 }
-_MOVES = {types[is_pose]: (cls, is_pose) for cls, types in _TYPES.items() for is_pose in (0, 1)}
 #: Last index into ``MOVES`` of a move with a duration; the moves after it have none.
 _LAST_TIMED = MOVES.index(MoveL)
 _POSE_TYPES = np.array([_TYPES[move][1] if move in _TYPES else MotionType.MOVEC for move in MOVES])
@@ -284,12 +313,10 @@ _STOPS: dict[type[Stop], MotionType] = {
 }
 #: Types whose word 18 is not the duration of a move.
 _WITH_DELAY = frozenset((MotionType.SWITCH_OUTPUT, *_STOPS.values()))
-_ARCS = {motion: kinds for kinds, motion in _ARC_TYPES.items()}
 #: The motion types of arcs; the types of all other moves with a velocity and an acceleration.
-ARC_TYPES, MOVE_TYPES = frozenset(_ARCS), frozenset(_MOVES)
-_OPTIMOVES = frozenset(
-    motion for motion, (cls, _) in _MOVES.items() if cls in (OptimoveJ, OptimoveL)
-)
+ARC_TYPES = frozenset(_ARC_TYPES.values())
+MOVE_TYPES = frozenset(kind for kinds in _TYPES.values() for kind in kinds)
+_OPTIMOVES = frozenset((*_TYPES[OptimoveJ], *_TYPES[OptimoveL]))
 
 
 def motion_type(primitive: Instruction) -> MotionType:
@@ -456,147 +483,11 @@ def _stop_fields(stop: Stop) -> PointFields:
             return (*(0.0,) * 18, stop.duration, 0, kind)
 
 
-def _stop(fields: Sequence[float], kind: MotionType) -> Stop:
-    if kind is MotionType.AWAIT_INPUT:
-        return AwaitInput(
-            input=_enum_member(InputKind, fields[12], 'kind of input (word 12)'),
-            pin=int(fields[13]),
-            threshold=fields[14],
-            below=bool(fields[15]),
-            timeout=fields[18],
-            go_on=bool(fields[16]),
-        )
-    if kind is MotionType.CHANGE_PAYLOAD:
-        return ChangePayload(
-            mass=fields[0],
-            center_of_gravity=(fields[1], fields[2], fields[3]),
-            inertia=vector6(fields[6:12]),
-            transition_time=fields[18],
-        )
-    if kind is MotionType.CALL_FUNCTION:
-        return CallFunction(number=int(fields[12]), arguments=vector6(fields[:6]))
-    if kind is MotionType.PRESS_LAW:
-        return PressLaw(
-            wrench=vector6(fields[:6]),
-            limits=vector6(fields[6:12]),
-            damping=fields[12],
-            gain_scaling=fields[13],
-            zero_sensor=bool(fields[14]),
-            contact=_enum_member(ContactEnd, fields[15], 'end by contact (word 15)'),
-        )
-    if kind is MotionType.BEGIN_PRESS:
-        return BeginPress(
-            T_base_task=Pose.from_rotation_vector(vector6(fields[:6])),
-            compliant=vector6(fields[6:12]),
-            follows_tool=bool(fields[12]),
-        )
-    return EndPress() if kind is MotionType.END_PRESS else Wait(duration=fields[18])
-
-
 def _spline_fields(piece: Spline) -> PointFields:
     kind = SplineKind.CUBIC if piece.accelerations is None else SplineKind.QUINTIC
     accelerations = piece.accelerations or ZERO6
     numbers = (*piece.target, *piece.velocities, *accelerations, piece.duration)
     return (*numbers, kind, MotionType.SPLINE)
-
-
-def from_fields(fields: Sequence[float]) -> Instruction:
-    """
-    Return the primitive or output that 21 numbers encode.
-
-    :raises RemoteProtocolError: the motion type, or another enumerated number, is unknown.
-    """
-    kind = _enum_member(MotionType, fields[20], 'motion type (word 20)')
-    if kind is MotionType.SPLINE:
-        return _spline(fields)
-    if kind is MotionType.SWITCH_OUTPUT:
-        return _output(fields)
-    if kind in _STOPS.values():
-        return _stop(fields, kind)
-    return _arc(fields, *_ARCS[kind]) if kind in _ARCS else _move(fields, kind)
-
-
-def _spline(fields: Sequence[float]) -> Spline:
-    kind = _enum_member(SplineKind, fields[19], 'spline kind (word 19)')
-    return Spline(
-        target=vector6(fields[:6]),
-        velocities=vector6(fields[6:12]),
-        accelerations=vector6(fields[12:18]) if kind is SplineKind.QUINTIC else None,
-        duration=fields[18],
-    )
-
-
-def _output(fields: Sequence[float]) -> OutputRecord:
-    if fields[12] == FollowKind.LAW:
-        return SpeedLaw(
-            gain=fields[0],
-            offset=fields[1],
-            minimum=fields[2],
-            maximum=fields[3],
-            filter_time=fields[4],
-        )
-    if fields[12] == FollowKind.LEAD:
-        return LeadLaw(
-            lead=fields[13],
-            distance=fields[15],
-            speeds=tuple(fields[: LEAD_PIECES + 1]),
-            turns=bool(fields[17]),
-        )
-    if fields[12] == FollowKind.PULSE_LAW:
-        return PulseLaw(
-            distance=1e-3 * fields[0],
-            phase=fields[1],
-            width=fields[2],
-            count=round(1e6 * fields[3]),
-            slot=round(fields[4]),
-            output=_enum_member(OutputKind, fields[5], 'kind of output (word 5)'),
-            pin=round(fields[6]),
-        )
-    follows_speed, begins_pulses = (
-        fields[12] == kind for kind in (FollowKind.BEGIN, FollowKind.PULSES)
-    )
-    trigger_pose = Pose.from_rotation_vector(vector6(fields[:6])) if fields[16] else None
-    return SwitchOutput(
-        output=OutputKind.STANDARD_ANALOG
-        if follows_speed
-        else OutputKind.STANDARD_DIGITAL
-        if begins_pulses
-        else _enum_member(OutputKind, fields[12], 'kind of output (word 12)'),
-        pin=int(fields[13]),
-        value=fields[14],
-        domain=_enum_member(AnalogDomain, fields[15], 'domain (word 15)'),
-        trigger_pose=trigger_pose,
-        trigger_direction=vector6(fields[6:12]),
-        starts_beyond=bool(fields[17]),
-        delay=fields[18],
-        follows_speed=follows_speed,
-        begins_pulses=begins_pulses,
-    )
-
-
-def _arc(fields: Sequence[float], target_is_pose: bool, via_is_pose: bool) -> MoveC:
-    return MoveC(
-        target=_target(fields[:6], target_is_pose),
-        via=_target(fields[6:12], via_is_pose),
-        velocity=fields[12],
-        acceleration=fields[13],
-        blend_radius=fields[19],
-        mode=_enum_member(ArcMode, fields[14], 'arc mode (word 14)'),
-    )
-
-
-def _move(fields: Sequence[float], kind: MotionType) -> Primitive:
-    cls, is_pose = _MOVES[kind]
-    # Optimoves and MoveP have no duration.
-    duration = {'duration': fields[18]} if cls in (MoveJ, MoveL) else {}
-    return cast(type[MoveJ], cls)(
-        target=_target(fields[:6], bool(is_pose)),
-        q_near=vector6(fields[6:12]) if is_pose and fields[14] else None,
-        velocity=fields[12],
-        acceleration=fields[13],
-        blend_radius=fields[19],
-        **duration,
-    )
 
 
 def check_fields(fields: PointFields) -> None:
@@ -607,21 +498,18 @@ def check_fields(fields: PointFields) -> None:
     """
     duration, blend, kind = fields[18], fields[19], fields[20]
     if kind in _WITH_DELAY and not duration >= 0.0:
-        raise LocalProtocolError(f'delay is {duration!r} s, but must not be negative.')
+        name = field_names(kind)[PointField.DURATION]
+        raise LocalProtocolError(f'{name} is {duration!r} s, but must not be negative.')
     if kind == MotionType.SPLINE or kind in _WITH_DELAY:
         return
     velocity, acceleration = fields[12], fields[13]
-    if velocity < 0.0 or acceleration < 0.0 or blend < 0.0:
-        name, value = next(
-            (name, value)
-            for name, value in (
-                ('velocity', velocity),
-                ('acceleration', acceleration),
-                ('blend_radius', blend),
-            )
-            if value < 0.0
-        )
-        raise LocalProtocolError(f'{name} is {value!r}, but must not be negative.')
+    for name, value in (
+        ('velocity', velocity),
+        ('acceleration', acceleration),
+        ('blend_radius', blend),
+    ):
+        if value < 0.0:
+            raise LocalProtocolError(f'{name} is {value!r}, but must not be negative.')
     if kind in _OPTIMOVES and not (0.0 < velocity <= 1.0 and 0.0 < acceleration <= 1.0):
         raise LocalProtocolError(
             f'velocity is {velocity!r} and acceleration is {acceleration!r}, but an optimove '
@@ -631,22 +519,8 @@ def check_fields(fields: PointFields) -> None:
 
 def field_names(kind: float) -> Sequence[str]:
     """Return the names of the 21 numbers of a motion type, for errors."""
-    if kind == MotionType.SPLINE:
-        return _SPLINE_NAMES
-    return _OUTPUT_NAMES if kind == MotionType.SWITCH_OUTPUT else _MOVE_NAMES
+    return _NAMES.get(kind, _MOVE_NAMES)
 
 
 def _numbers(target: Target) -> Vector6:
     return target.rotation_vector() if isinstance(target, Pose) else target
-
-
-def _target(numbers: Sequence[float], is_pose: bool) -> Target:
-    vector = vector6(numbers)
-    return Pose.from_rotation_vector(vector) if is_pose else vector
-
-
-def _enum_member(enum: type[_E], number: float, what: str) -> _E:
-    for member in enum:
-        if member == number:
-            return member
-    raise RemoteProtocolError(f'{number:g} is an unknown {what}.')

@@ -178,9 +178,6 @@ Register: TypeAlias = (
     | FeedOutput
 )
 
-#: See :class:`OutputInteger`.
-POINTS_BEGUN = OutputInteger.POINTS_BEGUN
-
 
 def register_name(register: Register, offset: int = 0) -> str:
     """

@@ -9,18 +9,12 @@ One message is 8 big-endian int32, 32 bytes; S = 1,000,000. The robot sends noth
 index  mode          meaning
 =====  ============  ======================================================================
 0      all           timeout of the robot's *next* read [ms]; 0 = none
-1 - 6  SERVOJ        joint positions [rad] x S
-1 - 6  SPEEDJ        joint velocities [rad/s] x S
-1 - 6  SPEEDL        twist of the tool [m/s, rad/s] x S
-1 - 6  POSE          x y z rx ry rz [m, rad] x S
-1 - 6  TORQUE        joint torques [Nm] x S
 1, 2   FORWARD       trajectory action, number of points, both unscaled
 3      FORWARD       START: 1 = the path accepts offsets (:mod:`~.registers`)
 4, 5   FORWARD       feed override: fraction of the planned speed of splines x S, and its largest
                      rate of change [1/s] x S; 0 = no override
 1, 2   BUFFERED_     trajectory action, number of points: what is done along the set-points
        SERVO
-1      FREEDRIVE     freedrive action, unscaled
 1 - 6  IDLE,         no meaning; URCL sends uninitialized memory
        STOPPED
 7      all           control mode
@@ -37,8 +31,9 @@ The sender must
   with STREAM_END, or with the CANCEL of a stream;
 * end or cancel a stream before the next START; otherwise the new points extend the stream.
 
-``BUFFERED_SERVO`` is a mode of our own robot program. The pieces of its trajectories are not run,
-but awaited: the set-points lead the arm along them.
+``BUFFERED_SERVO`` is a mode of our own robot program. The program does not run trajectory pieces
+in this mode; it waits while the set-points move the arm through them. The driver does not use
+URCL's modes of set-points (servoj, speedj, speedl, pose, torque) and of freedrive.
 Word 3 of START and words 4 and 5 exist only in our own program, too; URCL leaves them 0. Every
 FORWARD message of a goal has words 4 and 5.
 Streams came with URCL 2.14; older programs ignore them. All other words have had the same place
@@ -50,18 +45,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 import struct
-from typing import cast, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
-from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.protocol.framing import (
-    checked_int32,
-    checked_size,
-    FIXED_POINT,
-    hex_text,
-    INT32_MAX,
-    INT32_MIN,
-    RecordDecoder,
-)
+from ur_cartesian_driver.motion.errors import LocalProtocolError
+from ur_cartesian_driver.protocol.framing import FIXED_POINT, INT32_MAX, to_fixed
 
 
 class ControlMode(IntEnum):
@@ -72,16 +59,8 @@ class ControlMode(IntEnum):
     #: Initial value inside the robot program; never sent.
     UNINITIALIZED = -1
     IDLE = 0
-    SERVOJ = 1
-    SPEEDJ = 2
     #: Trajectories; the points come over the trajectory interface.
     FORWARD = 3
-    SPEEDL = 4
-    POSE = 5
-    FREEDRIVE = 6
-    #: Used inside the robot program; never sent.
-    TOOL_IN_CONTACT = 7
-    TORQUE = 8
     #: Our own program only: set-points come through RTDE registers (:mod:`~.registers`), are
     #: buffered and fed to ``servoj``; reverse messages keep the program alive, and start what is
     #: done along the set-points.
@@ -99,34 +78,12 @@ class TrajectoryAction(IntEnum):
     STREAM_END = 3
 
 
-class FreedriveAction(IntEnum):
-    """Word 1 in FREEDRIVE mode."""
-
-    STOP = -1
-    NOOP = 0
-    START = 1
-
-
 MESSAGE_FIELDS = 8
 MESSAGE_SIZE = 4 * MESSAGE_FIELDS
 #: Word 3 of a START whose path accepts offsets.
 TAKES_OFFSETS = 1
-#: Longest read timeout in a real-time mode, in which messages are set-points [ms].
-MAX_REALTIME_TIMEOUT = 200
 #: Word 0 of a STOPPED message [ms].
 STOPPED_TIMEOUT = 100
-#: Controller cycle of an e-Series robot [ms].
-DEFAULT_STEP_TIME = 2
-
-# A tuple: comparing a few numbers is faster than hashing one.
-REALTIME_MODES = (
-    ControlMode.SERVOJ,
-    ControlMode.SPEEDJ,
-    ControlMode.SPEEDL,
-    ControlMode.POSE,
-    ControlMode.TORQUE,
-)
-_NEVER_SENT = (ControlMode.UNINITIALIZED, ControlMode.TOOL_IN_CONTACT)
 
 MessageWords: TypeAlias = tuple[int, int, int, int, int, int]
 
@@ -149,69 +106,20 @@ class ReverseMessage:
 
     def __post_init__(self) -> None:
         """Check all words, so that no invalid message exists."""
-        _refuse_internal_mode(self.mode)
+        if self.mode is ControlMode.UNINITIALIZED:
+            raise LocalProtocolError(
+                f'Control mode {self.mode.name} exists only inside the robot program.'
+            )
         if not 0 <= self.read_timeout <= INT32_MAX:
             raise LocalProtocolError(
                 f'read_timeout is {self.read_timeout} ms, but must lie within 0 and {INT32_MAX}.'
             )
-        if not INT32_MIN <= min(self.payload) <= max(self.payload) <= INT32_MAX:
-            for index, word in enumerate(self.payload, 1):
-                checked_int32(word, f'word {index} of a {self.mode.name} message')
+        for index, word in enumerate(self.payload, 1):
+            to_fixed(word, f'word {index} of a {self.mode.name} message', scale=1)
 
     def encode(self) -> bytes:
         """Return the 32 bytes."""
         return _MESSAGE.pack(self.read_timeout, *self.payload, self.mode)
-
-    @classmethod
-    def decode(cls, data: bytes) -> ReverseMessage:
-        """
-        Return the message that 32 bytes encode.
-
-        :raises RemoteProtocolError: the size, the mode or the read timeout is impossible.
-        """
-        words = _MESSAGE.unpack(checked_size(data, MESSAGE_SIZE, 'reverse message'))
-        try:
-            return cls(
-                read_timeout=words[0],
-                mode=ControlMode(words[7]),
-                payload=cast(MessageWords, words[1:7]),
-            )
-        except (ValueError, LocalProtocolError) as error:
-            raise RemoteProtocolError(
-                f'Invalid reverse message: {error} {hex_text(data)}'
-            ) from None
-
-
-class ReverseDecoder(RecordDecoder[ReverseMessage]):
-    """Decodes reverse messages, as the robot does."""
-
-    def __init__(self) -> None:
-        """Start empty."""
-        super().__init__(MESSAGE_SIZE, 'reverse message', ReverseMessage.decode)
-
-
-def read_timeout_for(mode: ControlMode, requested: int, step_time: int = DEFAULT_STEP_TIME) -> int:
-    """
-    Return word 0, the timeout of the robot's next read [ms], for a requested timeout [ms].
-
-    * Real-time modes: at least one step, at most 200 ms. A timeout is needed, because the arm
-      would continue to move without messages.
-    * IDLE, FORWARD, FREEDRIVE, BUFFERED_SERVO: 0 = none, otherwise at least one step.
-    * STOPPED: always 100 ms.
-
-    :param step_time: controller cycle [ms].
-    :raises LocalProtocolError: the mode is never sent, or the timeout is negative.
-    """
-    _refuse_internal_mode(mode)
-    if requested < 0:
-        raise LocalProtocolError(
-            f'read_timeout is {requested} ms, but must not be negative (0 = no timeout).'
-        )
-    if mode is ControlMode.STOPPED:
-        return STOPPED_TIMEOUT
-    if mode in REALTIME_MODES:
-        return min(max(requested, step_time), MAX_REALTIME_TIMEOUT)
-    return max(requested, step_time) if requested else 0
 
 
 class FeedTarget(NamedTuple):
@@ -235,7 +143,6 @@ def trajectory(
     action: TrajectoryAction,
     count: int = 0,
     read_timeout: int = 200,
-    step_time: int = DEFAULT_STEP_TIME,
     takes_offsets: bool = False,
     mode: ControlMode = ControlMode.FORWARD,
     feed: FeedTarget = NO_OVERRIDE,
@@ -244,34 +151,28 @@ def trajectory(
     Return the message that starts, ends, cancels or keeps alive a trajectory.
 
     :param count: number of points, for START, STREAM_END, and CANCEL of a stream.
+    :param read_timeout: timeout of the robot's next read [ms], 0 = none.
     :param takes_offsets: for START: whether the path accepts offsets, through registers.
     :param mode: BUFFERED_SERVO for a trajectory along which set-points lead the arm.
     :param feed: the feed override of the goal.
     """
     return ReverseMessage(
-        read_timeout=read_timeout_for(mode, read_timeout, step_time),
+        read_timeout=read_timeout,
         mode=mode,
         payload=(action, count, TAKES_OFFSETS * takes_offsets, *feed.encode(), 0),
     )
 
 
-def keepalive(read_timeout: int = 1000, step_time: int = DEFAULT_STEP_TIME) -> ReverseMessage:
+def keepalive(read_timeout: int = 1000) -> ReverseMessage:
     """Return the message that asks the robot to stand still and wait for the next message."""
-    mode = ControlMode.IDLE
-    return ReverseMessage(read_timeout=read_timeout_for(mode, read_timeout, step_time), mode=mode)
+    return ReverseMessage(read_timeout=read_timeout, mode=ControlMode.IDLE)
 
 
-def buffered_servo(read_timeout: int = 200, step_time: int = DEFAULT_STEP_TIME) -> ReverseMessage:
+def buffered_servo(read_timeout: int = 200) -> ReverseMessage:
     """Return the message that enters the buffered servo, or keeps it alive."""
-    mode = ControlMode.BUFFERED_SERVO
-    return ReverseMessage(read_timeout=read_timeout_for(mode, read_timeout, step_time), mode=mode)
+    return ReverseMessage(read_timeout=read_timeout, mode=ControlMode.BUFFERED_SERVO)
 
 
 def stop() -> ReverseMessage:
     """Return the message that ends the control loop of the robot program."""
     return ReverseMessage(read_timeout=STOPPED_TIMEOUT, mode=ControlMode.STOPPED)
-
-
-def _refuse_internal_mode(mode: ControlMode) -> None:
-    if mode in _NEVER_SENT:
-        raise LocalProtocolError(f'Control mode {mode.name} exists only inside the robot program.')

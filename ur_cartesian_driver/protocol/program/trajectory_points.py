@@ -4,10 +4,8 @@
 The trajectory point interface: points go to the robot program, which answers with a result.
 
 A point is 21 big-endian int32, 84 bytes: the numbers of
-:mod:`~ur_cartesian_driver.protocol.program.point_fields`, scaled. :func:`encode_point` and
-:func:`decode_point` convert primitives, :func:`encode_fields` and :func:`decode_fields` bare
-numbers. For many primitives :func:`encode_points` is faster, for a whole plan :func:`encode_plan`.
-The :class:`Dialect` checks the numbers, and arranges their words for older robot programs.
+:mod:`~ur_cartesian_driver.protocol.program.point_fields`, scaled. The :class:`Dialect` checks the
+numbers, and arranges their words for older robot programs.
 
 The sender must
 
@@ -26,30 +24,25 @@ also 3 input missing, 4 contact, 5 no contact, 6 touched. It comes in a TCP segm
 from __future__ import annotations
 
 from collections.abc import Iterable
-import struct
 
 import numpy as np
 
-from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.plan.move_rows import MoveRows, SplineRows
 from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows
 from ur_cartesian_driver.motion.plan.primitive import Instruction
 from ur_cartesian_driver.protocol.framing import (
-    checked_size,
     FIXED_POINT,
-    hex_text,
     INT32_MAX,
     INT32_MIN,
     range_error,
     ResultDecoder,
-    to_fixed,
 )
 from ur_cartesian_driver.protocol.program.point_fields import (
     are_plain_moves,
     field_names,
-    from_fields,
     MotionType,
     move_fields,
     PointField,
@@ -68,44 +61,21 @@ MAX_PULSE_TRAINS = 4
 POINT_FIELDS = 21
 POINT_SIZE = 4 * POINT_FIELDS
 
-_POINT = struct.Struct(f'>{POINT_FIELDS}i')
 #: Number of points encoded at once: large enough for numpy, small enough for the cache.
 _CHUNK = 4096
 #: Factors of words 0 to 17.
 _MOVE_SCALES = (FIXED_POINT,) * 18
 
 
-def encode_point(instruction: Instruction, dialect: Dialect = NEWEST_DIALECT) -> bytes:
-    """
-    Return the 84 bytes of a primitive or output.
-
-    :raises LocalProtocolError: a value cannot be sent; the text names the field and the bound.
-    """
-    data = encode_fields(to_fields(instruction), dialect)
-    return dialect.arrange(np.frombuffer(data, '>i4').reshape(1, POINT_FIELDS)).tobytes()
-
-
-def decode_point(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> Instruction:
-    """
-    Return the primitive or output that 84 bytes encode.
-
-    :raises RemoteProtocolError: the size is wrong, or a type, kind or mode is unknown.
-    """
-    try:
-        return from_fields(dialect.restore(decode_fields(data, dialect)))
-    except RemoteProtocolError as error:
-        raise RemoteProtocolError(f'{error} Bytes: {hex_text(data)}') from None
-
-
 def encode_points(instructions: Iterable[Instruction], dialect: Dialect = NEWEST_DIALECT) -> bytes:
     """
-    Return the bytes of many primitives and outputs, like :func:`encode_point` but faster.
+    Return the bytes of primitives and outputs, 84 for each.
 
     :raises LocalProtocolError: a value cannot be sent; the text gives the point's index
         (from 0) and the bound.
     """
     fields = [_checked_fields(each, i, dialect) for i, each in enumerate(instructions)]
-    return _encode_rows(np.array(fields, dtype=np.float64).reshape(-1, POINT_FIELDS), dialect)
+    return encode_numbers(np.array(fields, dtype=np.float64).reshape(-1, POINT_FIELDS), dialect)
 
 
 def encode_plan(plan: Plan) -> bytes:
@@ -146,32 +116,18 @@ def encode_rows(rows: PlannedRows, dialect: Dialect = NEWEST_DIALECT) -> bytes:
     for record in np.flatnonzero(~fine).tolist():
         instruction = others.get(record) or moves[int(np.searchsorted(first, record))]
         fields[record] = _checked_fields(instruction, record, dialect)
-    return _encode_rows(fields, dialect)
+    return encode_numbers(fields, dialect)
 
 
-def encode_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> bytes:
+def encode_numbers(fields: Floats, dialect: Dialect = NEWEST_DIALECT) -> bytes:
     """
-    Return the 84 bytes of 21 numbers in SI units.
+    Return the bytes of rows (n, 21) in SI units, which the dialect has accepted.
 
-    :raises LocalProtocolError: a number cannot be sent.
+    :raises LocalProtocolError: a number does not fit; the text names the first one.
     """
-    dialect.check_fields(fields)
-    motion_type = fields[PointField.TYPE]
-    names, scales = field_names(motion_type), _scales(motion_type, dialect)
-    return _POINT.pack(*map(to_fixed, fields, names, scales))
-
-
-def decode_fields(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> PointFields:
-    """
-    Return the 21 numbers that 84 bytes encode, in SI units.
-
-    :raises RemoteProtocolError: the size is wrong.
-    """
-    words = _POINT.unpack(checked_size(data, POINT_SIZE, 'trajectory point'))
-    scales = _scales(words[PointField.TYPE], dialect)
-    return tuple(
-        word if scale == 1 else word / scale  # kinds and types stay integers
-        for word, scale in zip(words, scales, strict=True)
+    return b''.join(
+        _encode_chunk(fields[first : first + _CHUNK], first, dialect)
+        for first in range(0, len(fields), _CHUNK)
     )
 
 
@@ -190,18 +146,6 @@ def _checked_fields(instruction: Instruction, index: int, dialect: Dialect) -> P
     except LocalProtocolError as error:
         raise LocalProtocolError(f'Point {index}: {error}') from None
     return fields
-
-
-def _encode_rows(fields: Floats, dialect: Dialect) -> bytes:
-    """
-    Return the bytes of rows (n, 21).
-
-    :raises LocalProtocolError: a number does not fit; the text names the first one.
-    """
-    return b''.join(
-        _encode_chunk(fields[first : first + _CHUNK], first, dialect)
-        for first in range(0, len(fields), _CHUNK)
-    )
 
 
 def _encode_chunk(fields: Floats, first: int, dialect: Dialect) -> bytes:

@@ -50,13 +50,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int32s
-from ur_cartesian_driver.motion.geometry.vectors import ZERO6
 from ur_cartesian_driver.protocol.framing import FIXED_POINT, INT32_MAX
 from ur_cartesian_driver.protocol.program.point_fields import (
     ARC_TYPES,
     check_fields,
+    field_names,
     MotionType,
     MOVE_TYPES,
     PointField,
@@ -143,14 +143,16 @@ class Dialect:
             raise self._unsupported(f'{MotionType(int(kind)).name} (motion type {kind:g})')
         if not self.supports_q_near and fields[14] and kind in MOVE_TYPES:
             raise self._unsupported('q_near')
+        name = field_names(kind)[PointField.DURATION]
         if 0.0 < duration < self.min_duration:
             raise LocalProtocolError(
-                f'duration is {duration!r} s, but wire dialect {self.name} counts in '
-                f'{1.0 / self.time_scale:g} s, and 0 would mean that the velocity applies.'
+                f'{name} is {duration!r} s, but wire dialect {self.name} has a resolution of '
+                f'{1.0 / self.time_scale:g} s; a duration rounded to 0 would mean that the '
+                'velocity applies.'
             )
         if duration > self.max_duration:
             raise LocalProtocolError(
-                f'duration is {duration!r} s, but one point can take at most {self.max_duration} '
+                f'{name} is {duration!r} s, but one point can take at most {self.max_duration} '
                 f's in wire dialect {self.name}.'
             )
         check_fields(fields)
@@ -174,23 +176,6 @@ class Dialect:
             rows = np.isin(kinds, list(types))
             words[rows] = words[rows][:, order]
         return words
-
-    def restore(self, fields: PointFields) -> PointFields:
-        """
-        Return the 21 numbers of a point in today's order.
-
-        :raises RemoteProtocolError: the program does not know the point's motion type.
-        """
-        kind = fields[PointField.TYPE]
-        if kind not in self.motion_types:
-            raise RemoteProtocolError(
-                f'{kind:g} is an unknown motion type (word 20) in wire dialect {self.name}.'
-            )
-        if self.supports_q_near or kind == MotionType.SPLINE:
-            return fields
-        if kind in ARC_TYPES:
-            return tuple(fields[i] for i in _OLD_ARC)
-        return (*fields[:6], *ZERO6, fields[6], fields[12], *(0.0,) * 4, *fields[18:])
 
     def _unsupported(self, what: str) -> LocalProtocolError:
         return LocalProtocolError(f'{what} does not exist in wire dialect {self.name}.')

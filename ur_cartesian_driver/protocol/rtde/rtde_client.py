@@ -13,7 +13,7 @@ The RTDE client: negotiate the recipes, then decode data packages to values.
                               |
                               O  (outputs; again without the optional ones that are NOT_FOUND)
                               |
-                              I  (inputs, once for each group; none: skipped)
+                              I  (inputs; none: skipped)
                               |
                               S  (start)
                               |
@@ -25,7 +25,7 @@ answers within a second).
 
 Real controllers send text messages at any time, and may send data before the reply to S; a data
 package is therefore taken as that reply. In each state of the handshake, up to five other
-unexpected packages are reported and tolerated.
+unexpected packages are tolerated.
 
 The packages are in :mod:`~ur_cartesian_driver.protocol.rtde.rtde_packages`; the controller's side
 of the connection is in `rtde_server`.
@@ -33,7 +33,7 @@ of the connection is in `rtde_server`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import TypeAlias
@@ -129,7 +129,7 @@ class HandshakeDone:
     :param frequency: requested or highest frequency [Hz]; protocol version 1 cannot request one.
     :param outputs: the fields of the data packages.
     :param missing: optional outputs that this controller lacks.
-    :param inputs: one recipe for each group of inputs; its ``pack`` encodes their values.
+    :param inputs: the fields of the packages to write, None without inputs.
     """
 
     protocol_version: int
@@ -137,7 +137,7 @@ class HandshakeDone:
     frequency: float
     outputs: Recipe
     missing: tuple[str, ...]
-    inputs: tuple[Recipe, ...]
+    inputs: Recipe | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,14 +147,7 @@ class DataReceived:
     values: RtdeValues
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class UnexpectedPackage:
-    """A package that was not requested; harmless."""
-
-    package: RtdeReply
-
-
-RtdeEvent: TypeAlias = HandshakeDone | DataReceived | RtdeTextMessage | UnexpectedPackage
+RtdeEvent: TypeAlias = HandshakeDone | DataReceived | RtdeTextMessage
 
 
 def max_frequency(version: ControllerVersion) -> float:
@@ -171,7 +164,6 @@ class RtdeClientCodec:
         inputs: Sequence[str] = (),
         frequency: float = 0.0,
         optional_outputs: Iterable[str] = (),
-        input_groups: Sequence[Sequence[str]] = (),
         *,
         lower_registers: bool = False,
     ) -> None:
@@ -179,16 +171,13 @@ class RtdeClientCodec:
         Choose outputs and inputs.
 
         :param outputs: names of the outputs to stream, in order.
-        :param inputs: names of the inputs to write, in one package.
+        :param inputs: names of the inputs to write, all in one package.
         :param frequency: rate of the packages [Hz]; 0 = the controller's highest.
         :param optional_outputs: outputs that the controller may lack.
-        :param input_groups: further groups of inputs, each written in its own package.
-        :param lower_registers: whether the int and double registers from 24 on stand for those
-            from 0 on, which the robot is asked for.
+        :param lower_registers: whether to request the registers 0 to 23 in place of 24 to 47.
         :raises LocalProtocolError: no outputs, a duplicate name, or an impossible frequency.
         """
-        self._groups = [tuple(group) for group in (inputs, *input_groups) if group]
-        for names in (outputs, [name for group in self._groups for name in group]):
+        for names in (outputs, inputs):
             duplicates = sorted({name for name in names if list(names).count(name) > 1})
             if duplicates:
                 raise LocalProtocolError(f'An RTDE recipe contains {", ".join(duplicates)} twice.')
@@ -199,14 +188,14 @@ class RtdeClientCodec:
             )
         self.state = RtdeState.NEW
         self._wire_name = in_lower_half if lower_registers else str
-        self._outputs = tuple(outputs)
+        self._outputs, self._inputs = tuple(outputs), tuple(inputs)
         self._optional = frozenset(optional_outputs)
         self._missing: tuple[str, ...] = ()
         self._frequency = frequency
         self._version = LATEST_PROTOCOL_VERSION
         self._controller = ControllerVersion(major=0, minor=0, bugfix=0)
         self._recipe: Recipe | None = None
-        self._inputs: list[Recipe] = []
+        self._input_recipe: Recipe | None = None
         self._unexpected = 0
         self._frames = RtdeFrameBuffer()
         self._to_send = b''
@@ -274,28 +263,22 @@ class RtdeClientCodec:
             return [reply]
         if self.state is RtdeState.START and isinstance(reply, DataPackage):
             return [*self._ready(), *self._frame(frame)]
-        expected, handle = self._handlers().get(self.state, (None, None))
-        if handle is None or PackageType(frame[2]) is not expected:
-            return self._handle_unexpected(reply)
-        return handle(reply)
-
-    def _handlers(
-        self,
-    ) -> dict[RtdeState, tuple[PackageType, Callable[[RtdeReply], list[RtdeEvent]]]]:
-        """Return the expected type of package, and its handler, for each state."""
-        return {
-            RtdeState.PROTOCOL_VERSION: (
-                PackageType.REQUEST_PROTOCOL_VERSION,
-                self._on_protocol_version,
-            ),
-            RtdeState.CONTROLLER_VERSION: (
-                PackageType.GET_URCONTROL_VERSION,
-                self._on_controller_version,
-            ),
-            RtdeState.OUTPUTS: (PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS, self._on_outputs),
-            RtdeState.INPUTS: (PackageType.CONTROL_PACKAGE_SETUP_INPUTS, self._on_inputs),
-            RtdeState.START: (PackageType.CONTROL_PACKAGE_START, self._on_start),
-        }
+        match self.state, reply:
+            case RtdeState.PROTOCOL_VERSION, Acknowledgement(
+                type=PackageType.REQUEST_PROTOCOL_VERSION
+            ):
+                return self._on_protocol_version(reply)
+            case RtdeState.CONTROLLER_VERSION, ControllerVersion():
+                return self._on_controller_version(reply)
+            case RtdeState.OUTPUTS, SetupOutputsReply():
+                return self._on_outputs(reply)
+            case RtdeState.INPUTS, SetupInputsReply():
+                return self._on_inputs(reply)
+            case RtdeState.START | RtdeState.READY, Acknowledgement(
+                type=PackageType.CONTROL_PACKAGE_START
+            ):
+                return self._on_start(reply)
+        return self._handle_unexpected(reply)
 
     def _send_request(self, state: RtdeState, request: RtdeRequest) -> list[RtdeEvent]:
         """Queue a request and expect its reply."""
@@ -305,13 +288,6 @@ class RtdeClientCodec:
         return []
 
     def _handle_unexpected(self, reply: RtdeReply) -> list[RtdeEvent]:
-        is_late_start = (
-            self.state is RtdeState.READY
-            and isinstance(reply, Acknowledgement)
-            and reply.type is PackageType.CONTROL_PACKAGE_START
-        )
-        if is_late_start:  # the data overtook the reply
-            return self._on_start(reply)
         if self.state is not RtdeState.READY:
             self._unexpected += 1
             if self._unexpected > MAX_UNEXPECTED_PACKAGES:
@@ -319,10 +295,10 @@ class RtdeClientCodec:
                     f'The robot sent {self._unexpected} unexpected RTDE packages instead of '
                     f'{self.state.value}; the last one was {reply!r:.200}.'
                 )
-        return [UnexpectedPackage(package=reply)]
+        return []
 
-    def _on_protocol_version(self, reply: RtdeReply) -> list[RtdeEvent]:
-        if _require_accepted(reply):
+    def _on_protocol_version(self, reply: Acknowledgement) -> list[RtdeEvent]:
+        if reply.accepted:
             return self._send_request(RtdeState.CONTROLLER_VERSION, GetControllerVersion())
         if self._version == 1:
             raise RemoteProtocolError(
@@ -331,8 +307,7 @@ class RtdeClientCodec:
         self._version = 1
         return self._send_request(RtdeState.PROTOCOL_VERSION, RequestProtocolVersion(version=1))
 
-    def _on_controller_version(self, reply: RtdeReply) -> list[RtdeEvent]:
-        assert isinstance(reply, ControllerVersion)
+    def _on_controller_version(self, reply: ControllerVersion) -> list[RtdeEvent]:
         self._controller = reply
         limit = max_frequency(reply)
         if self._frequency > limit:
@@ -350,8 +325,7 @@ class RtdeClientCodec:
             SetupOutputs(names=tuple(map(self._wire_name, self._outputs)), frequency=frequency),
         )
 
-    def _on_outputs(self, reply: RtdeReply) -> list[RtdeEvent]:
-        assert isinstance(reply, SetupOutputsReply)
+    def _on_outputs(self, reply: SetupOutputsReply) -> list[RtdeEvent]:
         names = self._outputs
         _check_count(reply.types, names)
         missing = [n for n, text in zip(names, reply.types, strict=True) if text == NOT_FOUND]
@@ -368,20 +342,14 @@ class RtdeClientCodec:
             for name, text in zip(names, reply.types, strict=True)
         ]
         self._recipe = Recipe(names, types, reply.recipe_id)
-        return self._request_inputs()
+        if not self._inputs:
+            return self._send_request(RtdeState.START, StartStreaming())
+        return self._send_request(
+            RtdeState.INPUTS, SetupInputs(names=tuple(map(self._wire_name, self._inputs)))
+        )
 
-    def _request_inputs(self) -> list[RtdeEvent]:
-        """Request the next group of inputs, or start the data when all groups are agreed."""
-        if len(self._inputs) < len(self._groups):
-            return self._send_request(
-                RtdeState.INPUTS,
-                SetupInputs(names=tuple(map(self._wire_name, self._groups[len(self._inputs)]))),
-            )
-        return self._send_request(RtdeState.START, StartStreaming())
-
-    def _on_inputs(self, reply: RtdeReply) -> list[RtdeEvent]:
-        assert isinstance(reply, SetupInputsReply)
-        names = self._groups[len(self._inputs)]
+    def _on_inputs(self, reply: SetupInputsReply) -> list[RtdeEvent]:
+        names = self._inputs
         _check_count(reply.types, names)
         answers = list(zip(names, reply.types, strict=True))
         if missing := [name for name, text in answers if text == NOT_FOUND]:
@@ -389,11 +357,12 @@ class RtdeClientCodec:
         if taken := [name for name, text in answers if text == IN_USE]:
             raise InputsInUse(list(map(self._wire_name, taken)))
         types = [_type(name, text, INPUT_TYPES.get(name)) for name, text in answers]
-        self._inputs.append(Recipe(names, types, reply.recipe_id))
-        return self._request_inputs()
+        self._input_recipe = Recipe(names, types, reply.recipe_id)
+        return self._send_request(RtdeState.START, StartStreaming())
 
-    def _on_start(self, reply: RtdeReply) -> list[RtdeEvent]:
-        if not _require_accepted(reply):
+    def _on_start(self, reply: Acknowledgement) -> list[RtdeEvent]:
+        """Process the reply to S, which data may have overtaken."""
+        if not reply.accepted:
             raise RemoteProtocolError('The robot refused to start the RTDE data.')
         return [] if self.state is RtdeState.READY else self._ready()
 
@@ -407,13 +376,9 @@ class RtdeClientCodec:
                 frequency=self._frequency,
                 outputs=self._recipe,
                 missing=self._missing,
-                inputs=tuple(self._inputs),
+                inputs=self._input_recipe,
             )
         ]
-
-
-def _require_accepted(reply: RtdeReply) -> bool:
-    return isinstance(reply, Acknowledgement) and reply.accepted
 
 
 def _check_count(types: Sequence[str], names: Sequence[str]) -> None:

@@ -143,10 +143,6 @@ class Recipe:
         """Return zero for each field."""
         return tuple(t.zero for t in self.types)
 
-    def index(self, name: str) -> int:
-        """Return the index of a field in the values; ValueError if the recipe lacks it."""
-        return self.names.index(name)
-
     def __eq__(self, other: object) -> bool:
         """Compare names, types and id."""
         return isinstance(other, Recipe) and self._key() == other._key()

@@ -4,8 +4,8 @@
 The robot program's watch for contact of the tool, which stops every motion at contact.
 
 START_TOOL_CONTACT begins the watch, and has one answer: contact, or ended before a contact, after
-END_TOOL_CONTACT. A paused program reads END_TOOL_CONTACT when it goes on, so its answer may be
-due long after its watch is of no more interest.
+END_TOOL_CONTACT. A paused program reads END_TOOL_CONTACT only when it resumes, so the answer may
+come long after anyone needs it.
 """
 
 from __future__ import annotations

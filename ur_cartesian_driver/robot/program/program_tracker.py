@@ -18,9 +18,9 @@ DEAD_PROGRAM_TIMEOUT = 0.5
 IDENTITY_TIMEOUT = 0.5
 #: What to do where only our own program will do; the end of a sentence.
 NEEDS_OWN_PROGRAM = (
-    'for which the robot has to run the program of this driver, and the program that runs has not '
-    'shown to be that; call resend_robot_program (headless_mode), or play a program whose '
-    'External Control node fetches it from here.'
+    "for which the robot has to run this driver's program, and the running program has not "
+    'identified itself as ours; call resend_robot_program (headless_mode), or play a program '
+    'whose External Control node fetches it from here.'
 )
 
 

@@ -134,7 +134,7 @@ class _Attempt(RtdeConnection):
     def write_row(self, values: Sequence[float]) -> None:
         """Write all inputs in their order, once they are granted."""
         if self._inputs:
-            self._connection.send(self._inputs[0].pack(values))
+            self._connection.send(self._inputs.pack(values))
 
     def close(self) -> None:
         """Close after sending what was written."""

@@ -55,7 +55,7 @@ class RtdeConnection:
         self._on_values = on_values
         self._silence, self._on_text = silence, on_text
         self._names: tuple[str, ...] = ()
-        self._inputs: tuple[Recipe, ...] = ()
+        self._inputs: Recipe | None = None
         self._last_packet = self._last_request = 0.0
         #: Shortest time between a request of the handshake and its answer [s].
         self.round_trip = inf
@@ -96,8 +96,9 @@ class RtdeConnection:
         return self._version
 
     def write(self, values: Mapping[str, RtdeValue]) -> None:
-        """Write the first group of inputs of the codec; ``values`` has each by its name."""
-        self._connection.send(self._inputs[0].pack_named(values))
+        """Write the inputs of the codec; ``values`` has each by its name."""
+        assert self._inputs is not None, 'The codec has no inputs.'
+        self._connection.send(self._inputs.pack_named(values))
 
     async def ended(self) -> str:
         """Wait for the end of the connection or of its data; return the reason as a clause."""
