@@ -30,7 +30,7 @@ from ur_cartesian_driver.motion.plan.move_rows import MoveRows, MOVES
 from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows
 from ur_cartesian_driver.motion.plan.primitive import MoveL
 from ur_cartesian_driver.planning import PlanningOptions
-from ur_cartesian_driver.protocol.program.registers import POINTS_BEGUN
+from ur_cartesian_driver.protocol.program.registers import OutputInteger
 from ur_cartesian_driver.protocol.program.trajectory_points import (
     encode_rows,
     POINT_FIELDS,
@@ -209,4 +209,4 @@ class FakeRobotProgram:
             self._first = self._last
         self._arrived += size
         begun = self._arrived // POINT_SIZE
-        self._robot.controller.io.outputs.integers[POINTS_BEGUN] = begun
+        self._robot.controller.io.outputs.integers[OutputInteger.POINTS_BEGUN] = begun

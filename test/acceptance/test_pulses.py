@@ -188,7 +188,7 @@ def test_slow_and_fast_tools(speed):
 
 
 def test_trains_of_several_outputs_and_one_after_the_other():
-    trains = (
+    trains: tuple[PulseTrain, ...] = (
         replace(TRAIN, pin=0, last_waypoint=2, distance=0.0007, width=0.002),
         replace(TRAIN, pin=1, first_waypoint=1, last_waypoint=4, phase=0.004, width=0.016),
         replace(TRAIN, pin=3, first_waypoint=2, last_waypoint=4, distance=0.0041, count=12),

@@ -13,6 +13,7 @@ from ur_cartesian_driver.identification.arm_samples import ArmSamples
 from ur_cartesian_driver.identification.estimators import Unknown
 from ur_cartesian_driver.identification.identify import identify
 from ur_cartesian_driver.identification.profile import find_profile
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 
 
 @pytest.fixture
@@ -66,7 +67,8 @@ def test_a_line_whose_turn_may_lead_shows_no_speed_of_lines(laws, turn):
 def test_begin_and_end_of_a_move_are_known_to_be_correlated():
     """A move that seems to begin late seems to end early, so gaps beside it err together."""
     generator, t = np.random.default_rng(1), 0.004 * np.arange(450)
-    travel = speed_steps(0.6, 2.0, 0.6).integral(np.maximum(t - 0.2013, 0.0))
+    times: Floats = np.maximum(t - 0.2013, 0.0)
+    travel: Floats = speed_steps(0.6, 2.0, 0.6).integral(times)
     follows = np.arange(len(t)) > 0
     found = [
         find_profile(

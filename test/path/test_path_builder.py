@@ -608,4 +608,4 @@ def test_pulses_begin_and_end_at_points():
     with pytest.raises(InvalidGoal, match='distance is -1 m; it must be more than 0'):
         Path(HERE).by(dy=0.1).pulses(camera, -1.0)
     with pytest.raises(InvalidGoal, match='distance'):
-        Path(HERE).by(dy=0.1).pulses(camera, 'wide')
+        Path(HERE).by(dy=0.1).pulses(camera, 'wide')  # type: ignore[arg-type]

@@ -47,7 +47,7 @@ def test_who_gets_the_first_feedback_finds_the_motion():
         ),
         publish_feedback=publish,
     )
-    action = SimpleNamespace(
+    action: Any = SimpleNamespace(
         goal=lambda *_: 'goal',
         is_validation=lambda _: False,
         resolved=lambda goal, *_: goal,

@@ -233,6 +233,7 @@ class PathCollector:
         posture: Posture | None = None,
         via: Sequence[float] | None = None,
         quaternion: Sequence[float] | None = None,
+        normal: Sequence[float] | None = None,
         speed: float | None = None,
         acceleration: float | None = None,
         blend: float | None = None,
@@ -247,6 +248,7 @@ class PathCollector:
         for name, value in (
             ('vias', via),
             ('quaternions', quaternion),
+            ('normals', normal),
             ('speeds', speed),
             ('accelerations', acceleration),
             ('blends', blend),
