@@ -58,6 +58,8 @@ STATUS_NAMES = {
 }
 #: Time without a server after which the driver is considered gone [s].
 SERVER_TIMEOUT = 3.0
+#: The states of a driver that accepts goals.
+_READY_STATES = (DriverStatus.READY, DriverStatus.EXECUTING)
 #: How long to wait for the list of goals [s]; a driver that has had no goal publishes no list.
 _GOALS_TIMEOUT = 2.0
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -438,9 +440,9 @@ class GoalClient:
 
     def wait_ready(self, timeout: float) -> None:
         """
-        Wait until the status of the driver is READY.
+        Wait until the status of the driver is READY or EXECUTING.
 
-        :raises TimeoutError: the driver is not READY within ``timeout`` [s]; the text names the
+        :raises TimeoutError: the driver is neither within ``timeout`` [s]; the text names the
             next step.
         """
         latest: list[DriverStatus] = []
@@ -450,7 +452,7 @@ class GoalClient:
         )
         try:
             deadline = monotonic() + timeout
-            while not latest or latest[-1].state < DriverStatus.READY:
+            while not latest or latest[-1].state not in _READY_STATES:
                 if monotonic() > deadline:
                     needed = latest[-1].message if latest else self._how_to_find()
                     raise TimeoutError(
