@@ -34,9 +34,9 @@ class GoalAppender:
         self,
         goal: FollowCartesianTrajectory.Goal | None,
         *,
-        last: bool,
-        replace_from_point: int | None,
-        replace_from_time: float | None,
+        last: bool = False,
+        replace_from_point: int | None = None,
+        replace_from_time: float | None = None,
     ) -> Future:
         """
         Send a request once all earlier ones are answered; return a future of the response.

@@ -28,6 +28,7 @@ from rclpy.clock_type import ClockType
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer
 from ur_cartesian_driver.ros.message_fields import class_of, duration_message, Message, nanoseconds
+from ur_cartesian_driver.ros.topics import Endpoints, feedback_publishers
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import UrName
@@ -151,7 +152,7 @@ class ForwardedGoal:
         self.forwarded: Any = None
         self.seconds_lost = 0.0
         #: Who published feedback when the goal was sent; a driver that is started again differs.
-        self.publishers: frozenset[tuple[int, ...]] = frozenset()
+        self.publishers: Endpoints = frozenset()
 
 
 class GoalForwarder(ABC):
@@ -299,10 +300,8 @@ class GoalForwarder(ABC):
             elif run.publishers and publishers and not publishers & run.publishers:
                 self.refuse(run, 'The driver was started again, and knows nothing of this goal.')
 
-    def _publishers(self) -> frozenset[tuple[int, ...]]:
-        """Return who publishes feedback of the driver's action, as numbers that nobody repeats."""
-        found = self.driver.node.get_publishers_info_by_topic(f'{self._target}/_action/feedback')
-        return frozenset(tuple(each.endpoint_gid) for each in found)
+    def _publishers(self) -> Endpoints:
+        return feedback_publishers(self.driver.node, self._target)
 
 
 def _key(handle: Any) -> bytes:
