@@ -73,8 +73,8 @@ class GoalAppender:
 
         def take(done: Future) -> None:
             response = done.result()
-            if response.accepted or not is_known:
-                self._points = response.points_received
+            # Refused, too: another client may have appended. 0 = the goal is not there.
+            self._points = response.points_received or self._points
             if is_appended and not is_known:
                 self._ask(request, answer)  # the refusal said how many points there are
             else:
