@@ -73,7 +73,7 @@ class GoalRun:
         self.thread = threading.Thread(target=self._run, name=self.arm_request.name, daemon=True)
         #: Whether the goal waits for its start time.
         self.is_waiting = self.is_scheduled
-        #: A key of the last append request that was granted, and the response to it.
+        #: Key and response of the last accepted append request, to answer a repeat of it.
         self.last_append: tuple[object, Any] | None = None
         self._lock = threading.Lock()
         self._motion: MotionHandle | None = None
@@ -127,6 +127,7 @@ class GoalRun:
             outcome = Outcome(code=error.code, text=self._refusal_text(error))
         except Exception as error:
             # A goal always ends with a result; the thread prints the traceback.
+            self._end_motion()
             text = f'The driver has a defect, {type(error).__name__}: {error}; its log says more.'
             self._on_end(self, Outcome(code=ErrorCode.EXECUTION_FAILED, text=text))
             raise
@@ -135,6 +136,12 @@ class GoalRun:
         if outcome.code is ErrorCode.CANCELLED and self._cancel_requested:
             self._wait_for_canceling_state()
         self._on_end(self, outcome)
+
+    def _end_motion(self) -> None:
+        """Stop the arm and wait for its rest, before another goal can get it."""
+        if self._motion is not None:
+            self._motion.cancel()
+            self._motion.result()
 
     def _process(self) -> Outcome:
         context, request = self._context, self.handle.request
