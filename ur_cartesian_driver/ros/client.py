@@ -18,7 +18,7 @@ from time import monotonic
 from types import FrameType
 from typing import Any
 
-from action_msgs.msg import GoalStatus, GoalStatusArray
+from action_msgs.msg import GoalStatus
 from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import Vector3, Vector3Stamped
 import rclpy
@@ -26,13 +26,10 @@ from rclpy.action.client import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import (
-    DurabilityPolicy,
-    qos_profile_action_status_default,
-    QoSProfile,
-)
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 from std_msgs.msg import Float64, Header
+from unique_identifier_msgs.msg import UUID
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.goal_files.goal_file import read_goal_file
@@ -44,6 +41,7 @@ from ur_cartesian_driver.motion.goal.leads import Lead, with_lead_times
 from ur_cartesian_driver.msg import DriverStatus
 from ur_cartesian_driver.path import Path, resume, ResumedGoal
 from ur_cartesian_driver.ros.goal_appender import GoalAppender
+from ur_cartesian_driver.ros.message_fields import AT_END
 from ur_cartesian_driver.ros.messages.action_messages import outcome_of
 from ur_cartesian_driver.ros.messages.packed_points import packed_if_long
 from ur_cartesian_driver.ros.topics import Endpoints, feedback_publishers
@@ -59,8 +57,6 @@ STATUS_NAMES = {
 SERVER_TIMEOUT = 3.0
 #: The states of a driver that accepts goals.
 _READY_STATES = (DriverStatus.READY, DriverStatus.EXECUTING)
-#: How long to wait for the list of goals [s]; a driver that has had no goal publishes no list.
-_GOALS_TIMEOUT = 2.0
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -396,41 +392,13 @@ class GoalClient:
         driver = self._find_driver(timeout)
         service = self._find_service(AppendPoints, 'append_points', timeout)
         try:
-            goal_id = self._running_goal()
-            if goal_id is None:
-                return AppendPoints.Response(
-                    message='No goal runs to which points could be appended: send one with '
-                    'keep_open.'
-                )
-            answer = GoalAppender(service, goal_id).append(_message(path), **where)
+            appender = GoalAppender(service, UUID(), AT_END)
+            answer = appender.append(_message(path), **where)
             return self._spin_until(
                 answer, driver, 'whether the points were appended is not known'
             )
         finally:
             self._node.destroy_client(service)
-
-    def _running_goal(self) -> Any:
-        """Return the id of the goal that moves the arm (the oldest goal); None if no goal runs."""
-        latest: list[GoalStatusArray] = []
-        subscription = self._node.create_subscription(
-            GoalStatusArray,
-            f'{self.action}/_action/status',
-            latest.append,
-            qos_profile_action_status_default,
-        )
-        try:
-            deadline = monotonic() + _GOALS_TIMEOUT
-            while not latest and monotonic() < deadline:
-                self._spin_or_wait()
-        finally:
-            self._node.destroy_subscription(subscription)
-        running = [
-            status.goal_info
-            for status in (latest[-1].status_list if latest else ())
-            if status.status == GoalStatus.STATUS_EXECUTING
-        ]
-        running.sort(key=lambda goal: (goal.stamp.sec, goal.stamp.nanosec))
-        return running[0].goal_id if running else None
 
     def recover(self, *, unlock_protective_stop: bool = False, timeout: float = 10.0) -> Any:
         """

@@ -17,6 +17,7 @@ from ur_cartesian_driver.goal_files.goal_schema import Message
 from ur_cartesian_driver.motion.geometry.pose import Pose
 
 __all__ = [
+    'AT_END',
     'Message',
     'class_of',
     'duration_message',
@@ -29,6 +30,8 @@ __all__ = [
 ]
 
 _MAX_SECONDS = 2**31 - 1
+#: ``first_index`` of an append request: the number of points that the goal has, whatever it is.
+AT_END = 2**32 - 1
 
 
 def duration_message(time: float) -> Duration:

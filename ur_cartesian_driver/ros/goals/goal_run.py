@@ -88,6 +88,21 @@ class GoalRun:
         return self._start_time > self._received
 
     @property
+    def is_moving(self) -> bool:
+        """Whether the goal moves the arm."""
+        motion = self._motion
+        return motion is not None and not motion.done()
+
+    @property
+    def is_starting(self) -> bool:
+        """Whether the goal moves the arm as soon as it is planned and the arm is free."""
+        return not (
+            self._begun.is_set()
+            or self.is_waiting
+            or self.action.is_validation(self.handle.request)
+        )
+
+    @property
     def points(self) -> int:
         """The number of points of a goal with keep_open; 0 = no keep_open, or no motion yet."""
         motion = self._motion
