@@ -15,6 +15,7 @@ from rclpy.context import Context
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, String
 from std_srvs.srv import Trigger
+from waiting import wait_for
 
 from ur_cartesian_driver.kinematics.robot_description import robot_description
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
@@ -28,6 +29,7 @@ from ur_cartesian_driver.msg import (
 )
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros import CartesianDriverNode
+from ur_cartesian_driver.ros import node as node_module
 from ur_cartesian_driver.ros.client import GoalClient, load_goal
 from ur_cartesian_driver.ros.parameters.parameter_table import ParameterError
 from ur_cartesian_driver.ros.state.state_publisher import LATCHED_QOS, STATE_QOS
@@ -134,6 +136,54 @@ def test_destroying_the_node_stops_a_running_goal(no_thread_left, sim, executor,
     )
 
 
+def test_the_arm_stops_before_anything_else_ends(single_cell):
+    cell, node = single_cell, single_cell.node
+    cell.send(cell.goal((5.0, 0.2, 0.2, 0.0)))
+    cell.spin_until(lambda: node.action_server.running_motion)
+    close, stopped = node.contact_action.close, []
+
+    def close_late():
+        wait_for(lambda: node.action_server.running_motion is None, 3.0)
+        stopped.append(True)
+        close()
+
+    node.contact_action.close = close_late
+    node.destroy_node()
+    assert stopped
+
+
+def test_the_command_ends_the_node_before_the_names(sim, parameters_for, monkeypatch):
+    events = []
+
+    class RecordedNode(CartesianDriverNode):
+        def destroy_node(self):
+            super().destroy_node()
+            events.append('node')
+
+    class RecordedNames:
+        def __init__(self, *_):
+            signal.raise_signal(signal.SIGINT)
+
+        def close(self):
+            events.append('names')
+
+    monkeypatch.setattr(node_module, 'CartesianDriverNode', RecordedNode)
+    monkeypatch.setattr(node_module, 'NamesProcess', RecordedNames)
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        node_module.main(['driver', '--ur-driver-names', *arguments_of(parameters_for(sim))])
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    assert events == ['node', 'names']
+
+
+def arguments_of(parameters):
+    """Return parameters as ROS arguments."""
+    words = [f'{name}:={str(value).lower()}' for name, value in parameters.items()]
+    return ['--ros-args', *(each for word in words for each in ('-p', word))]
+
+
 def test_a_node_can_be_made_and_destroyed_again(no_thread_left, sim, make_cell):
     for _ in range(2):
         cell = make_cell(sim)
@@ -189,13 +239,12 @@ def command(*arguments):
 def test_a_signal_ends_the_goal_with_a_result_and_the_command_with_0(
     sim, parameters_for, tmp_path
 ):
-    arguments = [
-        word
-        for name, value in parameters_for(sim, robot_loop='process').items()
-        for word in ('-p', f'{name}:={str(value).lower()}')
-    ]
+    arguments = arguments_of(parameters_for(sim, robot_loop='process'))
     errors = tmp_path / 'stderr'
-    with errors.open('w') as stderr, subprocess.Popen(command(*arguments), stderr=stderr) as node:
+    with (
+        errors.open('w') as stderr,
+        subprocess.Popen(command(*arguments[1:]), stderr=stderr) as node,
+    ):
         try:
             with GoalClient() as client:
                 goal = load_goal(share_path() / 'config' / 'examples' / 'square.yaml')

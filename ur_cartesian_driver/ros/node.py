@@ -166,6 +166,8 @@ class CartesianDriverNode(Node):
 
     def destroy_node(self) -> None:
         """Stop the arm, end all goals, threads and connections, and destroy the node."""
+        if hasattr(self, 'action_server'):
+            self.action_server.stop()  # first, as the end of other components may take seconds
         components, self._components = self._components, []
         for component in reversed(components):
             component.close()
@@ -250,9 +252,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             was_idle = idle
         _end_goals(node, executor, signals)
     finally:
+        node.destroy_node()  # first: it stops live targets and freedrive, too
         if names is not None:
             names.close()
-        node.destroy_node()
         rclpy.shutdown()
 
 
