@@ -188,6 +188,19 @@ def test_a_shell_appends_to_the_goal_of_another_client(single_cell, tmp_path, ca
     assert cell.T_base_tcp.position == pytest.approx((x, y + 0.01, z), abs=1e-4)
 
 
+def test_a_defect_is_logged_with_its_traceback(single_cell, capfd):
+    cell = single_cell
+    handle = cell.send(cell.goal((1.0, 0.02, 0.0, 0.0), keep_open=True))
+    run = cell.node.action_server.find_run(bytes(handle.goal_id.uuid))
+    run.motion = None
+    said = Producer(cell)(handle, 1, (2.0, 0.0, 0.0, 0.0))
+    assert said.message.startswith('The driver has a defect, TypeError: ')
+    assert 'Traceback' in capfd.readouterr().err
+    del run.motion
+    cell.await_(handle.cancel_goal_async())
+    cell.result(handle)
+
+
 def test_a_shell_is_asked_for_the_points(capsys):
     assert main(['append']) == 1
     assert capsys.readouterr().err == (

@@ -17,6 +17,7 @@ from std_msgs.msg import Bool, Float64, String
 from std_srvs.srv import Trigger
 from waiting import wait_for
 
+from ur_cartesian_driver.driver.callbacks import LOG
 from ur_cartesian_driver.kinematics.robot_description import robot_description
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -91,7 +92,7 @@ def test_the_state_of_the_robot_is_published(single_cell):
     )
 
 
-def test_a_value_that_cannot_be_published_does_not_silence_the_topics(single_cell):
+def test_a_value_that_cannot_be_published_does_not_silence_the_topics(single_cell, capfd):
     cell = single_cell
     newest = subscribe(cell, ['joint_states'])
     cell.spin_until(lambda: newest)
@@ -99,6 +100,7 @@ def test_a_value_that_cannot_be_published_does_not_silence_the_topics(single_cel
     cell.spin_until(lambda: cell.node._publisher._io_topics._last == 'nonsense')
     newest.clear()
     cell.spin_until(lambda: newest)
+    assert 'Traceback' in capfd.readouterr().err
 
 
 def test_a_protective_stop_is_published(single_cell):
@@ -134,6 +136,37 @@ def test_destroying_the_node_stops_a_running_goal(no_thread_left, sim, executor,
         thread.name.startswith(('goal', 'driver', 'state publisher', 'robot loop'))
         for thread in threading.enumerate()
     )
+
+
+class RosLogger:
+    """Keeps what it is told."""
+
+    def __init__(self, name):
+        self.name, self.records = name, []
+
+    def __getattr__(self, severity):
+        return lambda text: self.records.append((severity, text))
+
+
+def test_each_node_logs_the_records_of_its_own_driver_with_their_tracebacks():
+    loggers = RosLogger('left'), RosLogger('right')
+    left, right = map(node_module._LogBridge, loggers)
+    left.source.info('of the left arm')
+    right.source.info('of the right arm')
+    LOG.warning('of no arm')
+    left.close()
+    right.source.info('alone')
+    try:
+        raise OSError('no memory')
+    except OSError:
+        LOG.exception('of no arm')
+    right.close()
+    assert loggers[0].records == [('info', 'of the left arm'), ('warning', 'of no arm')]
+    right_arm, alone, (severity, text) = loggers[1].records
+    assert (right_arm, alone) == (('info', 'of the right arm'), ('info', 'alone'))
+    assert severity == 'error'
+    assert text.startswith('of no arm\nTraceback ')
+    assert text.endswith('OSError: no memory')
 
 
 def test_the_arm_stops_before_anything_else_ends(single_cell):

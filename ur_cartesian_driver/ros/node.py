@@ -12,7 +12,7 @@ import signal
 import sys
 from time import monotonic
 from types import FrameType
-from typing import Any
+from typing import Any, ClassVar
 
 import rclpy
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -25,6 +25,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
 from ur_cartesian_driver.driver import Driver
+from ur_cartesian_driver.driver.callbacks import LOG
 from ur_cartesian_driver.ros.goals.action_server import GoalServer
 from ur_cartesian_driver.ros.goals.feed_override_subscriber import FeedOverrideSubscriber
 from ur_cartesian_driver.ros.goals.path_offset_subscriber import PathOffsetSubscriber
@@ -102,8 +103,11 @@ class CartesianDriverNode(Node):
         settings = declare_parameters(self)
         self._joint_names = settings.joint_names
         logger = self.get_logger()  # type: ignore[no-untyped-call]  # rclpy's
-        self._components.append(_LogBridge(logger))
-        self.driver = Driver(settings.driver, settings.planning, auto_heartbeat=False)
+        log_bridge = _LogBridge(logger)
+        self._components.append(log_bridge)
+        self.driver = Driver(
+            settings.driver, settings.planning, auto_heartbeat=False, logger=log_bridge.source
+        )
         self._components.append(self.driver)
         self.driver.open()
         self._publisher = StatePublisher(self, self.driver, settings)
@@ -175,20 +179,32 @@ class CartesianDriverNode(Node):
 
 
 class _LogBridge(logging.Handler):
-    """Passes the log records of the package to the logger of the node."""
+    """
+    Passes the log records of one driver to the logger of its node.
 
+    Records of no driver, as of a callback that failed, go to the oldest node of the process.
+    """
+
+    _bridges: ClassVar[list[_LogBridge]] = []
     _SEVERITIES = ((logging.ERROR, 'error'), (logging.WARNING, 'warning'), (logging.INFO, 'info'))
 
     def __init__(self, logger: RcutilsLogger) -> None:
         super().__init__()
         self._ros_logger = logger
-        self._source = logging.getLogger('ur_cartesian_driver')
-        self._level_before = self._source.level
-        self._source.addHandler(self)
-        self._source.setLevel(logging.DEBUG)
+        #: The logger of the driver.
+        self.source = LOG.getChild(logger.name)
+        self.source.setLevel(logging.DEBUG)
+        self._bridges.append(self)
+        LOG.addHandler(self)
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        if record.name == self.source.name:
+            return True
+        others = (bridge.source.name for bridge in self._bridges)
+        return self._bridges[0] is self and record.name not in others
 
     def emit(self, record: logging.LogRecord) -> None:
-        text = record.getMessage()
+        text = self.format(record)  # with the traceback, if there is one
         for level, severity in self._SEVERITIES:
             if record.levelno >= level:
                 # rclpy insists on one call site for each severity.
@@ -206,8 +222,8 @@ class _LogBridge(logging.Handler):
         self._ros_logger.info(text)
 
     def close(self) -> None:
-        self._source.removeHandler(self)
-        self._source.setLevel(self._level_before)
+        LOG.removeHandler(self)
+        self._bridges.remove(self)
         super().close()
 
 

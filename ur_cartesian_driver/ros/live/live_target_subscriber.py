@@ -22,6 +22,7 @@ import contextlib
 from math import inf
 import threading
 from time import monotonic
+import traceback
 
 from geometry_msgs.msg import PoseStamped
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -193,7 +194,7 @@ class LiveTargetSubscriber:
             except Exception as error:  # the next message may be processed without error
                 self._logger.error(
                     'A message on ~/live_target is ignored, because of a defect of the driver, '
-                    f'{type(error).__name__}: {error}.',
+                    f'{type(error).__name__}: {error}.\n{traceback.format_exc()}',
                     throttle_duration_sec=WARNING_PERIOD,
                 )
 

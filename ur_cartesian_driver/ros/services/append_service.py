@@ -13,6 +13,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from hashlib import sha256
 import pickle
 import threading
+import traceback
 from typing import Any
 
 from rclpy.node import Node
@@ -48,7 +49,7 @@ class AppendService:
 
     def __init__(self, node: Node, server: GoalServer) -> None:
         """Start to serve."""
-        self._server = server
+        self._logger, self._server = node.get_logger(), server
         self._thread = ThreadPoolExecutor(1, thread_name_prefix='append points')
         self._slots = threading.Semaphore(MAX_WAITING_REQUESTS)
         self._service = DeferredService(node, AppendPoints, '~/append_points', self._handle)
@@ -95,8 +96,10 @@ class AppendService:
         except DriverError as error:
             return _refusal(str(error), run.points)
         except Exception as error:
+            self._logger.error(traceback.format_exc())
             return _refusal(
-                f'The driver has a defect, {type(error).__name__}: {error}.', run.points
+                f'The driver has a defect, {type(error).__name__}: {error}; its log says more.',
+                run.points,
             )
 
     def _append_to_run(self, run: GoalRun, request: Any) -> Any:

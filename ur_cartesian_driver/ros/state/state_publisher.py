@@ -14,6 +14,7 @@ from __future__ import annotations
 import importlib
 import threading
 from time import monotonic
+import traceback
 from types import ModuleType
 from typing import Any
 
@@ -117,7 +118,7 @@ class StatePublisher:
                 # One bad value must not silence all topics for good.
                 self._logger.error(
                     'The state of the robot is not published, because of a defect of the driver, '
-                    f'{type(error).__name__}: {error}.',
+                    f'{type(error).__name__}: {error}.\n{traceback.format_exc()}',
                     throttle_duration_sec=WARNING_PERIOD,
                 )
             due += self._period * max(1.0, (monotonic() - due) // self._period)

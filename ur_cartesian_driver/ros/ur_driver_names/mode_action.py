@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 import threading
+import traceback
 from typing import Any
 
 from rcl_interfaces.srv import GetParameters
@@ -174,6 +175,7 @@ class ModeRun:
         except (_Ended, DriverSilent) as error:
             self._finish(False, str(error))
         except Exception as error:  # a goal without a result would refuse all later ones
+            self._driver.warn(traceback.format_exc())
             self._finish(False, f'A defect of set_mode: {type(error).__name__}: {error}.')
 
     def _go(self) -> str:
