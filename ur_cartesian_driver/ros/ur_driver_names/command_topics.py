@@ -86,6 +86,7 @@ class _FreedriveSwitch:
             timeout, self._late, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
         self._watchdog.cancel()
+        driver.on_close(self._end)
 
     def take(self, message: Message) -> None:
         """Take a request."""
@@ -96,6 +97,11 @@ class _FreedriveSwitch:
             self._watchdog.cancel()
         self._is_wanted = message.data
         self._follow()
+
+    def _end(self) -> None:
+        """Switch freedrive off, because nobody is left who could."""
+        if self._is_wanted or self._confirmed is not False:
+            self._driver.call(SetBool, 'freedrive_mode', SetBool.Request(data=False))
 
     def _late(self) -> None:
         self._watchdog.cancel()

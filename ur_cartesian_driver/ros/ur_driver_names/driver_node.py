@@ -69,6 +69,7 @@ class DriverNode:
         self._status_time = 0.0
         self.io_states: IOStates | None = None
         self._on_status: list[Callable[[DriverStatus], None]] = []
+        self._on_close: list[Callable[[], None]] = []
         self.subscribe(DriverStatus, 'status', self._keep_status, LATCHED_QOS)
         self.subscribe(IOStates, 'io_states', self._keep_io_states, LATCHED_QOS)
         self._group = ReentrantCallbackGroup()
@@ -108,6 +109,10 @@ class DriverNode:
         """Call a function with each message of the status, once a second and on change."""
         self._on_status.append(callback)
 
+    def on_close(self, callback: Callable[[], None]) -> None:
+        """Call a function before all calls are given up."""
+        self._on_close.append(callback)
+
     def client(self, kind: Any, name: str) -> Any:
         """Return the client of a service of the driver's node; each has one."""
         with self._lock:
@@ -135,7 +140,9 @@ class DriverNode:
         return call.future
 
     def close(self) -> None:
-        """Give up all calls, also those that are made later."""
+        """Fail all pending and later calls."""
+        for callback in self._on_close:
+            callback()
         self._is_closed = True
         self._look_at_calls()
 
