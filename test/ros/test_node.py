@@ -315,6 +315,11 @@ def run_when_ready(client, goal, on_feedback):
             "Parameter max_tool_speed is 'fast', but must be a number.",
         ),
         (['-p', 'max_tool_sped:=0.5'], 'There is no parameter max_tool_sped; did you mean'),
+        (
+            ['-p', 'unlock_protective_stop:=true'],
+            'unlock_protective_stop is a parameter of the node ur_driver_names; write -p '
+            'ur_driver_names:unlock_protective_stop:=VALUE.',
+        ),
         (['-p', 'ur_type'], "failed to initialize rcl: Couldn't parse parameter override rule"),
         (['--params-file', '/nowhere'], "failed to initialize rcl: Couldn't parse params file"),
     ],

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 import ctypes
+from dataclasses import fields
 import logging
 import re
 import signal
@@ -32,7 +33,11 @@ from ur_cartesian_driver.ros.goals.path_offset_subscriber import PathOffsetSubsc
 from ur_cartesian_driver.ros.live.freedrive_service import FreedriveService
 from ur_cartesian_driver.ros.live.live_target_subscriber import LiveTargetSubscriber
 from ur_cartesian_driver.ros.live.servo_state_publisher import ServoStatePublisher
-from ur_cartesian_driver.ros.parameters.node_parameters import as_overrides, declare_parameters
+from ur_cartesian_driver.ros.parameters.node_parameters import (
+    as_overrides,
+    declare_parameters,
+    explained_overrides,
+)
 from ur_cartesian_driver.ros.parameters.parameter_table import ParameterError, ParameterValue
 from ur_cartesian_driver.ros.services.append_service import AppendService
 from ur_cartesian_driver.ros.services.command_services import CommandServices
@@ -40,6 +45,7 @@ from ur_cartesian_driver.ros.services.contact_action import ContactAction
 from ur_cartesian_driver.ros.state.joint_states_check import JointStatesCheck
 from ur_cartesian_driver.ros.state.state_publisher import StatePublisher
 from ur_cartesian_driver.ros.ur_driver_names.names_process import NamesProcess
+from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 
 #: Longest period of the heartbeat, which reports that the node's executor is alive [s].
 HEARTBEAT_PERIOD = 0.5
@@ -78,7 +84,7 @@ class CartesianDriverNode(Node):
         :param node_kwargs: for ``rclpy.node.Node``.
         :raises ParameterError: a parameter is unknown or invalid; the text says why.
         """
-        try:
+        with explained_overrides():
             super().__init__(
                 node_name,
                 namespace=namespace,
@@ -86,12 +92,6 @@ class CartesianDriverNode(Node):
                 automatically_declare_parameters_from_overrides=True,
                 **node_kwargs,
             )
-        except ValueError as error:
-            if 'PARAMETER_NOT_SET' not in str(error):
-                raise
-            raise ParameterError(
-                "A parameter has no value; write '' for an empty text and [''] for an empty list."
-            ) from None
         self._components: list[Any] = []  # destroy_node() closes them, the last one first
         try:
             self._start()
@@ -100,7 +100,7 @@ class CartesianDriverNode(Node):
             raise
 
     def _start(self) -> None:
-        settings = declare_parameters(self)
+        settings = declare_parameters(self, [each.name for each in fields(NamesSettings)])
         self._joint_names = settings.joint_names
         logger = self.get_logger()  # type: ignore[no-untyped-call]  # rclpy's
         log_bridge = _LogBridge(logger)
