@@ -11,6 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 import pytest
 import rclpy
+from rclpy.action.server import RCLError
 from rclpy.context import Context
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, String
@@ -101,6 +102,22 @@ def test_a_value_that_cannot_be_published_does_not_silence_the_topics(single_cel
     newest.clear()
     cell.spin_until(lambda: newest)
     assert 'Traceback' in capfd.readouterr().err
+
+
+def test_a_topic_that_fails_while_ros_is_up_does_not_silence_the_others(single_cell, capfd):
+    cell = single_cell
+    newest = subscribe(cell, ['joint_states'])
+    cell.spin_until(lambda: newest)
+
+    def fail(*_):
+        raise RCLError('no memory')
+
+    topic = cell.node._publisher._diagnostics_topic
+    publish, topic.publish = topic.publish, fail
+    cell.spin_until(lambda: 'no memory' in capfd.readouterr().err)
+    topic.publish = publish
+    newest.clear()
+    cell.spin_until(lambda: newest)
 
 
 def test_a_protective_stop_is_published(single_cell):
