@@ -8,17 +8,19 @@ from collections.abc import Sequence
 import importlib
 from typing import Any
 
-from builtin_interfaces.msg import Duration
+from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from geometry_msgs.msg import Pose as PoseMessage
 
 from ur_cartesian_driver.goal_files.goal_reading import nanoseconds, pose_from_message, seconds
 from ur_cartesian_driver.goal_files.goal_schema import Message
+from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import Pose
 
 __all__ = [
     'AT_END',
     'Message',
+    'age_of',
     'class_of',
     'duration_message',
     'nanoseconds',
@@ -32,6 +34,29 @@ __all__ = [
 _MAX_SECONDS = 2**31 - 1
 #: ``first_index`` of an append request: the number of points that the goal has, whatever it is.
 AT_END = 2**32 - 1
+
+
+def age_of(stamp: Time, now: int, max_age: float, bound: str, *, ahead: float) -> float:
+    """
+    Return the age of a message [s]: 0 for the stamp 0, and not below 0.
+
+    :param now: time of the node's clock [ns].
+    :param max_age: largest age [s].
+    :param bound: the name of ``max_age``, for the refusal.
+    :param ahead: how far the stamp may lie in the future [s], because clocks differ.
+    :raises InvalidGoal: the stamp is too old, or too far in the future.
+    """
+    time = nanoseconds(stamp)
+    age = (now - time) / 1_000_000_000 if time else 0.0
+    if not -ahead <= age <= max_age:
+        raise InvalidGoal(
+            'header.stamp',
+            f'is {abs(age):.3f} s {"old" if age > 0.0 else "in the future"}, '
+            f'{bound} is {max_age:g} s',
+            'compare the clocks of both computers, or leave the stamp 0: then the age counts '
+            'from the receipt',
+        )
+    return max(0.0, age)
 
 
 def duration_message(time: float) -> Duration:

@@ -31,13 +31,18 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.driver.live_session import check_pose, LiveSession
-from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, RobotNotReady
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.state.rtde_state import SafetyStatus
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter, ArmRequest
-from ur_cartesian_driver.ros.message_fields import Message, nanoseconds, pose_from_message
+from ur_cartesian_driver.ros.message_fields import (
+    age_of,
+    Message,
+    nanoseconds,
+    pose_from_message,
+)
 
 #: Only the newest target is used, and a lost one is not sent again.
 TARGET_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -71,17 +76,8 @@ def target_from_message(
     """
     pose = pose_from_message(message.pose)
     check_pose(pose)
-    stamp = nanoseconds(message.header.stamp)
-    age = (now - stamp) / 1_000_000_000 if stamp else 0.0
-    if abs(age) > max_age:
-        raise InvalidGoal(
-            'header.stamp',
-            f'is {abs(age):.3f} s {"old" if age > 0.0 else "in the future"}, '
-            f'live_target_max_age is {max_age:g} s',
-            'compare the clocks of both computers, or leave the stamp 0: then the age counts '
-            'from the receipt',
-        )
-    return frames.T_base_frame(message.header.frame_id, snapshot) @ pose, max(0.0, age)
+    age = age_of(message.header.stamp, now, max_age, 'live_target_max_age', ahead=max_age)
+    return frames.T_base_frame(message.header.frame_id, snapshot) @ pose, age
 
 
 class TargetInhibitor:
