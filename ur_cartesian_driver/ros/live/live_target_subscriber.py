@@ -82,7 +82,7 @@ def target_from_message(
 
 class TargetInhibitor:
     """
-    Blocks targets after a stop, until there is a pause between two targets.
+    Blocks targets after a stop, until there is a pause between two targets; thread-safe.
 
     :param pause: the shortest pause that ends the blocking [s].
     """
@@ -90,12 +90,14 @@ class TargetInhibitor:
     def __init__(self, pause: float) -> None:
         """Start without blocking."""
         self._pause = pause
+        self._lock = threading.Lock()
         self._is_active = False
         self._last = -inf
 
     def activate(self) -> None:
         """Start to block."""
-        self._is_active = True
+        with self._lock:
+            self._is_active = True
 
     def blocks(self, now: float) -> bool:
         """
@@ -103,9 +105,10 @@ class TargetInhibitor:
 
         :param now: time of a steady clock [s].
         """
-        self._is_active = self._is_active and now - self._last < self._pause
-        self._last = now
-        return self._is_active
+        with self._lock:
+            self._is_active = self._is_active and now - self._last < self._pause
+            self._last = now
+            return self._is_active
 
 
 class LiveTargetSubscriber:
