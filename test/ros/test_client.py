@@ -15,7 +15,7 @@ from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.msg import DriverStatus
 from ur_cartesian_driver.ros.client import GoalClient
 from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer
-from ur_cartesian_driver.ros.state.state_publisher import LATCHED_QOS
+from ur_cartesian_driver.ros.topics import LATCHED_QOS
 from ur_cartesian_driver.srv import Recover
 
 

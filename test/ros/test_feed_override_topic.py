@@ -10,7 +10,7 @@ from std_msgs.msg import Float64
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.msg import DriverStatus
 from ur_cartesian_driver.ros.client import GoalClient
-from ur_cartesian_driver.ros.state.state_publisher import LATCHED_QOS
+from ur_cartesian_driver.ros.topics import LATCHED_QOS
 
 pytestmark = pytest.mark.slow
 

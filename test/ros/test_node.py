@@ -34,7 +34,7 @@ from ur_cartesian_driver.ros import CartesianDriverNode
 from ur_cartesian_driver.ros import node as node_module
 from ur_cartesian_driver.ros.client import GoalClient, load_goal
 from ur_cartesian_driver.ros.parameters.parameter_table import ParameterError
-from ur_cartesian_driver.ros.state.state_publisher import LATCHED_QOS, STATE_QOS
+from ur_cartesian_driver.ros.topics import LATCHED_QOS, STATE_QOS
 
 pytestmark = pytest.mark.slow
 

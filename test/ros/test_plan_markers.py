@@ -22,7 +22,7 @@ from ur_cartesian_driver.ros.message_fields import pose_from_message
 from ur_cartesian_driver.ros.messages import marker_messages
 from ur_cartesian_driver.ros.messages.marker_messages import COLOURS, plan_markers
 from ur_cartesian_driver.ros.messages.state_messages import link_transforms
-from ur_cartesian_driver.ros.state.state_publisher import LATCHED_QOS
+from ur_cartesian_driver.ros.topics import LATCHED_QOS
 
 ARM = Arm(MODELS['ur5e'])
 HOME = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)

@@ -22,7 +22,7 @@ from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 from ur_cartesian_driver.ros import CartesianDriverNode
 from ur_cartesian_driver.ros.client import add_tf_prefix, load_goal
 from ur_cartesian_driver.ros.message_fields import duration_message, pose_message
-from ur_cartesian_driver.ros.state.state_publisher import STATE_QOS
+from ur_cartesian_driver.ros.topics import STATE_QOS
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 #: The arms, and how far each goes along y [m].

@@ -26,7 +26,6 @@ from rclpy.action.client import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 from std_msgs.msg import Float64, Header
 from unique_identifier_msgs.msg import UUID
@@ -44,7 +43,7 @@ from ur_cartesian_driver.ros.goal_appender import GoalAppender
 from ur_cartesian_driver.ros.message_fields import AT_END
 from ur_cartesian_driver.ros.messages.action_messages import outcome_of
 from ur_cartesian_driver.ros.messages.packed_points import packed_if_long
-from ur_cartesian_driver.ros.topics import Endpoints, feedback_publishers
+from ur_cartesian_driver.ros.topics import Endpoints, feedback_publishers, LATCHED_QOS
 from ur_cartesian_driver.srv import AppendPoints, Recover
 
 #: Names of the final states of a goal.
@@ -428,9 +427,8 @@ class GoalClient:
             next step.
         """
         latest: list[DriverStatus] = []
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         subscription = self._node.create_subscription(
-            DriverStatus, f'{self._driver}/status', latest.append, latched
+            DriverStatus, f'{self._driver}/status', latest.append, LATCHED_QOS
         )
         try:
             deadline = monotonic() + timeout

@@ -28,10 +28,10 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.goal.known_frames import Frames
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter
-from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer
+from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer, GoalHandle
 from ur_cartesian_driver.ros.goals.goal_actions import GoalAction, installed_actions
 from ur_cartesian_driver.ros.goals.goal_context import GoalContext
-from ur_cartesian_driver.ros.goals.goal_run import goal_key, GoalHandle, GoalRun
+from ur_cartesian_driver.ros.goals.goal_run import goal_key, GoalRun
 from ur_cartesian_driver.ros.goals.plan_marker_publisher import PlanMarkerPublisher
 from ur_cartesian_driver.ros.message_fields import Message
 from ur_cartesian_driver.ros.parameters.node_parameters import Settings

@@ -9,7 +9,7 @@ from rclpy.node import Node
 from std_msgs.msg import Float64
 
 from ur_cartesian_driver.ros.goals.action_server import GoalServer
-from ur_cartesian_driver.ros.goals.path_offset_subscriber import OFFSET_QOS
+from ur_cartesian_driver.ros.topics import NEWEST_QOS
 
 
 class FeedOverrideSubscriber:
@@ -27,7 +27,7 @@ class FeedOverrideSubscriber:
             Float64,
             '~/feed_override',
             self.give,
-            OFFSET_QOS,
+            NEWEST_QOS,
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
 

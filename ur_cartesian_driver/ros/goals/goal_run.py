@@ -13,7 +13,7 @@ from collections.abc import Callable
 import contextlib
 from dataclasses import replace
 import threading
-from typing import Any, TypeAlias
+from typing import Any
 
 from rclpy.action.server import RCLError
 from rclpy.exceptions import InvalidHandle
@@ -33,11 +33,10 @@ from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.planning.request.joint_goal_rules import check_joint_goal
 from ur_cartesian_driver.planning.request.validate import check
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmRequest
+from ur_cartesian_driver.ros.goals.deferred_action_server import GoalHandle
 from ur_cartesian_driver.ros.goals.goal_actions import AnyGoal, GoalAction
 from ur_cartesian_driver.ros.goals.goal_context import GoalContext
 from ur_cartesian_driver.ros.message_fields import nanoseconds
-
-GoalHandle: TypeAlias = Any
 
 #: Period in which a waiting goal reads the node's clock, which may be a simulated one [s].
 CLOCK_PERIOD = 0.05

@@ -13,14 +13,12 @@ from __future__ import annotations
 from geometry_msgs.msg import Vector3Stamped
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal
 from ur_cartesian_driver.ros.goals.action_server import GoalServer
 from ur_cartesian_driver.ros.message_fields import age_of
+from ur_cartesian_driver.ros.topics import NEWEST_QOS
 
-#: Only the newest offset is used, and a lost one is not sent again.
-OFFSET_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 #: The values of ``frame_id`` that mean the frame of the path.
 FRAMES = ('', 'path')
 #: How far a stamp may lie in the future, because clocks differ [s].
@@ -39,7 +37,7 @@ class PathOffsetSubscriber:
             Vector3Stamped,
             '~/path_offset',
             self._take,
-            OFFSET_QOS,
+            NEWEST_QOS,
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
 

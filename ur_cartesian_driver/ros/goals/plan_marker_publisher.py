@@ -9,16 +9,11 @@ import contextlib
 from rclpy.action.server import RCLError
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from visualization_msgs.msg import MarkerArray
 
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.ros.messages.marker_messages import plan_markers
-
-#: Late subscribers get the newest plan at once.
-LATCHED_QOS = QoSProfile(
-    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
-)
+from ur_cartesian_driver.ros.topics import LATCHED_QOS
 
 
 class PlanMarkerPublisher:

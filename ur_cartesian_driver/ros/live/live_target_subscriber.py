@@ -27,7 +27,6 @@ import traceback
 from geometry_msgs.msg import PoseStamped
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.driver.live_session import check_pose, LiveSession
@@ -43,9 +42,8 @@ from ur_cartesian_driver.ros.message_fields import (
     nanoseconds,
     pose_from_message,
 )
+from ur_cartesian_driver.ros.topics import NEWEST_QOS
 
-#: Only the newest target is used, and a lost one is not sent again.
-TARGET_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 #: Stops after which an operator has to check the robot.
 SAFETY_STOPS = (
     SafetyStatus.PROTECTIVE_STOPPED
@@ -134,7 +132,7 @@ class LiveTargetSubscriber:
             PoseStamped,
             '~/live_target',
             self._store,
-            TARGET_QOS,
+            NEWEST_QOS,
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
 

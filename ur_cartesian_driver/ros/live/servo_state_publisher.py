@@ -11,15 +11,12 @@ from time import monotonic
 from rclpy.action.server import RCLError
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.motion.state.servo_report import ServoActivity, ServoReport
 from ur_cartesian_driver.msg import ServoState
 from ur_cartesian_driver.ros.messages.state_messages import servo_state_message
-
-#: The same QoS as for the other state topics.
-SERVO_STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+from ur_cartesian_driver.ros.topics import STATE_QOS
 
 
 class ServoStatePublisher:
@@ -32,7 +29,7 @@ class ServoStatePublisher:
         :param rate: the largest rate [Hz], above 0.
         """
         self._clock, self._period, self._due = node.get_clock(), 1.0 / rate, -inf
-        self._topic = node.create_publisher(ServoState, '~/servo_state', SERVO_STATE_QOS)
+        self._topic = node.create_publisher(ServoState, '~/servo_state', STATE_QOS)
         driver.add_servo_listener(self._publish)
 
     def _publish(self, report: ServoReport) -> None:

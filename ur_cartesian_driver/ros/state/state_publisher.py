@@ -21,7 +21,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, String
 
@@ -48,15 +47,8 @@ from ur_cartesian_driver.ros.messages.state_messages import (
 )
 from ur_cartesian_driver.ros.parameters.node_parameters import Settings
 from ur_cartesian_driver.ros.state.diagnostics import diagnostics_message
+from ur_cartesian_driver.ros.topics import LATCHED_QOS, STATE_QOS, TF_QOS
 
-#: Reliable, so that subscribers of either reliability get the topics.
-STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-#: Late subscribers get the last value at once.
-LATCHED_QOS = QoSProfile(
-    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
-)
-#: The QoS that tf2 requires.
-TF_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 #: Enough for all messages that a subscriber may not have received yet.
 KEPT_STAMPS = 1000
 #: Period in which an unchanged status is published again [s].

@@ -14,7 +14,7 @@ from std_srvs.srv import SetBool
 
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
 from ur_cartesian_driver.ros.message_fields import Message
-from ur_cartesian_driver.ros.state.state_publisher import STATE_QOS
+from ur_cartesian_driver.ros.topics import STATE_QOS
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import UrName

@@ -20,7 +20,7 @@ from rclpy.node import Node
 from ur_cartesian_driver.msg import DriverStatus, IOStates
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
 from ur_cartesian_driver.ros.message_fields import Message
-from ur_cartesian_driver.ros.state.state_publisher import LATCHED_QOS
+from ur_cartesian_driver.ros.topics import LATCHED_QOS
 
 #: How long the driver may take to answer; its own bound is 40 s for most services [s].
 ANSWER_TIMEOUT = 60.0

@@ -21,7 +21,7 @@ from rclpy.qos import QoSProfile
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
 from ur_cartesian_driver.ros.message_fields import Message
 from ur_cartesian_driver.ros.services.deferred_service import DeferredService
-from ur_cartesian_driver.ros.state.state_publisher import LATCHED_QOS, STATE_QOS
+from ur_cartesian_driver.ros.topics import LATCHED_QOS, STATE_QOS
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import ANSWER_TIMEOUT, DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 
