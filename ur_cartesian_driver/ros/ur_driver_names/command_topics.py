@@ -111,7 +111,7 @@ class _FreedriveSwitch:
         self._follow()
 
     def _follow(self) -> None:
-        """Make the driver do what is wanted, unless it is being told something already."""
+        """Make the driver do what is wanted, unless a request is pending."""
         on = self._is_wanted
         if self._is_calling or on == self._confirmed:
             return

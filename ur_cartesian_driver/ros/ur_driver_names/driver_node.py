@@ -26,7 +26,7 @@ from ur_cartesian_driver.ros.topics import LATCHED_QOS
 ANSWER_TIMEOUT = 60.0
 #: How long a call waits for the discovery of the driver's service [s].
 DISCOVERY_TIMEOUT = 5.0
-#: Age from which on a status says nothing more; the driver publishes it once a second [s].
+#: Older statuses are ignored; the driver publishes one every second [s].
 STATUS_TIMEOUT = 5.0
 #: Period in which waiting calls are looked at [s].
 CHECK_PERIOD = 0.2
@@ -194,8 +194,8 @@ class DriverNode:
             text = f'The service {call.service} did not answer within {call.timeout:g} s.'
             if not call.is_sent:
                 text = (
-                    f'The service {call.service} is not there: does the driver run, and is its '
-                    'node called so?'
+                    f'The service {call.service} does not exist; start the driver, or set the '
+                    'parameter driver to the name of its node.'
                 )
             _finish(call.future, DriverSilent(text))
 

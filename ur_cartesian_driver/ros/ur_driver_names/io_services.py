@@ -168,7 +168,7 @@ def _services() -> Iterable[UrName]:
         source_type=SetPayload,
         call=_set_payload,
     )
-    # Its newest release has a controller of its own for it.
+    # The UR driver's newest release serves gravity from a separate controller.
     for controller in (IO, 'gravity_update_controller'):
         yield Service(
             name=f'{controller}/set_gravity',

@@ -95,7 +95,7 @@ class _ModeServer:
 
     def _judge(self, goal: Message) -> GoalResponse:
         if not self._driver.is_reporting:
-            reason = 'the mode of the robot is not known: is the driver connected to it'
+            reason = 'the mode of the robot is not known; connect the driver to the robot'
         elif self._run is not None:
             reason = 'another goal changes the mode'
         else:
@@ -226,7 +226,7 @@ class ModeRun:
             raise _Ended(
                 'The robot is in a protective stop, which a person has to look at. Unlock it on '
                 'the pendant or by dashboard_client/unlock_protective_stop; set_mode does so only '
-                'where the parameter unlock_protective_stop takes the responsibility.'
+                'if unlock_protective_stop is true.'
             )
         else:
             self._do('dashboard/unlock_protective_stop')
@@ -239,7 +239,7 @@ class ModeRun:
         commands = COMMANDS.get((mode, target))
         if commands is None:
             raise _Ended(
-                f'The robot is in mode {mode.name}, out of which set_mode does not bring it; '
+                f'The robot is in mode {mode.name}, which set_mode cannot leave; '
                 'wait, or look at the pendant.'
             )
         for command in commands:

@@ -42,8 +42,8 @@ class UrDriverNames(Node):
     """
     Serves the topics, services and actions of the UR ROS 2 driver, in its own namespace.
 
-    It calls the driver's node over ROS and may be in another process. Without the driver it
-    answers each call with that.
+    It calls the driver's node over ROS and may be in another process. Without a driver, every call
+    fails and says so.
     """
 
     def __init__(

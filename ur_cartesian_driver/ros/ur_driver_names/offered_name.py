@@ -49,7 +49,7 @@ class UrName(ABC):
     @property
     @abstractmethod
     def served_by(self) -> str:
-        """What of the driver serves it; empty = nothing does."""
+        """The driver's interface behind the name, or ''."""
 
     @abstractmethod
     def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:

@@ -192,7 +192,7 @@ class GoalForwarder(ABC):
             clock=Clock(clock_type=ClockType.STEADY_TIME),
         )
 
-    # -- how the two actions differ; by default they do not --------------------------------------
+    # -- what subclasses convert ------------------------------------------------------------------
 
     def rejection(self, goal: Message) -> str:
         """Return why a goal is rejected; empty = it is not."""
@@ -203,7 +203,7 @@ class GoalForwarder(ABC):
         self.send(run, run.handle.request)
 
     def feedback(self, feedback: Message) -> Message:
-        """Return the feedback of the goal for that of the driver's goal."""
+        """Convert the driver's feedback."""
         return feedback
 
     def result(self, result: Message) -> Message:
@@ -238,7 +238,7 @@ class GoalForwarder(ABC):
     def _judge(self, goal: Message) -> GoalResponse:
         reason = self.rejection(goal)
         if not reason and not self._client.server_is_ready():
-            reason = f'the driver does not serve {self._target}: does it run'
+            reason = f'the driver does not serve {self._target}; start the driver'
         if not reason and not self.preempts and self._runs:
             reason = 'a goal is being executed; cancel it first'
         if not reason:
@@ -271,7 +271,7 @@ class GoalForwarder(ABC):
         return CancelResponse.ACCEPT
 
     def _end(self, run: ForwardedGoal, status: int, result: Message) -> None:
-        """Give a goal the end of the driver's goal; only the first end counts."""
+        """End a goal as the driver's goal ended; ignore later ends."""
         with self._lock:
             if self._runs.pop(_key(run.handle), None) is None:
                 return
