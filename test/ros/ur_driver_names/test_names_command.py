@@ -67,7 +67,10 @@ def test_the_names_come_and_go_with_the_driver(
             'release:=foxy',
             "Parameter release is 'foxy', but must be one of jazzy, lyrical.",
         ),
-        ('relase:=jazzy', 'There is no parameter relase; did you mean release?'),
+        (
+            'io_publish_rat:=1.0',
+            'There is no parameter io_publish_rat; did you mean io_publish_rate?',
+        ),
         ('x:=1', 'There is no parameter x; doc/coming_from/ur_driver.md lists all.'),
     ],
 )
