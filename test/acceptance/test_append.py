@@ -20,7 +20,7 @@ from append_goals import (
 )
 import numpy as np
 import pytest
-from robot_cell import CYCLE, run_cell
+from robot_cell import CYCLE, RTDE, run_cell
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -31,6 +31,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     Goal,
     IOCommand,
     OutputKind,
+    Waypoint,
 )
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
@@ -41,6 +42,7 @@ HORIZON, MARGIN = 1.0, 0.2
 #: What a producer sees is so old at most [s]: the period of the reports, and some cycles.
 REACTION = 0.04 + 4 * CYCLE
 ARM = Arm(robot_model('ur5e'))
+OPTIONS = PlanningOptions(max_tool_speed=1.0)
 
 
 def lines(home, first, count, last):
@@ -157,6 +159,28 @@ async def closed(cell, kind, count=6, **changes):
     motion = AppendMotion(cell, goal(kind, home, count, **changes))
     assert await motion.until(lambda: motion.motion.progress and motion.progress.awaiting_points)
     return motion, home, speeds.stop()
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_points_that_a_lost_connection_leaves_do_not_run_in_later_goals(kind):
+    async def scenario(cell):
+        motion = AppendMotion(cell, goal(kind, cell.memory.read().actual_tcp_pose, 10))
+        await cell.sleep(0.6)
+        cell.loop.cut(RTDE)
+        await cell.until(lambda: motion.outcome, 3.0)
+        assert motion.outcome.code is ErrorCode.CONNECTION_LOST
+        await cell.until(lambda: cell.is_ready() and cell.at_rest(), 3.0)
+        for _ in range(2):
+            here = cell.memory.read().actual_tcp_pose
+            up = moved(here, 0.0, 0.0, 0.02)
+            later = cell.owner.start(
+                plan(Goal(waypoints=(Waypoint(pose=up),)), cell.memory.read(), ARM, OPTIONS)
+            )
+            await cell.until(lambda: later.outcome, 10.0)  # noqa: B023  # at once
+            assert later.outcome.succeeded, later.outcome.text
+            assert cell.memory.read().target_tcp_pose.distance_to(up) < 1e-4
+
+    run_cell(scenario)
 
 
 @pytest.mark.parametrize('kind', KINDS)

@@ -39,7 +39,7 @@ DISTANCE, ACCURACY = 0.03, 1e-3
 PRESSED, TOUCHING = 0.004, 5.0
 #: How far a wall pushes the tool [m]: 20 N, less what the arm gives way.
 PUSHED = 0.001
-STOPPED = 'the watch for contact (detect_tool_contact) stops every motion'
+STOPPED = 'while detect_tool_contact watched, which stops every motion'
 
 
 def put_wall(cell, distance=DISTANCE, friction=0.2):

@@ -10,6 +10,7 @@ an output is due when no more of this time is left to its place than passes with
 """
 
 from collections import Counter
+from dataclasses import replace
 from math import cos
 
 import numpy as np
@@ -23,6 +24,7 @@ from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal, IOCommand, OutputKind, Segment, Waypoint
+from ur_cartesian_driver.motion.goal.leads import Lead
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
@@ -43,7 +45,7 @@ def command(waypoint, pin, value=1.0, **place):
         **{
             'waypoint': waypoint,
             'pin': pin,
-            'offset': -place.pop('lead', 0.0),
+            'offset': 0.0 if isinstance(place.get('lead'), str) else -place.pop('lead', 0.0),
             'output': OutputKind.STANDARD_DIGITAL,
             'value': value,
         }
@@ -318,14 +320,25 @@ def test_places_that_do_not_exist_are_refused(place, field, text):
 
 def test_a_lead_that_would_close_a_valve_before_it_opens_is_refused():
     bead = [command(2, 0, distance=0.01), command(2, 0, 0.0, distance=0.012, lead=0.1)]
-    with pytest.raises(InvalidGoal, match='is switched before the change ahead of it'):
+    with pytest.raises(
+        InvalidGoal, match=r'io_commands.1..offset makes a lead of 0.1 s, with which that'
+    ):
         Run(RobotInMemory('ur5e'), by_kind('stops', bead))
+
+
+def test_a_named_lead_is_refused_by_its_name():
+    valve = Lead(name='gun', output=OutputKind.STANDARD_DIGITAL, pin=0, open=0.9, close=0.0)
+    state = RobotInMemory('ur5e').place(HOME, Pose((0.0, 0.02, 0.12)))
+    seam = by_kind('stops', [command(3, 1), command(1, 0, distance=-0.045, lead='gun')])
+    options = replace(OPTIONS, leads=(valve,))
+    with pytest.raises(InvalidGoal, match=r'io_commands.1..lead is 0.9 s.* the longest lead'):
+        plan(seam(state.actual_tcp_pose), state, ARM, options)
 
 
 def test_more_leads_than_the_program_follows_are_refused():
     many = [command(2, pin, distance=0.02, lead=0.1) for pin in range(8)]
     many.append(command(2, 0, distance=0.02, lead=0.1, output=OutputKind.TOOL_DIGITAL))
-    with pytest.raises(InvalidGoal, match='more than 8 leads'):
+    with pytest.raises(InvalidGoal, match=r'io_commands.8..offset is one of more than 8 leads'):
         Run(RobotInMemory('ur5e'), by_kind('stops', many))
 
 

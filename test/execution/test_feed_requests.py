@@ -45,7 +45,7 @@ def test_an_invalid_value_ends_the_signal_until_a_valid_one_comes(fraction):
     assert feed.age(1.03) == []
     feed.set_feed(0.7, 0.0, 1.04)
     assert feed.target == 0.7
-    assert any('1 value not within 0 to 1' in line for line in feed.report)
+    assert any('1 value was not within 0 to 1' in line for line in feed.report)
 
 
 def test_a_signal_that_ends_is_lost_after_its_timeout():
@@ -66,7 +66,7 @@ def test_a_value_that_is_old_or_out_of_order_is_ignored(age):
     feed.set_feed(0.8, 0.0, 1.0)
     feed.set_feed(0.4, age, 1.1)
     assert feed.target == 0.8
-    assert any('1 value ignored' in line for line in feed.report)
+    assert any('1 value was ignored' in line for line in feed.report)
 
 
 def test_the_program_is_told_each_change_once_and_before_the_start():
@@ -83,7 +83,7 @@ def test_the_delay_of_a_goal_begins_with_it():
     feed = ProgramFeed(BOUNDS)
 
     def state(fraction, delay):
-        return feed.feed_state(
+        return feed.observe_feed(
             RobotState(
                 timestamp=0.0, actual_q=(0.0,) * 6, feed_override=fraction, feed_delay=delay
             ),
@@ -93,8 +93,8 @@ def test_the_delay_of_a_goal_begins_with_it():
     assert state(0.3, 7.0).delay == 0.0  # of earlier goals
     assert state(0.5, 7.5) == (0.5, 0.5, False)
     assert feed.report[0] == (
-        'feed_override: 0 values followed; the feed went down to 30%, and the goal took 0.50 s '
-        'more'
+        'feed_override: 0 values were followed; the feed went down to 30%, and the goal took '
+        '0.50 s more'
     )
 
 
@@ -108,7 +108,7 @@ def test_the_level_of_an_input_gives_the_feed_and_one_beyond_its_ends_is_invalid
 ):
     feed = ProgramFeed(BOUNDS, FeedInput(1, *((8.0, 2.0) if falls else (2.0, 8.0))))
     state = RobotState(timestamp=0.0, actual_q=(0.0,) * 6, standard_analog_input1=level)
-    valid = feed.feed_state(state, 1.0).is_valid
+    valid = feed.observe_feed(state, 1.0).is_valid
     assert valid == (fraction is not None)
     if valid:
         wanted = 1.0 - fraction if falls else fraction
@@ -119,7 +119,7 @@ def test_the_level_of_an_input_gives_the_feed_and_one_beyond_its_ends_is_invalid
 
 def test_an_input_that_the_robot_does_not_report_is_an_invalid_signal():
     feed = ProgramFeed(BOUNDS, FeedInput(0, 0.004, 0.02))
-    assert not feed.feed_state(RobotState(timestamp=0.0, actual_q=(0.0,) * 6), 1.0).is_valid
+    assert not feed.observe_feed(RobotState(timestamp=0.0, actual_q=(0.0,) * 6), 1.0).is_valid
 
 
 @pytest.mark.parametrize(

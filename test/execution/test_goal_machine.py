@@ -19,8 +19,10 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     StopProgram,
 )
 from ur_cartesian_driver.execution.goal.goal_transitions import (
+    detect_stop,
     GoalState,
     MONITORED_STATES,
+    RESUMABLE_STOPS,
     TRANSITIONS,
 )
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
@@ -46,6 +48,7 @@ from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
     RobotState,
     RuntimeState,
+    SafetyMode,
     SafetyStatus,
 )
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
@@ -534,6 +537,16 @@ STOPPED_STATES = [
         ErrorCode.EMERGENCY_STOP,
         id='emergency stop',
     ),
+    pytest.param(
+        {'safety_mode': SafetyMode.AUTOMATIC_MODE_SAFEGUARD_STOP},
+        ErrorCode.PROTECTIVE_STOP,
+        id='safeguard stop without its bit',
+    ),
+    pytest.param(
+        {'safety_mode': SafetyMode.PROFISAFE_EMERGENCY_STOP},
+        ErrorCode.EMERGENCY_STOP,
+        id='emergency stop without its bit',
+    ),
     pytest.param({'robot_mode': RobotMode.POWER_OFF}, ErrorCode.PROGRAM_STOPPED, id='power off'),
 ]
 
@@ -605,6 +618,46 @@ def test_an_arm_that_is_held_may_stand_as_long_as_it_likes(reason):
     machine = started()
     assert not [c for c in standing(machine, 20.0, **reason) if isinstance(c, Finish)]
     assert machine.state is GoalState.MOVING
+
+
+@pytest.mark.parametrize('mode', list(SafetyMode))
+def test_each_mode_in_which_the_arm_cannot_move_ends_a_goal_or_is_resumable(mode):
+    """With the bits that the controller is known to set, and without any for newer modes."""
+    known = {
+        SafetyMode.PROTECTIVE_STOP: SafetyStatus.PROTECTIVE_STOPPED,
+        SafetyMode.SAFEGUARD_STOP: SafetyStatus.SAFEGUARD_STOPPED,
+        SafetyMode.SYSTEM_EMERGENCY_STOP: SafetyStatus.SYSTEM_EMERGENCY_STOPPED,
+        SafetyMode.ROBOT_EMERGENCY_STOP: SafetyStatus.ROBOT_EMERGENCY_STOPPED,
+        SafetyMode.VIOLATION: SafetyStatus.VIOLATION,
+        SafetyMode.FAULT: SafetyStatus.FAULT,
+    }
+    state = robot(safety_mode=mode, safety_status=known.get(mode, SafetyStatus(0))).state
+    without_power = (  # the mode of the arm says so
+        SafetyMode.RECOVERY,
+        SafetyMode.VALIDATE_JOINT_ID,
+        SafetyMode.UNDEFINED_SAFETY_MODE,
+        SafetyMode.PROFISAFE_WAITING_FOR_PARAMETERS,
+    )
+    movable = (SafetyMode.NORMAL, SafetyMode.REDUCED, *without_power)
+    assert (detect_stop(state) is None) == (mode in movable)
+    resumable = detect_stop(state, RESUMABLE_STOPS) is None
+    assert resumable == (
+        mode in movable
+        or 'SAFEGUARD' in mode.name
+        or 'ENABLING' in mode.name
+        or mode is SafetyMode.PROTECTIVE_STOP
+    )
+
+
+def test_the_last_feedback_compares_the_tool_with_the_end():
+    machine = started()
+    machine.step(robot(0.999), 1.0)
+    machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 1.01)
+    short = {'actual_tcp_pose': Pose((END[0] - 4e-4, *END[1:]))}
+    commands = machine.step(robot(1.0, qd=REST, target_tcp_twist=REST, **short), 1.1)
+    *_, progress, finish = commands
+    assert finish.outcome.succeeded, finish.outcome.text
+    assert progress.progress.desired_pose.position == pytest.approx(END, abs=1e-9)
 
 
 def test_a_protective_stop_ends_the_program_so_that_the_motion_cannot_resume():
@@ -699,7 +752,7 @@ def test_a_robot_that_does_not_take_the_tcp_is_not_moved():
     end = outcome(machine.step(with_tcp(OWN), ARMING_TIMEOUT + 0.01))
     assert end.code is ErrorCode.ROBOT_NOT_READY
     assert 'did not take the TCP of the goal within 1.2 s' in end.text
-    assert 'nothing was moved' in end.text
+    assert end.text.endswith('(before anything moved).')
 
 
 def test_an_arm_that_went_away_before_it_was_armed_is_not_moved():
@@ -742,7 +795,7 @@ def test_a_contact_ends_a_goal_that_has_not_moved_yet():
     assert machine.step(with_tcp(OWN), 0.02) == []
     end = outcome(machine.step(with_tcp(OWN), SET_TIMEOUT))
     assert end.code is ErrorCode.EXECUTION_FAILED
-    assert end.text.startswith('The tool touched, ')
+    assert end.text.startswith('The tool touched something ')
     assert end.text.endswith('(before anything moved).')
 
 

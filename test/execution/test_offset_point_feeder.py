@@ -221,8 +221,9 @@ def test_lost_inputs_end_a_moving_goal():
 def test_the_inputs_are_released_once_and_nothing_is_written_after_that():
     cell = Cell().start()
     cell.move(0.5)
-    cell.event(CancelRequested())
     assert cell.report() is not None
+    cell.event(CancelRequested())
+    assert cell.report() is None, 'the program reads nothing any more'
     cell.event(TrajectoryEnded(result=TrajectoryResult.CANCELED))
     cell.event(StateReceived(state=replace(cell.state(0.5), actual_qd=(0.0,) * 6)))
     assert cell.outcome.code is ErrorCode.CANCELLED

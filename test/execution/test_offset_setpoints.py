@@ -213,7 +213,7 @@ def test_old_offsets_and_nan_are_ignored():
     drive.run(0.25)
     assert drive.place == [0.0, 2.0, 0.0]
     assert any(
-        line.startswith('5 path offsets came after') for line in drive.setpoints.requests.report
+        line.startswith('5 path offsets were ignored') for line in drive.setpoints.requests.report
     )
 
 

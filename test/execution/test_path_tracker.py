@@ -239,3 +239,17 @@ def test_a_robot_that_says_it_is_anywhere_is_somewhere_on_the_path():
     tracker = PathTracker(path(*rows))
     tracker.update(Pose((0.4, 0.0, 1e160), DOWN), 1e161)
     assert 0 <= tracker.path_position.row < len(rows)
+
+
+@pytest.mark.parametrize('turn', [90, 170, 200, 270, 350])
+def test_the_path_behind_is_found_however_far_the_tool_has_turned(turn):
+    halves = 0.5 * np.radians(turn) * np.linspace(0.0, 1.0, 101)
+    # As planning makes them: each has the sign of the one before it.
+    quaternions = [(0.0, 0.0, sin(half), cos(half)) for half in halves]
+    whole = path(*[(0.002 * i, 0.0, 0.2) for i in range(101)], quaternions=quaternions)
+    tracker = PathTracker(whole)
+    tracker.path_position = PathPosition(95, 0.5)
+    retracted = Pose((0.002 * 92, 0.0, 0.2), quaternions[92])
+    found = tracker.behind(retracted)
+    assert found.distance_to(retracted) < 1e-9
+    assert found.angle_to(retracted) < 1e-6

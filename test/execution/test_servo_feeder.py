@@ -274,8 +274,10 @@ def test_a_dwell_is_no_stall_while_the_program_reads():
 def test_due_counts_from_when_the_arm_can_follow():
     goal = machine()
     Cell(goal).until(GoalState.SETTLING)
-    assert goal.job.due + goal.feeder.monitor.start_delay == pytest.approx(DURATION + 0.1, abs=0.1)
-    assert goal.job.due + goal.feeder.monitor.start_delay > DURATION
+    assert goal.job.due + goal.feeder.monitor.allowed_delay == pytest.approx(
+        DURATION + 0.1, abs=0.1
+    )
+    assert goal.job.due + goal.feeder.monitor.allowed_delay > DURATION
 
 
 SAFETY = [

@@ -2,11 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The file of leads is written and read back, or refused with a sentence."""
 
+from dataclasses import replace
+
 import pytest
 
 from ur_cartesian_driver.goal_files.lead_file import LeadFileError, read_leads, write_lead
 from ur_cartesian_driver.motion.goal.goal import OutputKind
 from ur_cartesian_driver.motion.goal.leads import Lead
+from ur_cartesian_driver.planning import PlanningOptions
 
 ONE = 'name: valve_1, output: standard_digital 2, open: 0.06'
 VALVE = Lead(
@@ -47,6 +50,20 @@ def test_a_date_without_quotes_and_no_date_are_fine(file):
     assert read_leads(file)[0].date == '2026-03-02'
     file.write_text(f'- {{{ONE}, close: 0}}\n', 'utf-8')
     assert read_leads(file)[0].date == ''
+
+
+def test_options_have_the_leads_of_the_file_that_they_name(file, tmp_path):
+    other = tmp_path / 'other.yaml'
+    write_lead(file, VALVE)
+    write_lead(other, GUN)
+    options = PlanningOptions(lead_file=str(file))
+    assert options.leads == (VALVE,)
+    assert replace(options, lead_file=str(other)).leads == (GUN,)
+    assert replace(options, lead_file='').leads == ()
+    file.unlink()
+    assert replace(options, max_tool_speed=0.1).leads == (VALVE,)
+    assert replace(options, leads=(GUN,)).leads == (GUN,)
+    assert PlanningOptions(lead_file=str(file), leads=(GUN,)).leads == (GUN,)
 
 
 @pytest.mark.parametrize(

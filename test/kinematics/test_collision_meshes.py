@@ -11,6 +11,7 @@ from meshes import need_meshes
 import numpy as np
 import pytest
 from random_cases import cases, random_of
+from scipy.spatial.distance import cdist
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import (
@@ -328,7 +329,7 @@ def brute_force_distance(one, other):
     do not count.
     """
     centres, radii = zip(*(spheres(mesh) for mesh in (one, other)), strict=True)
-    between = np.linalg.norm(centres[0][:, None] - centres[1], axis=2)
+    between = cdist(*centres)
     between -= radii[0][:, None] + radii[1]
     best = np.inf
     for bound in (np.partition(between.ravel(), 2000)[2000], None):

@@ -21,6 +21,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     ContactEnd,
     OutputKind,
     Press,
+    PulseTrain,
     SafeOutput,
     ScriptCall,
     SegmentType,
@@ -43,6 +44,7 @@ from ur_cartesian_driver.path import (
     StaticFrame,
     tilted,
     Tolerance,
+    tool_digital,
     X,
     Y,
     Z,
@@ -575,3 +577,35 @@ def test_what_happens_at_points_is_that_of_a_goal():
             open_path.goal()
     with pytest.raises(InvalidGoal, match='has no begin for analog output 1'):
         Path(HERE).by(dy=0.1).end_follow_speed(pump)
+
+
+def test_pulses_begin_and_end_at_points():
+    camera = tool_digital(1)
+    path = Path(HERE).by(dz=-0.1).pulses(camera, mm(2), width=0.004, phase=mm(1), count=9)
+    path = path.by(dy=0.1).by(dx=0.1).end_pulses(camera)
+    goal = path.goal()
+    assert goal.pulses == (
+        PulseTrain(
+            first_waypoint=0,
+            last_waypoint=2,
+            output=OutputKind.TOOL_DIGITAL,
+            pin=1,
+            distance=0.002,
+            phase=0.001,
+            width=0.004,
+            count=9,
+        ),
+    )
+    assert Path.from_goal(goal).goal() == goal
+    assert Path.from_yaml(path.to_yaml()).goal() == goal
+    begun = Path(HERE).by(dy=0.1).pulses(camera, mm(2))
+    with pytest.raises(InvalidGoal, match=r'pulses\(\) at point 0 has no end for pin 1'):
+        begun.by(dy=0.1).goal()
+    with pytest.raises(InvalidGoal, match='has no begin for standard digital output 1'):
+        begun.by(dy=0.1).end_pulses(digital(1))
+    with pytest.raises(InvalidGoal, match='gives no pulses'):
+        Path(HERE).by(dy=0.1).pulses(analog(0), mm(2))
+    with pytest.raises(InvalidGoal, match='distance is -1 m; it must be more than 0'):
+        Path(HERE).by(dy=0.1).pulses(camera, -1.0)
+    with pytest.raises(InvalidGoal, match='distance'):
+        Path(HERE).by(dy=0.1).pulses(camera, 'wide')

@@ -96,7 +96,7 @@ def test_the_goals_of_the_page_on_outputs_are_the_examples(tmp_path, monkeypatch
         goal = Path.load(file).goal()
         motions = [(row.velocity, row.acceleration, row.blend_radius) for row in goal.segments]
         places = [waypoint.pose.position for waypoint in goal.waypoints]
-        return places, motions, goal.io_commands, goal.safe_outputs
+        return places, motions, goal.io_commands, goal.pulses, goal.safe_outputs
 
-    for file in ('glue.yaml', 'bead_by_place.yaml'):
+    for file in ('glue.yaml', 'bead_by_place.yaml', 'photo_seam.yaml'):
         assert content(file) == content(CHECKOUT / 'config' / 'examples' / file)

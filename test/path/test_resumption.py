@@ -29,6 +29,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     Posture,
     Press,
     ProportionalOutput,
+    PulseTrain,
     ScriptCall,
     Segment,
     SegmentType,
@@ -263,6 +264,38 @@ def test_an_amount_follows_the_speed_from_the_place_on():
         (each.first_waypoint, each.last_waypoint, each.begin_lead)
         for each in left.proportional_outputs
     ] == [(1, 3, 0.0), (2, 3, 0.1)]
+
+
+def test_the_pulses_behind_the_stop_are_left():
+    def left(*trains, place=(2, 0.52), **changes):
+        return [
+            (each.first_waypoint, each.last_waypoint, round(each.phase, 9), each.count)
+            for each in resume(
+                goal(
+                    pulses=tuple(
+                        PulseTrain(
+                            first_waypoint=first,
+                            last_waypoint=last,
+                            output=OutputKind.STANDARD_DIGITAL,
+                            pin=1,
+                            distance=0.01,
+                            **changes,
+                        )
+                        for first, last in trains
+                    )
+                ),
+                at(*place),
+                overlap=0.03,
+            ).goal.pulses
+        ]
+
+    # The path begins 22 mm behind point 1, the place of new point 1; the stop is 52 mm behind it.
+    assert left((0, 1), (1, 3), (2, 3)) == [(1, 3, 0.038, 0), (2, 3, 0.0, 0)]
+    assert left((0, 3), phase=0.004) == [(1, 3, 0.032, 0)]
+    assert left((1, 3), count=8) == [(1, 3, 0.038, 2)]
+    assert left((1, 3), count=6) == []
+    assert left((1, 2), phase=0.055) == [(1, 2, 0.033, 0)]
+    assert left((1, 2), phase=0.042, place=(2, 0.995)) == []
 
 
 def test_the_tool_presses_from_the_place_on():

@@ -21,6 +21,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     PathOffset,
     Posture,
     ProportionalOutput,
+    PulseTrain,
     SafeOutput,
     Segment,
     SegmentType,
@@ -82,6 +83,21 @@ DEMANDS = (
         },
         'proportional_outputs is not empty, but robot programs of wire dialect 2.0 have none; '
         'leave it empty, or let the driver send its own robot program.',
+    ),
+    (
+        {
+            'pulses': (
+                PulseTrain(
+                    first_waypoint=0,
+                    last_waypoint=1,
+                    output=OutputKind.TOOL_DIGITAL,
+                    pin=0,
+                    distance=0.01,
+                ),
+            )
+        },
+        'pulses is not empty, but robot programs of wire dialect 2.0 give none; leave it empty, '
+        'or let the driver send its own robot program.',
     ),
     (
         {'safe_outputs': (SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=0, value=1.0),)},

@@ -135,6 +135,11 @@ def test_twin_file_is_read_and_refused_with_its_line(tmp_path):
     assert options.twin == twin
     file.write_text(twin_text(twin).replace('blend_begin', 'blend_start'))
     assert replace(options, max_tool_speed=0.1).twin == twin
+    assert replace(options, twin_file='').twin is None
+    other = tmp_path / 'other.yaml'
+    other.write_text(twin_text(twin_of()))
+    assert replace(options, twin_file=str(other)).twin == twin_of()
+    assert replace(options, twin=twin_of()).twin == twin_of()
     with pytest.raises(
         ValueError, match=r'^twin_file: .*twin\.yaml, line \d+: blend_start is no law'
     ):

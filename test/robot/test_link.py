@@ -6,15 +6,21 @@ import asyncio
 import contextlib
 from dataclasses import replace
 import logging
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
-from ur_cartesian_driver.robot.connection_status import ConnectionStatus
-from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.link import LinkCallbacks, RobotLink
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RobotState, RuntimeState
+from ur_cartesian_driver.protocol.rtde.rtde_packages import RtdeTextMessage
+from ur_cartesian_driver.robot.connection_status import ConnectionStatus, required_action
+from ur_cartesian_driver.robot.lifecycle import ConnectionEvent, ConnectionState
+from ur_cartesian_driver.robot.link import LinkCallbacks, model_names, RobotLink
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.link_status import LOG_DELAY
+from ur_cartesian_driver.robot.program.tcp_setter import TemporaryTcpSetter
+from ur_cartesian_driver.robot.rtde.state_stream import StateStream
 
 
 class Ear:
@@ -119,6 +125,62 @@ def test_the_log_asks_for_nothing_while_the_program_is_on_its_way(ur_sim):
         assert not [text for _, text in ear.log if 'resend' in text]
 
     asyncio.run(run())
+
+
+def test_warnings_that_the_controller_sends_over_rtde_are_logged():
+    texts: list[str] = []
+
+    async def run():
+        stream = StateStream(0.0, 0.0, lambda state: None, on_text=texts.append)
+        for level, text in ((3, 'so it is'), (1, 'an input is in use')):
+            stream._on_data(RtdeTextMessage(text=text, level=level).encode())
+
+    asyncio.run(run())
+    assert texts == ['an input is in use']
+
+
+def test_a_type_that_no_model_has_is_no_fault_of_ur_type(ur_sim):
+    assert model_names(12, 5) == []
+
+    async def run():
+        async with listening(ur_sim) as ear:
+            await ear.ready()
+            ear.link._status.apply(ConnectionEvent.ROBOT_LOST)
+            ear.link._status.apply(ConnectionEvent.ROBOT_ANSWERED)
+            unknown: Any = SimpleNamespace(robot_type=12)
+            ear.link._on_configuration(unknown)
+            status = ear.link.status
+        assert status.state is ConnectionState.REFUSED
+        assert 'reports the type 12, which this driver does not know' in status.message
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    ('mode', 'part'),
+    [
+        (RobotMode.POWER_OFF, 'switch it on and release its brakes'),
+        (RobotMode.IDLE, 'switch it on and release its brakes'),
+        (RobotMode.BOOTING, 'wait until it can be switched on'),
+        (RobotMode.CONFIRM_SAFETY, 'a person to confirm its safety configuration'),
+    ],
+)
+def test_each_mode_of_the_arm_has_its_remedy(mode, part):
+    state = RobotState(timestamp=0.0, actual_q=(0.0,) * 6, robot_mode=mode)
+    assert part in required_action(
+        ConnectionState.CONNECTED, state, program_connected=False, headless_mode=True
+    )
+
+
+@pytest.mark.parametrize('is_foreign', [False, True])
+def test_the_tcp_is_not_restored_under_a_paused_program_of_others(is_foreign):
+    sent: list[bytes] = []
+    program: Any = SimpleNamespace(connected=False)
+    primary: Any = SimpleNamespace(send=lambda data, is_wanted: sent.append(data))
+    setter = TemporaryTcpSetter(program, primary, headless_mode=True)
+    state = RobotState(timestamp=0.0, actual_q=(0.0,) * 6, runtime_state=RuntimeState.PAUSED)
+    setter.restore(IDENTITY, state, lambda: not is_foreign)
+    assert bool(sent) is not is_foreign
 
 
 @pytest.mark.slow

@@ -36,12 +36,16 @@ PROGRAM_PORTS = ('trajectory_port', 'script_command_port', 'reverse_port')
 class Cell:
     """Open ports, and what was told about them, in order."""
 
-    def __init__(self):
+    def __init__(self, **settings):
         self.news = asyncio.Queue()
         tell = self.news.put_nowait
         self.sockets = ProgramSockets(
             LinkSettings(
-                reverse_port=0, trajectory_port=0, script_command_port=0, script_sender_port=0
+                reverse_port=0,
+                trajectory_port=0,
+                script_command_port=0,
+                script_sender_port=0,
+                **settings,
             ),
             ProgramCallbacks(
                 connected=lambda: tell('connected'),
@@ -74,8 +78,8 @@ class Cell:
 
 
 @contextlib.asynccontextmanager
-async def cell(allowed=frozenset()):
-    made = Cell()
+async def cell(allowed=frozenset(), **settings):
+    made = Cell(**settings)
     await made.sockets.open(HOST, allowed)
     try:
         yield made
@@ -433,12 +437,30 @@ def test_the_program_leaves_in_one_call_where_the_system_keeps_little(monkeypatc
     asyncio.run(scene())
 
 
-def test_a_program_is_not_served_where_the_robot_has_its_own():
+@pytest.mark.parametrize(
+    ('settings', 'reason'),
+    [
+        ({'wire_dialect': '2.12'}, 'wire_dialect is set to an older program'),
+        ({}, 'it cannot be made from the settings; the status of the driver says why'),
+    ],
+)
+def test_a_request_for_a_program_that_is_not_there_is_explained(settings, reason):
     async def scene():
-        async with cell() as here:
+        async with cell(**settings) as here:
             _, writer = await here.dial('script_sender_port')
             writer.write(b'request_program\n')
-            assert 'wire_dialect' in await here.next()
+            assert reason in await here.next()
+
+    asyncio.run(scene())
+
+
+def test_a_robot_that_got_another_address_may_connect_to_ports_that_are_open():
+    async def scene():
+        async with cell(allowed=frozenset({'127.0.0.9'})) as here:
+            await here.dial('reverse_port')
+            assert 'may not connect' in await here.next()
+            await here.sockets.open(HOST, frozenset({HOST}))
+            await here.connect()
 
     asyncio.run(scene())
 

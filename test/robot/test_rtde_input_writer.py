@@ -7,19 +7,16 @@ from itertools import product
 import pytest
 
 from ur_cartesian_driver.motion.goal.goal import OutputKind
+from ur_cartesian_driver.motion.goal.output_names import OUTPUTS
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol.rtde.rtde_fields import INPUT_TYPES, OUTPUT_TYPES
 from ur_cartesian_driver.robot.services import rtde_input_writer
-from ur_cartesian_driver.robot.services.service_calls import (
-    PINS,
-    SetOutputCall,
-    SetSpeedSliderCall,
-)
+from ur_cartesian_driver.robot.services.service_calls import SetOutputCall, SetSpeedSliderCall
 
 DIGITAL = [
     SetOutputCall(kind=kind, pin=pin, value=value)
     for kind, value in product(list(OutputKind)[:3], (0.0, 1.0))
-    for pin in range(PINS[kind])
+    for pin in range(OUTPUTS[kind][1])
 ]
 ANALOG = [
     SetOutputCall(kind=OutputKind.STANDARD_ANALOG, pin=pin, value=0.5, domain=domain)

@@ -11,6 +11,7 @@ import rclpy
 from rclpy.action.client import ActionClient
 from rclpy.context import Context
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.experimental.events_executor import EventsExecutor
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.driver import ConnectionState
@@ -21,6 +22,8 @@ from ur_cartesian_driver.ros.message_fields import duration_message, pose_messag
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 EXECUTORS = {'single': SingleThreadedExecutor, 'multi': MultiThreadedExecutor}
+#: One thread, which makes no wait set of hundreds of entities for each callback.
+EVENTS = {'events': EventsExecutor}
 
 
 @pytest.fixture(autouse=True)
@@ -81,7 +84,7 @@ class Cell:
             FollowCartesianTrajectory,
             '/ur_cartesian_driver/follow_cartesian_trajectory',
         )
-        self.executor = EXECUTORS[executor](context=self.context)
+        self.executor = (EXECUTORS | EVENTS)[executor](context=self.context)
         self.executor.add_node(self.node)
         self.executor.add_node(self.client_node)
         self.feedback = []

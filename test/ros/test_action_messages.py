@@ -10,8 +10,9 @@ import pytest
 
 from ur_cartesian_driver.driver import ConnectionState, ConnectionStatus
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.events import Outcome, Progress, Pulse
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose, pose_error
+from ur_cartesian_driver.motion.goal.goal import OutputKind
 from ur_cartesian_driver.motion.goal.known_frames import Frames
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RobotState, SafetyMode
 from ur_cartesian_driver.msg import DriverStatus
@@ -23,6 +24,7 @@ from ur_cartesian_driver.ros.messages.action_messages import (
 )
 from ur_cartesian_driver.ros.messages.state_messages import (
     joint_state_message,
+    pulse_message,
     status_message,
     tcp_pose_message,
 )
@@ -223,3 +225,16 @@ def test_the_motion_version_is_that_of_the_program_that_is_ours():
         (ConnectionStatus(program_is_own=True, motion_version=2), 2),
     ):
         assert status_message(connection, left_behind, STAMP).motion_version == shown
+
+
+def test_a_pulse_has_its_output_and_pose_or_nan_where_its_packet_was_lost():
+    pulse = Pulse(
+        output=OutputKind.TOOL_DIGITAL, pin=1, number=7, timestamp=2.5, pose=Pose((1.0, 2.0, 3.0))
+    )
+    message = pulse_message(pulse, 'left_base', STAMP)
+    assert (message.header.frame_id, message.timestamp) == ('left_base', 2.5)
+    assert (message.output, message.pin, message.number) == (2, 1, 7)
+    assert (message.pose.position.x, message.pose.orientation.w) == (1.0, 1.0)
+    lost = pulse_message(replace(pulse, pose=None), 'left_base', STAMP)
+    assert isnan(lost.pose.position.x)
+    assert isnan(lost.pose.orientation.w)

@@ -392,3 +392,15 @@ def test_garbage_comes_out_of_a_program(talk):
     peer.take()
     bench.step()
     assert len(peer.take().replace(b'tick', b'')) == 32
+
+
+def test_a_delay_of_sockets_delays_the_end_of_the_data_too(talk):
+    bench, peer = talk
+    add(bench, 'delay sockets 0.3 s')
+    bench.step()
+    peer.feed(b'hello')
+    peer.hang_up()
+    bench.wait(0.2)
+    assert 'hello' not in bench.log
+    bench.wait(0.4)
+    assert 'hello' in bench.log

@@ -302,3 +302,12 @@ def test_the_port_stands_beside_a_standard_primary_port():
     assert SimulatorConfig().listening_interpreter_port == 30020
     assert SimulatorConfig(primary_port=0).listening_interpreter_port == 0
     assert SimulatorConfig(interpreter_port=5).listening_interpreter_port == 5
+
+
+def test_statements_with_poses_leave_nothing_behind(bench, client):
+    names = bench.programs._interpreter._names
+    client.say('a = p[0.1, 0, 0, 0, 0, 0]')
+    before = len(names)
+    for _ in range(20):
+        client.say('a = p[0.1, 0, 0, 0, 0, 0]')
+    assert len(names) == before

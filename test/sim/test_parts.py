@@ -51,6 +51,21 @@ def test_it_does_not_matter_how_a_stream_is_cut(cuts):
     assert items == ITEMS
 
 
+@pytest.mark.parametrize(
+    'text',
+    [
+        'def a():\n  sync()\nend # of a\n',
+        'def\ta():\n  sync()\nend\n',
+        'sec a():\nif True:\nsync()\nend\nend\n',
+        'def a():\nsec = 1\nwhile True:\nsync()\nend\nend\n',
+    ],
+)
+def test_a_program_ends_at_its_own_end(text):
+    stop = b'stop program\n'
+    items = UploadDecoder().feed(text.encode() + stop)
+    assert items == [UploadedProgram(text), UploadedLine('stop program')]
+
+
 def test_a_program_without_end_is_not_collected_for_ever():
     uploads = UploadDecoder()
     uploads.feed(b'def a():\n' + (b'  ' + b'x' * 2**16 + b'\n') * 15)

@@ -98,3 +98,10 @@ def test_a_call_that_fails_ends_the_program_and_says_why(camera):
             f'The remote procedure call {call} of http://127.0.0.1:{port}/RPC2 failed: ' in error
         )
         assert reason in error
+
+
+def test_a_request_that_is_longer_than_a_socket_keeps_is_sent_in_parts(camera):
+    served, port = camera
+    log = run(port, '  textmsg(length(camera.look(make_list(3000, 1.5))))')
+    assert log == ['3000']
+    assert served.seen == [([1.5] * 3000,)]

@@ -37,6 +37,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
     MotionProgress,
     OwnerHeartbeat,
     pack,
+    PulsesGiven,
     ResendProgram,
     StartMotion,
     StatusChanged,
@@ -93,6 +94,8 @@ class Owner:
         self.answers = []
         #: Answers to service calls, by their numbers.
         self.call_answers = {}
+        #: The pulses of all goals.
+        self.pulses = []
         self._calls = 0
         self.log = []
         self.silent = False
@@ -152,6 +155,8 @@ class Owner:
                 self.motions[number].progress.append(progress)
             case AppendAnswered(answer=answer):
                 self.answers.append(answer)
+            case PulsesGiven(pulses=pulses):
+                self.pulses += pulses
             case CallAnswered(number=number, answer=answer):
                 self.call_answers[number] = answer
             case MotionEnded(motion=number, outcome=outcome):

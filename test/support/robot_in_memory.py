@@ -179,10 +179,14 @@ class RobotInMemory:
 
     def ask_to_idle(self):
         """Let the message come that ends the mode in which trajectories run."""
-        self._socket(REVERSE).feed(keepalive(0).encode())
+        self.ask(keepalive(0))
+
+    def ask(self, message):
+        """Let a message come on the reverse socket."""
+        self._socket(REVERSE).feed(message.encode())
 
     def cancel(self):
-        """Let CANCEL come, as the driver sends it."""
+        """Let CANCEL come, without the number of points that were sent."""
         self._command(trajectory(TrajectoryAction.CANCEL, 0, read_timeout=0))
 
     def late_results(self, cycles):

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import MAX_JOINT_VALUE
+from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.robot.services.service_calls import MAX_TOOL_OFFSET
 from ur_cartesian_driver.sim.command_line.simulator_options import parsed, six_numbers
 
@@ -55,9 +56,9 @@ def software(text: str) -> str:
     return text
 
 
-def tcp(text: str) -> tuple[float, ...]:
-    """Return a pose of six numbers [m], [rad]."""
-    return six_numbers(text, (MAX_TOOL_OFFSET, MAX_JOINT_VALUE))
+def pose(text: str) -> Pose:
+    """Return the pose of six numbers [m], [rad]."""
+    return Pose.from_rotation_vector(six_numbers(text, (MAX_TOOL_OFFSET, MAX_JOINT_VALUE)))
 
 
 def offsets(text: str) -> tuple[float, ...]:

@@ -20,9 +20,16 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.robot.check.experiment_runner import motion_refusal, run_experiment
 from ur_cartesian_driver.robot.check.experiments import Experiment, EXPERIMENTS
-from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, skipped, Verdict
+from ur_cartesian_driver.robot.check.finding import (
+    Finding,
+    problem,
+    RobotAddress,
+    skipped,
+    Verdict,
+)
 from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 from ur_cartesian_driver.robot.check.observations import observe
+from ur_cartesian_driver.sim.command_line.simulator_options import fields_from
 
 #: Exit status: nothing answers at the address; something keeps the driver from working.
 UNREACHABLE, HAS_PROBLEMS = 3, 1
@@ -36,13 +43,7 @@ def check_robot(arguments: argparse.Namespace) -> int:
     """Check a robot, write the report, and return the exit status."""
     if arguments.with_motion and not sys.stdin.isatty():
         raise ValueError('--with-motion asks before each motion, so it needs a terminal.')
-    address = RobotAddress(
-        host=arguments.robot_ip,
-        rtde_port=arguments.rtde_port,
-        primary_port=arguments.primary_port,
-        dashboard_port=arguments.dashboard_port,
-        robot_api_port=arguments.robot_api_port,
-    )
+    address = RobotAddress(host=arguments.robot_ip, **fields_from(arguments, RobotAddress))
     findings = asyncio.run(_observe(address, arguments.seconds))
     recordings: dict[str, MotionSamples] = {}
     if arguments.with_motion:
@@ -115,8 +116,7 @@ def _experiment(
             return [skipped(experiment.check, f'No motion: {refusal}')]
         samples = asyncio.run(run_experiment(address, experiment))
     except (OSError, DriverError) as error:
-        text = f'Not finished: {str(error).rstrip(".")}.'
-        return [Finding(check=experiment.check, verdict=Verdict.PROBLEM, text=text)]
+        return [problem(experiment.check, f'Not finished: {error}')]
     recordings[experiment.check] = samples
     return [analyse(samples) for analyse in experiment.analyses]
 

@@ -78,9 +78,37 @@ def parser() -> argparse.ArgumentParser:
 def _add_tcp(command: CommandParser, text: str) -> None:
     command.add_argument(
         '--tcp',
-        type=argument_types.tcp,
+        type=argument_types.pose,
         metavar='X,Y,Z,RX,RY,RZ',
         help=f'active TCP in the flange frame{text}',
+    )
+
+
+def _add_robot(command: CommandParser, text: str, **ports: int) -> None:
+    """Add the address of a robot, and the ports that a command uses."""
+    command.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
+    add_ports(command, text, **ports)
+
+
+def _add_own_driver(command: CommandParser) -> None:
+    """Add the options of :func:`~ur_cartesian_driver.cli.own_driver.ready_driver`."""
+    _add_robot(command, 'its port', rtde=30004, primary=30001, dashboard=29999)
+    add_model(command)
+    command.add_argument(
+        '--wait',
+        type=argument_types.seconds,
+        default=10.0,
+        help='until the robot must be ready [s]',
+    )
+
+
+def _add_length(command: CommandParser, name: str, default: float | str | None, text: str) -> None:
+    command.add_argument(
+        f'--{name}',
+        type=argument_types.length,
+        default=default,
+        metavar='LENGTH',
+        help=text,
     )
 
 
@@ -368,7 +396,7 @@ def _add_import(command: CommandParser) -> None:
     )
     command.add_argument(
         '--origin',
-        type=argument_types.tcp,
+        type=argument_types.pose,
         metavar='X,Y,Z,RX,RY,RZ',
         help='where the origin of the file is in that frame [m, rad]',
     )
@@ -435,13 +463,7 @@ def _add_shape(command: CommandParser) -> None:
         ('tolerance', 5e-5, 'of the lines that take the place of splines, ellipses and helices'),
         ('lift', 0.0, 'go back between contours'),
     ):
-        command.add_argument(
-            f'--{name}',
-            type=argument_types.length,
-            default=default,
-            metavar='LENGTH',
-            help=text,
-        )
+        _add_length(command, name, default, text)
     command.add_argument(
         '--lines',
         action='store_true',
@@ -454,21 +476,11 @@ def _add_teach(command: CommandParser) -> None:
 
     command.set_defaults(run=teach_command.teach_path)
     command.add_argument('-o', '--output', default='path.yaml', help='goal file')
-    command.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
-    add_model(command)
-    add_ports(command, 'its port', rtde=30004, primary=30001, dashboard=29999)
+    _add_own_driver(command)
     command.add_argument(
         '--speed', type=argument_types.factor, help="of lines and arcs [m/s]; else the driver's"
     )
-    command.add_argument(
-        '--blend', type=argument_types.length, metavar='LENGTH', help='at inner points, like 1mm'
-    )
-    command.add_argument(
-        '--wait',
-        type=argument_types.seconds,
-        default=10.0,
-        help='until the robot must be ready [s]',
-    )
+    _add_length(command, 'blend', None, 'at inner points, like 1mm')
 
 
 def _add_valve(command: CommandParser) -> None:
@@ -491,13 +503,7 @@ def _add_valve(command: CommandParser) -> None:
         metavar=('BEGINS', 'ENDS'),
         help='how far behind the slow bead the fast one begins and ends [mm]: lay no beads',
     )
-    command.add_argument(
-        '--ruler',
-        type=argument_types.length,
-        default='0.5mm',
-        metavar='LENGTH',
-        help='uncertainty of one reading',
-    )
+    _add_length(command, 'ruler', '0.5mm', 'uncertainty of one reading')
     for name, speed in (('slow', 0.02), ('fast', 0.2)):
         command.add_argument(
             f'--{name}',
@@ -505,48 +511,29 @@ def _add_valve(command: CommandParser) -> None:
             default=speed,
             help=f'speed of the {name} bead [m/s]',
         )
-    for name, default, text in (
-        ('length', '100mm', 'of a bead'),
-        ('beside', '10mm', 'between them'),
-    ):
-        command.add_argument(
-            f'--{name}',
-            type=argument_types.length,
-            default=default,
-            metavar='LENGTH',
-            help=text,
-        )
+    _add_length(command, 'length', '100mm', 'of a bead')
+    _add_length(command, 'beside', '10mm', 'between them')
     command.add_argument(
         '--along',
         default='x',
         choices=valve_beads.DIRECTIONS,
         help='axis of the tool along which the beads are laid',
     )
-    command.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
-    add_model(command)
-    add_ports(command, 'its port', rtde=30004, primary=30001, dashboard=29999)
-    command.add_argument(
-        '--wait',
-        type=argument_types.seconds,
-        default=10.0,
-        help='until the robot must be ready [s]',
-    )
+    _add_own_driver(command)
 
 
 def _add_where(command: CommandParser) -> None:
     from ur_cartesian_driver.cli import commands
 
     command.set_defaults(run=commands.where)
-    command.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
-    add_ports(command, 'its RTDE port', rtde=30004)
+    _add_robot(command, 'its RTDE port', rtde=30004)
 
 
 def _add_calibration(command: CommandParser) -> None:
     from ur_cartesian_driver.cli import calibration_command
 
     command.set_defaults(run=calibration_command.write_calibration)
-    command.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
-    add_ports(command, 'its primary port', primary=30001)
+    _add_robot(command, 'its primary port', primary=30001)
     command.add_argument(
         '-o', '--output', metavar='FILE', help='YAML file; by default standard output'
     )

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import fields
 from datetime import date
 from pathlib import Path
 
@@ -79,10 +80,6 @@ def _arm(paths: list[Path], arguments: argparse.Namespace) -> ArmIdentity:
             raise ValueError(
                 f'{path} is of another arm: {differences}; identify one arm at a time'
             )
-        arm = ArmIdentity(
-            model=arm.model or own.model,
-            serial_number=arm.serial_number or own.serial_number,
-            software=arm.software or own.software,
-            motion_version=arm.motion_version or own.motion_version,
-        )
+        names = [each.name for each in fields(ArmIdentity)]
+        arm = ArmIdentity(**{name: getattr(arm, name) or getattr(own, name) for name in names})
     return arm

@@ -19,8 +19,9 @@ from ur_cartesian_driver.importing import (
 )
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY
 from ur_cartesian_driver.sim.command_line.simulate import calibration
+from ur_cartesian_driver.sim.command_line.simulator_options import fields_from
 
 __all__ = ['FORMATS', 'import_goal', 'options_of']
 
@@ -52,27 +53,12 @@ def import_goal(arguments: argparse.Namespace) -> int:
 def options_of(arguments: argparse.Namespace) -> ImportOptions:
     """Return the options of a command line."""
     model = robot_model(arguments.ur_type)
-    return ImportOptions(
-        frame=arguments.frame,
-        origin=_pose(arguments.origin),
-        unit=arguments.unit,
-        scale=arguments.scale,
-        orientation=ToolOrientation(arguments.orientation),
-        speed=arguments.speed,
-        travel_speed=arguments.travel_speed,
-        acceleration=arguments.acceleration,
-        approach_time=arguments.approach_time,
-        blend=arguments.blend,
-        corner=arguments.corner,
-        simplify=arguments.simplify,
-        tolerance=max(arguments.tolerance, 1e-6),
-        lift=arguments.lift,
-        lines=arguments.lines,
-        outputs=dict(arguments.output_of),
-        arm=Arm(model, calibration(arguments, model)),
-        T_flange_tcp=_pose(arguments.tcp),
-    )
-
-
-def _pose(numbers: tuple[float, ...] | None) -> Pose:
-    return Pose.from_rotation_vector(numbers) if numbers else IDENTITY
+    fields = fields_from(arguments, ImportOptions) | {
+        'origin': arguments.origin or IDENTITY,
+        'orientation': ToolOrientation(arguments.orientation),
+        'tolerance': max(arguments.tolerance, 1e-6),
+        'outputs': dict(arguments.output_of),
+        'arm': Arm(model, calibration(arguments, model)),
+        'T_flange_tcp': arguments.tcp or IDENTITY,
+    }
+    return ImportOptions(**fields)

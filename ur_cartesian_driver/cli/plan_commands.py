@@ -24,7 +24,7 @@ from ur_cartesian_driver.cli.progress import timed
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import GoalRefused
-from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY
 from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes, Plane
 from ur_cartesian_driver.motion.goal.goal import Goal
@@ -173,7 +173,7 @@ class GoalPlanning:
         self.arm = Arm(model, calibration(arguments, model))
         if robot is None:
             q = vector6(arguments.joints or SimulatorConfig().q)
-            tcp = Pose.from_rotation_vector(arguments.tcp) if arguments.tcp else IDENTITY
+            tcp = arguments.tcp or IDENTITY
         else:
             q, tcp = robot.actual_q, robot.T_flange_tcp
         self.state = state_at_rest(self.arm, q, tcp)

@@ -17,7 +17,7 @@ from ur_cartesian_driver.cli.commands import read_goal
 from ur_cartesian_driver.cli.progress import counted
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY
 from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.path import Path
 from ur_cartesian_driver.sim import SimulatorConfig
@@ -93,7 +93,7 @@ def variants_of(arguments: argparse.Namespace) -> list[Variant]:
         goal=Path.from_message(read_goal(arguments)),
         arm=Arm(model, calibration(arguments, model)),
         start=vector6(arguments.joints or SimulatorConfig().q),
-        T_flange_tcp=Pose.from_rotation_vector(arguments.tcp) if arguments.tcp else IDENTITY,
+        T_flange_tcp=arguments.tcp or IDENTITY,
         options=settings.planning.for_program(settings.driver),
         frames=settings.frames,
     )

@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterable, Iterator
 import sys
 import threading
 
-from ur_cartesian_driver.driver import Driver, DriverConfig
+from ur_cartesian_driver.cli.own_driver import ready_driver
+from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.geometry.pose import Pose
@@ -27,19 +28,9 @@ _KINDS = {'l': 'line', 'j': 'joint', 'p': 'process'}
 
 def teach_path(arguments: argparse.Namespace) -> int:
     """Connect, let a person guide the arm, and write the taken points, even after Ctrl-C."""
-    config = DriverConfig(
-        robot_ip=arguments.robot_ip,
-        ur_type=arguments.ur_type,
-        headless_mode=True,
-        allow_freedrive=True,
-        rtde_port=arguments.rtde_port,
-        primary_port=arguments.primary_port,
-        dashboard_port=arguments.dashboard_port,
-    )
     lesson = Lesson(Path().at(speed=arguments.speed, blend=arguments.blend))
     try:
-        with Driver(config) as driver:
-            driver.wait_ready(arguments.wait)
+        with ready_driver(arguments, allow_freedrive=True) as driver:
             guide(driver, lesson, _keys(), _say)
     finally:
         if lesson.path.poses:

@@ -12,8 +12,9 @@ from pathlib import Path
 import sys
 
 from ur_cartesian_driver.cli.check_robot import ask
+from ur_cartesian_driver.cli.own_driver import ready_driver
 from ur_cartesian_driver.cli.valve_beads import BEAD_POINTS, Beads, dead_times, DeadTimes
-from ur_cartesian_driver.driver import Driver, DriverConfig
+from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.goal_files.lead_file import read_leads, write_lead
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
@@ -22,6 +23,7 @@ from ur_cartesian_driver.motion.goal.goal import OutputKind
 from ur_cartesian_driver.motion.goal.leads import Lead
 from ur_cartesian_driver.motion.goal.output_names import output_name, parse_output
 from ur_cartesian_driver.path import Output
+from ur_cartesian_driver.sim.command_line.simulator_options import fields_from
 
 QUESTIONS = ('begin', 'end')
 WARNING = (
@@ -44,26 +46,11 @@ def measure_valve(arguments: argparse.Namespace) -> int:
     file = Path(arguments.lead_file)
     if file.exists():
         read_leads(file)  # so that a wrong file is refused before beads are laid
-    beads = Beads(
-        slow=arguments.slow,
-        fast=arguments.fast,
-        length=arguments.length,
-        beside=arguments.beside,
-        along=arguments.along,
-    )
+    beads = Beads(**fields_from(arguments, Beads))
     if arguments.measured:
         shifts = arguments.measured
     elif sys.stdin.isatty():
-        config = DriverConfig(
-            robot_ip=arguments.robot_ip,
-            ur_type=arguments.ur_type,
-            headless_mode=True,
-            rtde_port=arguments.rtde_port,
-            primary_port=arguments.primary_port,
-            dashboard_port=arguments.dashboard_port,
-        )
-        with Driver(config) as driver:
-            driver.wait_ready(arguments.wait)
+        with ready_driver(arguments) as driver:
             if not lay_beads(driver, beads, Output(kind, pin), ask):
                 print('No bead was laid.')
                 return 1

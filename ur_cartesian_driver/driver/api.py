@@ -58,7 +58,7 @@ from ur_cartesian_driver.motion.errors import (
     LocalProtocolError,
     RobotNotReady,
 )
-from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.events import Outcome, Progress, Pulse
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes
 from ur_cartesian_driver.motion.goal.goal import Goal
@@ -239,6 +239,10 @@ class Driver(RobotServices, InteractiveMotions):
     def add_servo_listener(self, callback: Callable[[ServoReport], None]) -> None:
         """Call back with each report of the servo."""
         self._robot.servo_listeners.append(callback)
+
+    def add_pulse_listener(self, callback: Callable[[Pulse], None]) -> None:
+        """Call back with each pulse of a goal (``pulses``), in the order in which they come."""
+        self._robot.pulse_listeners.append(callback)
 
     def wait_ready(self, timeout: float) -> None:
         """

@@ -15,6 +15,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
     LogMessage,
     LoopHeartbeat,
     Notification,
+    PulsesGiven,
     Request,
     ServoProgress,
     SignalsChanged,
@@ -30,6 +31,7 @@ from ur_cartesian_driver.kinematics.robot_models import (
     JointLimits,
     robot_model,
 )
+from ur_cartesian_driver.motion.events import Pulse
 from ur_cartesian_driver.motion.state.io_signals import Signals
 from ur_cartesian_driver.motion.state.servo_report import ServoReport
 from ur_cartesian_driver.planning import PlanningOptions
@@ -60,6 +62,7 @@ class ReportedRobot:
         self.gaps = LinkGaps()
         self.status_listeners: list[Callable[[ConnectionStatus], None]] = []
         self.servo_listeners: list[Callable[[ServoReport], None]] = []
+        self.pulse_listeners: list[Callable[[Pulse], None]] = []
         #: The TCP that a goal has set, until the original TCP is restored.
         self.temporary_tcp: TemporaryTcpSet | None = None
         self._has_warned_of_cell = False
@@ -70,6 +73,10 @@ class ReportedRobot:
             case ServoProgress(report=report):
                 for listener in list(self.servo_listeners):
                     run_callback(listener, report)
+            case PulsesGiven(pulses=pulses):
+                for pulse in pulses:
+                    for to_pulse in list(self.pulse_listeners):
+                        run_callback(to_pulse, pulse)
             case StatusChanged(status=status):
                 self.set_status(status)
             case SignalsChanged(signals=signals):

@@ -12,27 +12,8 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector3
 from ur_cartesian_driver.motion.goal.goal import OutputKind
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
-from ur_cartesian_driver.robot.services.service_calls import (
-    DashboardCall,
-    DashboardLineCall,
-    DownloadProgramCall,
-    EndContactWatchCall,
-    HandBackCall,
-    ListProgramsCall,
-    RecoverCall,
-    RunScriptCall,
-    SCRIPT_TIMEOUT,
-    ServiceAnswer,
-    ServiceCall,
-    SetGravityCall,
-    SetOutputCall,
-    SetPayloadCall,
-    SetSpeedSliderCall,
-    SetTcpCall,
-    UploadProgramCall,
-    WatchContactCall,
-    ZeroFtSensorCall,
-)
+from ur_cartesian_driver.robot.services import service_calls as calls
+from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, ServiceCall
 
 
 class RobotServices(ABC):
@@ -51,15 +32,15 @@ class RobotServices(ABC):
 
     def dashboard(self, command: str, argument: str = '') -> ServiceAnswer:
         """Give a command to the dashboard, for example ``power on``, or ``load`` with a file."""
-        return self.call(DashboardCall(command=command, argument=argument)).result()
+        return self.call(calls.DashboardCall(command=command, argument=argument)).result()
 
     def dashboard_line(self, line: str) -> ServiceAnswer:
         """Send any line to the dashboard, and return its answer."""
-        return self.call(DashboardLineCall(line=line)).result()
+        return self.call(calls.DashboardLineCall(line=line)).result()
 
     def list_programs(self) -> ServiceAnswer:
         """Return the names of the robot's programs, one on each line; PolyScope X only."""
-        return self.call(ListProgramsCall()).result()
+        return self.call(calls.ListProgramsCall()).result()
 
     def upload_program(self, program: str, *, replaces: bool = False) -> ServiceAnswer:
         """
@@ -68,15 +49,15 @@ class RobotServices(ABC):
         :param program: the content of a ``.urpx`` file; the program's name is inside it.
         :param replaces: whether to replace the robot's program of that name.
         """
-        return self.call(UploadProgramCall(program=program, replaces=replaces)).result()
+        return self.call(calls.UploadProgramCall(program=program, replaces=replaces)).result()
 
     def download_program(self, program_name: str) -> ServiceAnswer:
         """Return a program of the robot, the content of a ``.urpx`` file; PolyScope X only."""
-        return self.call(DownloadProgramCall(program_name=program_name)).result()
+        return self.call(calls.DownloadProgramCall(program_name=program_name)).result()
 
     def set_tcp(self, T_flange_tcp: Pose) -> ServiceAnswer:
         """Set the active TCP."""
-        return self.call(SetTcpCall(T_flange_tcp=T_flange_tcp)).result()
+        return self.call(calls.SetTcpCall(T_flange_tcp=T_flange_tcp)).result()
 
     def set_payload(
         self,
@@ -93,18 +74,18 @@ class RobotServices(ABC):
             [kg m^2]; empty = a point mass.
         :param transition_time: time over which the controller changes to this load [s].
         """
-        call = SetPayloadCall(
+        call = calls.SetPayloadCall(
             mass=mass, cog=cog, inertia=tuple(inertia), transition_time=transition_time
         )
         return self.call(call).result()
 
     def set_gravity(self, gravity: Vector3) -> ServiceAnswer:
         """Set the acceleration that opposes gravity, in base axes [m/s^2]."""
-        return self.call(SetGravityCall(gravity=gravity)).result()
+        return self.call(calls.SetGravityCall(gravity=gravity)).result()
 
     def zero_ftsensor(self) -> ServiceAnswer:
         """Zero the force-torque sensor at its present reading."""
-        return self.call(ZeroFtSensorCall()).result()
+        return self.call(calls.ZeroFtSensorCall()).result()
 
     def watch_contact(self) -> Future[ServiceAnswer]:
         """
@@ -114,17 +95,17 @@ class RobotServices(ABC):
         ``EXECUTION_FAILED``, unless its own goal was to end at contact. The watch fails if
         :meth:`end_contact_watch` is called or the robot program ends.
         """
-        return self.call(WatchContactCall())
+        return self.call(calls.WatchContactCall())
 
     def end_contact_watch(self) -> ServiceAnswer:
         """End the contact watch, whose call then gets its answer; do nothing if there is none."""
-        return self.call(EndContactWatchCall()).result()
+        return self.call(calls.EndContactWatchCall()).result()
 
     def hand_back_control(self) -> ServiceAnswer:
         """Make the pendant's program continue after its External Control node."""
-        return self.call(HandBackCall()).result()
+        return self.call(calls.HandBackCall()).result()
 
-    def run_script(self, script: str, timeout: float = SCRIPT_TIMEOUT) -> ServiceAnswer:
+    def run_script(self, script: str, timeout: float = calls.SCRIPT_TIMEOUT) -> ServiceAnswer:
         """
         Run a script without any of the driver's checks; needs ``allow_scripts``.
 
@@ -132,21 +113,23 @@ class RobotServices(ABC):
             after which the driver's own program is sent again.
         :param timeout: how long a primary program may take [s].
         """
-        return self.call(RunScriptCall(script=script, timeout=timeout)).result()
+        return self.call(calls.RunScriptCall(script=script, timeout=timeout)).result()
 
     def set_digital_output(self, kind: OutputKind, pin: int, high: bool) -> ServiceAnswer:
         """Set a digital output."""
-        return self.call(SetOutputCall(kind=kind, pin=pin, value=float(high))).result()
+        return self.call(calls.SetOutputCall(kind=kind, pin=pin, value=float(high))).result()
 
     def set_analog_output(self, pin: int, fraction: float, domain: AnalogDomain) -> ServiceAnswer:
         """Set an analog output to a fraction of its range: 4-20 mA or 0-10 V."""
         return self.call(
-            SetOutputCall(kind=OutputKind.STANDARD_ANALOG, pin=pin, value=fraction, domain=domain)
+            calls.SetOutputCall(
+                kind=OutputKind.STANDARD_ANALOG, pin=pin, value=fraction, domain=domain
+            )
         ).result()
 
     def set_speed_slider(self, fraction: float) -> ServiceAnswer:
         """Move the speed slider, 0 (the arm stands still) to 1."""
-        return self.call(SetSpeedSliderCall(fraction=fraction)).result()
+        return self.call(calls.SetSpeedSliderCall(fraction=fraction)).result()
 
     def recover(self, *, unlock_protective_stop: bool = False) -> ServiceAnswer:
         """
@@ -155,4 +138,4 @@ class RobotServices(ABC):
         :param unlock_protective_stop: whether a person has looked at the cause of a protective
             stop and removed it; if False, unlocking the stop is left to a person.
         """
-        return self.call(RecoverCall(unlock_protective_stop=unlock_protective_stop)).result()
+        return self.call(calls.RecoverCall(unlock_protective_stop=unlock_protective_stop)).result()

@@ -39,6 +39,7 @@ _VECTOR = {'x': 0.0, 'y': 0.0, 'z': 0.0}
 _FORMS: Mapping[Form, Any] = {
     Form.PIN: _UINT8,
     Form.CHOICE: _UINT8,
+    Form.COUNT: _UINT32,
     Form.INDEX: _UINT32,
     Form.DURATION: _TIME,
     Form.VECTOR: _VECTOR,

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from types import MappingProxyType
 from typing import TypeVar
 
 from ur_cartesian_driver.importing.import_options import ImportOptions
@@ -70,7 +69,7 @@ def term_table(*rows: Iterable[_T]) -> Mapping[str, _T]:
         for term in row:
             if table.setdefault(term.name, term) is not term:
                 raise ValueError(f'the term {term.name!r} stands twice')
-    return MappingProxyType(table)
+    return table
 
 
 def honoured(topic: str, *names: str) -> tuple[Term, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 from ur_cartesian_driver.importing.import_options import ImportOptions, ToolOrientation
 from ur_cartesian_driver.importing.imported_path import (
     BrokenFile,
+    COLUMNS,
     ImportedPath,
     ImportNote,
     ImportNotes,
@@ -347,31 +348,25 @@ def _lifted(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) ->
     # Outputs at a point are switched at its last copy: the tool is down again, or not up yet.
     outputs = tuple(replace(o, waypoint=int(last[o.waypoint])) for o in path.outputs)
     waits = tuple(replace(w, waypoint=int(last[w.waypoint])) for w in path.waits)
-    for row in rows:
-        up, across = int(first[row]), int(first[row]) + 1
-        positions[up] = path.positions[row - 1]
-        raised[[up, across]] = True
     lifted = path.quaternions[order]
     for row in rows:
-        lifted[int(first[row])] = path.quaternions[row - 1]
+        up = int(first[row])
+        positions[up], lifted[up] = path.positions[row - 1], path.quaternions[row - 1]
+        raised[[up, up + 1]] = True
     x, y, z, w = lifted.T
     axis = np.stack((2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)), axis=1)
     positions = np.where(raised[:, None], positions - options.lift * axis, positions)
+    columns = {name: getattr(path, name)[order] for name in COLUMNS}
+    columns |= {
+        'times': np.full(len(order), np.nan),
+        'dwells': np.where(np.isin(np.arange(len(order)), last), columns['dwells'], np.nan),
+        'lines': np.where(raised, 0, columns['lines']),
+        'positions': positions,
+        'quaternions': lifted,
+    }
     return replace(
         path,
-        **{
-            name: getattr(path, name)[order]
-            for name in ('types', 'travels', 'lifts', 'arc_modes', 'vias', 'normals')
-        },
-        **{
-            name: getattr(path, name)[order]
-            for name in ('speeds', 'accelerations', 'blends', 'corners')
-        },
-        times=np.full(len(order), np.nan),
-        dwells=np.where(np.isin(np.arange(len(order)), last), path.dwells[order], np.nan),
-        lines=np.where(raised, 0, path.lines[order]),
-        positions=positions,
-        quaternions=lifted,
+        **columns,
         postures={int(last[row]): posture for row, posture in path.postures.items()},
         outputs=outputs,
         waits=waits,
@@ -380,20 +375,21 @@ def _lifted(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) ->
 
 def _speeds(path: ImportedPath, options: ImportOptions) -> Floats:
     """Return the speeds (n,) [m/s]; 0 = the driver chooses the speed."""
-    plain = np.isin(path.types, (SegmentType.LINEAR, SegmentType.CIRCULAR, SegmentType.PROCESS))
-    found = path.speeds if options.speed is None else np.where(plain, options.speed, path.speeds)
+    found = _given(path, options.speed, path.speeds)
     travel = np.nan if options.travel_speed is None else options.travel_speed
     return np.nan_to_num(np.where(path.travels, travel, found))
 
 
 def _accelerations(path: ImportedPath, options: ImportOptions) -> Floats:
-    found = path.accelerations
-    if options.acceleration is not None:
-        plain = np.isin(
-            path.types, (SegmentType.LINEAR, SegmentType.CIRCULAR, SegmentType.PROCESS)
-        )
-        found = np.where(plain, options.acceleration, found)
-    return np.nan_to_num(found)
+    return np.nan_to_num(_given(path, options.acceleration, path.accelerations))
+
+
+def _given(path: ImportedPath, option: float | None, of_file: Floats) -> Floats:
+    """Return the rates of the file, replaced by an option on lines and arcs."""
+    if option is None:
+        return of_file
+    plain = np.isin(path.types, (SegmentType.LINEAR, SegmentType.CIRCULAR, SegmentType.PROCESS))
+    return np.where(plain, option, of_file)
 
 
 def _blends(

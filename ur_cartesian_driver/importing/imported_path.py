@@ -180,7 +180,7 @@ class ImportedPath:
         new_row = {int(row): i for i, row in enumerate(rows)}
         return replace(
             self,
-            **{name: getattr(self, name)[rows] for name in _COLUMNS},
+            **{name: getattr(self, name)[rows] for name in COLUMNS},
             postures={new_row[row]: p for row, p in self.postures.items() if row in new_row},
             outputs=tuple(
                 replace(
@@ -193,7 +193,8 @@ class ImportedPath:
         )
 
 
-_COLUMNS = (
+#: The names of all columns.
+COLUMNS = (
     *('positions', 'lines', 'types', 'travels', 'lifts', 'arc_modes'),
     *_OPTIONAL,
 )
@@ -232,7 +233,6 @@ class PathCollector:
         posture: Posture | None = None,
         via: Sequence[float] | None = None,
         quaternion: Sequence[float] | None = None,
-        normal: Sequence[float] | None = None,
         speed: float | None = None,
         acceleration: float | None = None,
         blend: float | None = None,
@@ -247,7 +247,6 @@ class PathCollector:
         for name, value in (
             ('vias', via),
             ('quaternions', quaternion),
-            ('normals', normal),
             ('speeds', speed),
             ('accelerations', acceleration),
             ('blends', blend),

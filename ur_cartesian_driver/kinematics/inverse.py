@@ -67,6 +67,8 @@ _PRUNING_MARGIN = 0.5
 # Solutions this close in the named joints [rad] are equally near: branches that agree in a joint
 # of the ideal arm differ by a few milliradians in that joint of a calibrated one.
 _EQUALLY_NEAR = 0.01
+#: A distance beyond the reach of any arm [m].
+_MAX_DISTANCE = 1e3
 
 
 def solutions(arm: Arm, T_base_flange: Pose, seed: Joints | None = None) -> list[Joints]:
@@ -100,6 +102,8 @@ def nearest(arm: Arm, T_base_flange: Pose, q_near: Joints) -> Joints | None:
 
     All branches and full turns are searched; the distance is Euclidean in joint space.
     """
+    if not max(map(abs, T_base_flange.position)) < _MAX_DISTANCE:
+        return None  # also NaN; the squares of such numbers overflow
     best = None
     for misfit_factor in MISFIT_FACTORS if arm.calibrated else (0.0,):
         starts = closed_form(ideal_arm_of(arm), T_base_flange, q_near[5], misfit_factor)

@@ -53,15 +53,12 @@ def robot_description(arm: Arm, tf_prefix: str = '') -> str:
     robot = Element('robot', name=arm.model.name)
     frames = LinkFrames(arm)
     _link(robot, tf_prefix + BASE_LINK)
+    details: tuple[Detail, ...] = ('visual', 'collision')
+    shapes = {detail: link_shapes(arm, detail) for detail in details}
     for number, name in enumerate(LINK_NAMES):
         link = _link(robot, tf_prefix + name)
-        details: tuple[tuple[str, Detail], ...] = (
-            ('visual', 'visual'),
-            ('collision', 'collision'),
-        )
-        for tag, detail in details:
-            shapes = (shape for shape in link_shapes(arm, detail) if shape.link == number)
-            _add_shapes(link, tag, shapes)
+        for tag in details:
+            _add_shapes(link, tag, (shape for shape in shapes[tag] if shape.link == number))
     _fixed(robot, tf_prefix, BASE_LINK, BASE, T_BASE_BASE_LINK.inverse())
     limits = zip(arm.model.position_limits, arm.model.max_joint_speed, strict=True)
     torque = arm.model.max_joint_torque

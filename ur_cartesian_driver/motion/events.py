@@ -12,7 +12,7 @@ from typing import TypeAlias
 from ur_cartesian_driver.motion.errors import error_of_outcome, ErrorCode
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3, ZERO6
-from ur_cartesian_driver.motion.goal.goal import SafeOutput
+from ur_cartesian_driver.motion.goal.goal import OutputKind, SafeOutput
 from ur_cartesian_driver.motion.plan.offset_band import OffsetFeedback
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.servo_report import ServoFeedback
@@ -173,6 +173,21 @@ class Progress:
     #: What a feed override leaves of the planned speed, 0 to 1; whether a valid signal says so.
     feed_override: float = 1.0
     feed_is_valid: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pulse:
+    """A pulse that the robot program has given."""
+
+    output: OutputKind
+    pin: int
+    #: Counts the pulses of this output since the goal began, from 0.
+    number: int
+    #: The controller's clock in the cycle in which the output switched on [s].
+    timestamp: float
+    #: Measured pose of the TCP in that cycle, in the robot's base; None = its packet was lost, and
+    #: ``timestamp`` is later.
+    pose: Pose | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -107,22 +107,15 @@ class Path(PathWithEvents):
         :param stall: how long the motion waits for an arm that is off its path [s], SERVO only;
             0 = such an arm is stopped, and the goal ends.
         """
-        settings = self._settings
+        given: dict[str, Any] = {'path_tolerance': path, 'goal_tolerance': goal}
         if stall is not None:
             amount('tolerances()', 'stall', stall, 3600.0, 's')
             stall = round(stall * NANOSECONDS) / NANOSECONDS
             choice = OnPathTolerance.STALL if stall else OnPathTolerance.ABORT
-            settings = replace(settings, on_path_tolerance=choice, stall_timeout=stall)
-        return self._with(
-            _settings=replace(
-                settings,
-                path_tolerance=settings.path_tolerance if path is None else path,
-                goal_tolerance=settings.goal_tolerance if goal is None else goal,
-                goal_time_tolerance=settings.goal_time_tolerance
-                if time is None
-                else round(time * NANOSECONDS) / NANOSECONDS,
-            )
-        )
+            given |= {'on_path_tolerance': choice, 'stall_timeout': stall}
+        if time is not None:
+            given['goal_time_tolerance'] = round(time * NANOSECONDS) / NANOSECONDS
+        return self._with_settings(**{k: value for k, value in given.items() if value is not None})
 
     def asking(self, **fields: Any) -> Path:
         """
@@ -134,11 +127,11 @@ class Path(PathWithEvents):
 
     def executed_as(self, mode: ExecutionMode) -> Path:
         """Choose how the path is executed, such as by the robot (SPLINE) or streamed (SERVO)."""
-        return self._with(_settings=replace(self._settings, execution=mode))
+        return self._with_settings(execution=mode)
 
     def steady(self, min_fraction: float = 0.95) -> Path:
         """Demand a fraction (0 to 1) of the asked speed everywhere; a slower path is refused."""
-        return self._with(_settings=replace(self._settings, min_speed_fraction=min_fraction))
+        return self._with_settings(min_speed_fraction=min_fraction)
 
     def rounded(self, deviation: float, angle: float = 0.0) -> Path:
         """
@@ -160,10 +153,7 @@ class Path(PathWithEvents):
             number = any_number('rounded()', name, value)
             if not bounds.holds(number):
                 raise InvalidGoal(f'rounded(): {name}', bounds.refusal(number)[0], remedy)
-        settings = replace(
-            self._settings, corner_deviation=float(deviation), corner_angle=float(angle)
-        )
-        return self._with(_settings=settings)
+        return self._with_settings(corner_deviation=float(deviation), corner_angle=float(angle))
 
     def path_offset(
         self,
@@ -196,7 +186,7 @@ class Path(PathWithEvents):
             timeout=timeout,
             on_stale=on_stale,
         )
-        return self._with(_settings=replace(self._settings, path_offset=offset))
+        return self._with_settings(path_offset=offset)
 
     def feed_override(
         self, minimum: float, *, maximum: float = 1.0, rate: float = 0.0, timeout: float = 0.0
@@ -214,7 +204,7 @@ class Path(PathWithEvents):
         :param timeout: age from which the signal is stale [s]; 0 = 0.5.
         """
         bounds = FeedOverride(minimum=minimum, maximum=maximum, rate=rate, timeout=timeout)
-        return self._with(_settings=replace(self._settings, feed_override=bounds))
+        return self._with_settings(feed_override=bounds)
 
     def keep_open(self, replace_horizon: float = 0.0) -> Path:
         """
@@ -223,9 +213,7 @@ class Path(PathWithEvents):
         :param replace_horizon: how far ahead of the arm points are fixed [s]; later points can be
             replaced. 0 = no points can be replaced.
         """
-        return self._with(
-            _settings=replace(self._settings, keep_open=True, replace_horizon=replace_horizon)
-        )
+        return self._with_settings(keep_open=True, replace_horizon=replace_horizon)
 
     def safe(self, output: Output, value: float, *, restore: bool = False) -> Path:
         """
@@ -237,7 +225,7 @@ class Path(PathWithEvents):
         safe, known = output.safe(value, restore), self._settings.safe_outputs
         if any((other.output, other.pin) == (safe.output, safe.pin) for other in known):
             raise InvalidGoal('safe()', f'names {output} a second time', 'name it once')
-        return self._with(_settings=replace(self._settings, safe_outputs=(*known, safe)))
+        return self._with_settings(safe_outputs=(*known, safe))
 
     # ---- new paths from paths ------------------------------------------------------------------
 

@@ -21,8 +21,10 @@ from ur_cartesian_driver.motion.goal.goal import (
     Press,
     PressFrame,
     ProportionalOutput,
+    PulseTrain,
     ScriptCall,
 )
+from ur_cartesian_driver.motion.goal.output_names import output_name
 from ur_cartesian_driver.path.outputs import Input, Output
 from ur_cartesian_driver.path.path_motions import PathOfMotions
 from ur_cartesian_driver.path.path_numbers import (
@@ -41,6 +43,7 @@ from ur_cartesian_driver.planning.request.point_events.registry import check_eve
 _METHODS = {
     Press: ('press()', 'end_press()', ''),
     ProportionalOutput: ('follow_speed()', 'end_follow_speed()', ' for analog output {0.pin}'),
+    PulseTrain: ('pulses()', 'end_pulses()', ' for pin {0.pin}'),
 }
 
 
@@ -182,6 +185,59 @@ class PathWithEvents(PathOfMotions):
             )
         check_event('end_follow_speed()', replace(begun[1], end_lead=float(lead), last_waypoint=1))
         return self._ended(*begun, end_lead=float(lead))
+
+    def pulses(
+        self,
+        output: Output,
+        distance: float,
+        *,
+        width: float = 0.0,
+        phase: float = 0.0,
+        count: int = 0,
+    ) -> Self:
+        """
+        Make a digital output give pulses from the last point on, evenly along the path.
+
+        :param distance: way along the path from pulse to pulse [m].
+        :param width: how long the output stays on [s], in real time; 0 = one cycle.
+        :param phase: way along the path from the point to the first pulse [m].
+        :param count: number of pulses; 0 = as many as there is room for.
+        :raises InvalidGoal: there is no point, the output is not digital, or a number is out of
+            its range.
+        """
+        where = f'pulses() at point {len(self) - 1}'
+        if not self._points:
+            raise InvalidGoal('pulses()', 'comes before the first point', 'add a motion')
+        train = PulseTrain(
+            first_waypoint=0,
+            last_waypoint=1,
+            output=output.kind,
+            pin=output.pin,
+            distance=any_number(where, 'distance', distance),
+            phase=any_number(where, 'phase', phase),
+            width=any_number(where, 'width', width),
+            count=count,
+        )
+        return self._happening(where, self._points[-1], train)
+
+    def end_pulses(self, output: Output) -> Self:
+        """
+        End :meth:`pulses` at the last point.
+
+        :raises InvalidGoal: the output gives no pulses from an earlier point on.
+        """
+        begun = self._begun(
+            lambda one: (
+                isinstance(one, PulseTrain) and (one.output, one.pin) == (output.kind, output.pin)
+            )
+        )
+        if begun is None:
+            raise InvalidGoal(
+                f'end_pulses() at point {len(self) - 1}',
+                f'has no begin for {output_name(output.kind, output.pin)} at a point before',
+                'call pulses() there',
+            )
+        return self._ended(*begun)
 
     def press(
         self,

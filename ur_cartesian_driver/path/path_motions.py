@@ -121,6 +121,10 @@ class PathOfMotions:
         path._set(**{each.name: getattr(self, each.name) for each in fields(self)} | changes)
         return path
 
+    def _with_settings(self, **fields: Any) -> Self:
+        """Return the path with other values in some fields of its goal."""
+        return self._with(_settings=replace(self._settings, **fields))
+
     def __repr__(self) -> str:
         return f'<Path of {len(self)} points in frame {self.frame or "base"!r}>'
 

@@ -178,6 +178,8 @@ class PlanningOptions:
     allow_other_twin: bool = False
     #: The twin in twin_file.
     twin: Detected[Twin | None] = None
+    #: The files from which leads and twin were read; '' = none, or the owner gave them.
+    read_files: Detected[tuple[str, str]] = ('', '')
     #: The robot for which goals are planned, as far as it is known.
     robot: Detected[ArmIdentity] = UNKNOWN_ARM
 
@@ -240,13 +242,15 @@ class PlanningOptions:
         check_parameters(self)
         parse_planes(self.workspace_planes)
         parse_safe_outputs(self.safe_outputs)
-        if self.lead_file and not self.leads:  # not read again by replace()
-            # Imported here, because most drivers have no such file.
-            from ur_cartesian_driver.goal_files.lead_file import read_leads
-
-            object.__setattr__(self, 'leads', read_leads(self.lead_file))
-        if self.twin_file and self.twin is None:
+        # replace() reads a file again only if it names another one.
+        lead_file, twin_file = self.read_files
+        if self.lead_file != lead_file and (lead_file or not self.leads):
+            object.__setattr__(self, 'leads', _read_leads(self.lead_file))
+            lead_file = self.lead_file
+        if self.twin_file != twin_file and (twin_file or self.twin is None):
             object.__setattr__(self, 'twin', _read_twin(self.twin_file))
+            twin_file = self.twin_file
+        object.__setattr__(self, 'read_files', (lead_file, twin_file))
 
     @property
     def twin_problem(self) -> str:
@@ -287,12 +291,28 @@ class PlanningOptions:
         return self.dialect.older_program
 
 
-def _read_twin(path: str) -> Twin:
+def _read_leads(path: str) -> tuple[Lead, ...]:
     """
-    Return the twin in a file.
+    Return the leads in a file; '' = none.
+
+    :raises ValueError: the file cannot be read, or has no leads.
+    """
+    if not path:
+        return ()
+    # Imported here, because most drivers have no such file.
+    from ur_cartesian_driver.goal_files.lead_file import read_leads
+
+    return read_leads(path)
+
+
+def _read_twin(path: str) -> Twin | None:
+    """
+    Return the twin in a file; '' = none.
 
     :raises ValueError: the file cannot be read, or is no twin.
     """
+    if not path:
+        return None
     try:
         return read_twin(path)
     except OSError as error:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from heapq import heappop, heappush
 from typing import Any
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
@@ -29,6 +30,7 @@ def place_outputs(
     blend_halves: Floats | None = None,
     start_time: float = 0.0,
     point_times: Floats | None = None,
+    control_cycle: float = 0.0,
 ) -> PlannedRows:
     """
     Return the segments with the records of outputs switched during the motion, in order of time.
@@ -40,21 +42,24 @@ def place_outputs(
     :param start_time: when the first segment begins [s].
     :param point_times: when points are passed within a motion (n,) [s]; None = each point is at
         the end of a motion.
+    :param control_cycle: cycle of the controller [s], needed for pulses only.
     :raises InvalidGoal: no motion leads to a point, or too many outputs are pending at once.
     """
     if not any(events.values()):
         return segments
-    path = TimedPath(segments, reference, blend_halves, start_time, point_times)
+    path = TimedPath(
+        segments, reference, blend_halves, start_time, point_times, control_cycle
+    )  # fmt: skip
     switches = [
         found
         for kind in OUTPUT_EVENTS
-        for i, event in enumerate(events.get(kind.field, ()))
-        for found in kind.place(event, f'{kind.field}[{i}]', path)
+        for found in kind.place_all(events.get(kind.field, ()), path)
     ]
+    switches.sort(key=lambda found: found.time)
     _check_leads(switches)
     outputs: dict[int, tuple[OutputRecord, ...]] = {}
     notes = dict(segments.notes)
-    for found in sorted(switches, key=lambda found: found.time):
+    for found in switches:
         row, line = found.after_index, found.report_index
         outputs[row] = (*outputs.get(row, ()), *found.records)
         notes[line] = f'{notes.get(line, "")}; {found.text}'
@@ -70,33 +75,42 @@ def place_outputs(
 
 
 def _check_leads(switches: Sequence[PlacedOutput]) -> None:
-    """Refuse more leads at one time than the program follows, and one that reverses an order."""
-    leads = [found for found in switches if found.lead > 0.0]
-    for each in leads:
-        if sum(found.time <= each.time < found.time + found.lead for found in leads) > MAX_LEADS:
+    """
+    Refuse more leads at one time than the program follows, and one that reverses an order.
+
+    :param switches: the outputs in the order of time.
+    """
+    if not any(found.lead for found in switches):
+        return
+    running: list[float] = []
+    #: The latest place of each output so far, with the lead to it.
+    latest: dict[tuple[int, int], PlacedOutput] = {}
+    for found in switches:
+        record = found.records[-1]
+        assert isinstance(record, SwitchOutput)
+        output, place = (record.output, record.pin), found.time + found.lead
+        before = latest.setdefault(output, found)
+        if place < before.time + before.lead - SAME_TIME and before.time < found.time - SAME_TIME:
             raise InvalidGoal(
-                'io_commands',
-                f'has more than {MAX_LEADS} leads that run at the same time, {each.time:.3f} s '
-                'after the start',
+                before.lead_field,
+                f'makes a lead of {before.lead:g} s, with which that output is switched before '
+                'the change ahead of it on the path',
+                'move the places apart, or reduce the lead',
+            )
+        if place >= before.time + before.lead:
+            latest[output] = found
+        if not found.lead:
+            continue
+        while running and running[0] <= found.time:
+            heappop(running)
+        heappush(running, place)
+        if len(running) > MAX_LEADS:
+            raise InvalidGoal(
+                found.lead_field,
+                f'is one of more than {MAX_LEADS} leads that run at the same time, '
+                f'{found.time:.3f} s after the start',
                 'shorten them, or move the places apart',
             )
-        for other in switches:
-            is_first = other.time + other.lead < each.time + each.lead - SAME_TIME
-            if is_first and each.time < other.time - SAME_TIME and _same_output(each, other):
-                raise InvalidGoal(
-                    'io_commands',
-                    f'has a lead of {each.lead:g} s, with which that output is switched before '
-                    'the change ahead of it on the path',
-                    'move the places apart, or reduce the lead',
-                )
-
-
-def _same_output(a: PlacedOutput, b: PlacedOutput) -> bool:
-    """Return whether the records of two outputs, the last ones of each, switch the same one."""
-    first, second = a.records[-1], b.records[-1]
-    assert isinstance(first, SwitchOutput)
-    assert isinstance(second, SwitchOutput)
-    return (first.output, first.pin) == (second.output, second.pin)
 
 
 def _waiting(records: Sequence[OutputRecord]) -> int:

@@ -455,6 +455,7 @@ class GoalPlanner:
             {kind.field: kind.of(goal) for kind in OUTPUT_EVENTS},
             blend_halves=segments.blend_entries[:, -1],
             point_times=None if point_times is None else self.stops.delayed(point_times),
+            control_cycle=self.arm.model.control_cycle,
         )
         return Plan(
             goal=goal,

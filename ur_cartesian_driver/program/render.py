@@ -32,7 +32,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 import re
 
@@ -190,6 +190,15 @@ FOLLOW_COLUMNS = ('GAIN', 'OFFSET', 'MINIMUM', 'MAXIMUM', 'FILTER_TIME', 'ACTIVE
 #: left [m or rad], the way that is left at the end of the present piece, the number of this piece,
 #: how fast the time of the path runs, whether the lead runs, and whether the tool only turns.
 LEAD_COLUMNS = ('TIME', 'LEFT', 'LEFT_LATER', 'PIECE', 'RATE', 'ACTIVE', 'TURNS')
+#: The columns for the pulses of an output: the distance between them [m], the way left to the next
+#: one [m], their width [s], how many are left, the slot, kind and pin of the output; how long the
+#: output stays on [s], whether pulses are given (1: since this step), and their count.
+PULSE_COLUMNS = (
+    *('DISTANCE', 'WAY', 'WIDTH', 'LEFT', 'SLOT', 'OUTPUT', 'PIN'),
+    *('TIME_ON', 'ACTIVE', 'GIVEN'),
+)
+#: The tool is at a pulse if its way to there is not longer than this [m].
+PULSE_TOLERANCE = 1e-6
 #: Planned speed [m/s or rad/s] below which the speed does not tell how fast the time runs.
 LEAD_MIN_SPEED = 2e-4
 
@@ -241,6 +250,7 @@ class ProgramSettings:
             )
 
 
+@lru_cache(maxsize=4)  # a driver renders the same program again for each new connection
 def render(settings: ProgramSettings) -> str:
     """
     Return the program for the script sender: header and node, without a ``def`` around them.
@@ -366,6 +376,7 @@ def _register_constants(settings: ProgramSettings) -> Iterator[str]:
         output.PROGRAM_NUMBER,
         output.PROGRAM_RUN,
         output.MOTION_VERSION,
+        output.PULSES,
     ):
         yield f'REGISTER_{register.name} = {register + shift}'
     for prefix, members in (
@@ -420,6 +431,13 @@ def _output_constants() -> Iterator[str]:
     for column, name in enumerate(LEAD_COLUMNS, LEAD_PIECES + 1):
         yield f'LEAD_{name} = {column}'
     yield f'LEAD_MIN_SPEED = {LEAD_MIN_SPEED}'
+    yield f'PULSE_TRAINS = {trajectory.MAX_PULSE_TRAINS}'
+    yield f'PULSE_ONES = {[1.0] * trajectory.MAX_PULSE_TRAINS}'
+    yield f'PULSE_ROW = {[0.0] * len(PULSE_COLUMNS)}'
+    for column, name in enumerate(PULSE_COLUMNS):
+        yield f'PULSE_{name} = {column}'
+    yield f'PULSE_TOLERANCE = {PULSE_TOLERANCE}'
+    yield f'PULSE_COUNTS = {registers.PULSE_COUNTS}'
     yield from _enum('OUTPUT', OutputKind)
 
 

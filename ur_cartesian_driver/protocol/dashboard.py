@@ -18,7 +18,6 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 import re
-from types import MappingProxyType
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.protocol.framing import LineBuffer
@@ -60,82 +59,78 @@ class CommandSpec:
 
 
 #: All known dashboard commands.
-COMMAND_SPECS: Mapping[str, CommandSpec] = MappingProxyType(
-    {
-        'load': CommandSpec(reply='Loading program: {}', takes_argument=True, cb3=(1, 4)),
-        'play': CommandSpec(reply='Starting program', cb3=(1, 4)),
-        'pause': CommandSpec(reply='Pausing program', cb3=(1, 4)),
-        'stop': CommandSpec(reply='Stopped', cb3=(1, 4)),
-        'quit': CommandSpec(reply='Disconnected', cb3=(1, 4)),
-        'shutdown': CommandSpec(reply='Shutting down', cb3=(1, 4)),
-        'running': CommandSpec(reply='Program running: {}', cb3=(1, 6)),
-        'robotmode': CommandSpec(reply='Robotmode: {}', cb3=(1, 6)),
-        'safetymode': CommandSpec(reply='Safetymode: {}', cb3=(3, 0)),
-        'safetystatus': CommandSpec(reply='Safetystatus: {}', cb3=None, e_series=(5, 4)),
-        'get loaded program': CommandSpec(reply='Loaded program: {}', cb3=(1, 6)),
-        'popup': CommandSpec(reply='showing popup', takes_argument=True, cb3=(1, 6)),
-        'close popup': CommandSpec(reply='closing popup', cb3=(1, 6)),
-        'close safety popup': CommandSpec(reply='closing safety popup', cb3=(3, 1)),
-        'addToLog': CommandSpec(
-            reply='Added log message',
-            takes_argument=True,
-            argument_is_optional=True,
-            cb3=(1, 8),
-        ),
-        'isProgramSaved': CommandSpec(reply='{}', cb3=(1, 8)),
-        'programState': CommandSpec(reply='{}', cb3=(1, 8)),
-        'PolyscopeVersion': CommandSpec(reply='URSoftware {}', cb3=(1, 8)),
-        'version': CommandSpec(reply='{}', cb3=None),
-        'setUserRole': CommandSpec(
-            reply='Setting user role: {}', takes_argument=True, cb3=(3, 1), e_series=None
-        ),
-        'getUserRole': CommandSpec(reply='{}', cb3=(3, 1), e_series=None),
-        'power on': CommandSpec(reply='Powering on', cb3=(3, 0)),
-        'power off': CommandSpec(reply='Powering off', cb3=(3, 0)),
-        'brake release': CommandSpec(reply='Brake releasing', cb3=(3, 0)),
-        'unlock protective stop': CommandSpec(reply='Protective stop releasing', cb3=(3, 1)),
-        'restart safety': CommandSpec(reply='Restarting safety', cb3=(3, 7), e_series=(5, 1)),
-        'load installation': CommandSpec(
-            reply='Loading installation: {}', takes_argument=True, cb3=(3, 2)
-        ),
-        'set operational mode': CommandSpec(
-            reply='Operational mode {}', takes_argument=True, cb3=None
-        ),
-        'get operational mode': CommandSpec(reply='{}', cb3=None, e_series=(5, 6)),
-        'clear operational mode': CommandSpec(
-            reply='No longer controlling the operational mode. {}', cb3=None
-        ),
-        'is in remote control': CommandSpec(reply='{}', cb3=None, e_series=(5, 6)),
-        'get serial number': CommandSpec(reply='{}', cb3=(3, 12), e_series=(5, 6)),
-        'get robot model': CommandSpec(reply='{}', cb3=(3, 12), e_series=(5, 6)),
-        'generate flight report': CommandSpec(
-            reply='Flight Report generated with id: {}',
-            takes_argument=True,
-            argument_is_optional=True,
-            cb3=(3, 13),
-            e_series=(5, 8),
-        ),
-        'generate support file': CommandSpec(
-            reply='Completed successfully: {}', takes_argument=True, cb3=(3, 13), e_series=(5, 8)
-        ),
-        'saveLog': CommandSpec(reply='Log saved to disk', cb3=(3, 13), e_series=(5, 8)),
-    }
-)
+COMMAND_SPECS: Mapping[str, CommandSpec] = {
+    'load': CommandSpec(reply='Loading program: {}', takes_argument=True, cb3=(1, 4)),
+    'play': CommandSpec(reply='Starting program', cb3=(1, 4)),
+    'pause': CommandSpec(reply='Pausing program', cb3=(1, 4)),
+    'stop': CommandSpec(reply='Stopped', cb3=(1, 4)),
+    'quit': CommandSpec(reply='Disconnected', cb3=(1, 4)),
+    'shutdown': CommandSpec(reply='Shutting down', cb3=(1, 4)),
+    'running': CommandSpec(reply='Program running: {}', cb3=(1, 6)),
+    'robotmode': CommandSpec(reply='Robotmode: {}', cb3=(1, 6)),
+    'safetymode': CommandSpec(reply='Safetymode: {}', cb3=(3, 0)),
+    'safetystatus': CommandSpec(reply='Safetystatus: {}', cb3=None, e_series=(5, 4)),
+    'get loaded program': CommandSpec(reply='Loaded program: {}', cb3=(1, 6)),
+    'popup': CommandSpec(reply='showing popup', takes_argument=True, cb3=(1, 6)),
+    'close popup': CommandSpec(reply='closing popup', cb3=(1, 6)),
+    'close safety popup': CommandSpec(reply='closing safety popup', cb3=(3, 1)),
+    'addToLog': CommandSpec(
+        reply='Added log message',
+        takes_argument=True,
+        argument_is_optional=True,
+        cb3=(1, 8),
+    ),
+    'isProgramSaved': CommandSpec(reply='{}', cb3=(1, 8)),
+    'programState': CommandSpec(reply='{}', cb3=(1, 8)),
+    'PolyscopeVersion': CommandSpec(reply='URSoftware {}', cb3=(1, 8)),
+    'version': CommandSpec(reply='{}', cb3=None),
+    'setUserRole': CommandSpec(
+        reply='Setting user role: {}', takes_argument=True, cb3=(3, 1), e_series=None
+    ),
+    'getUserRole': CommandSpec(reply='{}', cb3=(3, 1), e_series=None),
+    'power on': CommandSpec(reply='Powering on', cb3=(3, 0)),
+    'power off': CommandSpec(reply='Powering off', cb3=(3, 0)),
+    'brake release': CommandSpec(reply='Brake releasing', cb3=(3, 0)),
+    'unlock protective stop': CommandSpec(reply='Protective stop releasing', cb3=(3, 1)),
+    'restart safety': CommandSpec(reply='Restarting safety', cb3=(3, 7), e_series=(5, 1)),
+    'load installation': CommandSpec(
+        reply='Loading installation: {}', takes_argument=True, cb3=(3, 2)
+    ),
+    'set operational mode': CommandSpec(
+        reply='Operational mode {}', takes_argument=True, cb3=None
+    ),
+    'get operational mode': CommandSpec(reply='{}', cb3=None, e_series=(5, 6)),
+    'clear operational mode': CommandSpec(
+        reply='No longer controlling the operational mode. {}', cb3=None
+    ),
+    'is in remote control': CommandSpec(reply='{}', cb3=None, e_series=(5, 6)),
+    'get serial number': CommandSpec(reply='{}', cb3=(3, 12), e_series=(5, 6)),
+    'get robot model': CommandSpec(reply='{}', cb3=(3, 12), e_series=(5, 6)),
+    'generate flight report': CommandSpec(
+        reply='Flight Report generated with id: {}',
+        takes_argument=True,
+        argument_is_optional=True,
+        cb3=(3, 13),
+        e_series=(5, 8),
+    ),
+    'generate support file': CommandSpec(
+        reply='Completed successfully: {}', takes_argument=True, cb3=(3, 13), e_series=(5, 8)
+    ),
+    'saveLog': CommandSpec(reply='Log saved to disk', cb3=(3, 13), e_series=(5, 8)),
+}
 
 #: Patterns for the valid values of some replies, mainly of replies that are only a value.
-_VALUE_PATTERNS: Mapping[str, re.Pattern[str]] = MappingProxyType(
-    {
-        'running': re.compile('true|false'),
-        'isProgramSaved': re.compile(r'(?:true|false)(?: .*)?'),
-        'programState': re.compile(r'(?:STOPPED|PLAYING|PAUSED)(?: .*)?'),
-        'version': re.compile(r'\d+(?:\.\d+){1,3}'),
-        'getUserRole': re.compile('PROGRAMMER|OPERATOR|NONE|LOCKED|RESTRICTED'),
-        'get operational mode': re.compile('NONE|MANUAL|AUTOMATIC'),
-        'is in remote control': re.compile('true|false'),
-        'get serial number': re.compile(r'20\d+'),
-        'get robot model': re.compile('UR.*'),
-    }
-)
+_VALUE_PATTERNS: Mapping[str, re.Pattern[str]] = {
+    'running': re.compile('true|false'),
+    'isProgramSaved': re.compile(r'(?:true|false)(?: .*)?'),
+    'programState': re.compile(r'(?:STOPPED|PLAYING|PAUSED)(?: .*)?'),
+    'version': re.compile(r'\d+(?:\.\d+){1,3}'),
+    'getUserRole': re.compile('PROGRAMMER|OPERATOR|NONE|LOCKED|RESTRICTED'),
+    'get operational mode': re.compile('NONE|MANUAL|AUTOMATIC'),
+    'is in remote control': re.compile('true|false'),
+    'get serial number': re.compile(r'20\d+'),
+    'get robot model': re.compile('UR.*'),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,7 +22,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 import json
-from types import MappingProxyType
 from typing import Any
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
@@ -70,70 +69,62 @@ def _query(
 
 
 #: The requests of the dashboard's commands, the newest of each first.
-API_COMMANDS: Mapping[str, tuple[ApiCommand, ...]] = MappingProxyType(
-    {
-        'power on': (_action(_STATE, 'POWER_ON'),),
-        'power off': (_action(_STATE, 'POWER_OFF'),),
-        'brake release': (_action(_STATE, 'BRAKE_RELEASE'),),
-        'unlock protective stop': (_action(_STATE, 'UNLOCK_PROTECTIVE_STOP'),),
-        'restart safety': (_action(_STATE, 'RESTART_SAFETY'),),
-        'load': (
-            ApiCommand(
-                method='PUT', path='/program/v1/loaded', body={'name': '{}'}, since=(10, 12)
-            ),
-            ApiCommand(method='PUT', path='/program/v1/load', body={'programName': '{}'}),
+API_COMMANDS: Mapping[str, tuple[ApiCommand, ...]] = {
+    'power on': (_action(_STATE, 'POWER_ON'),),
+    'power off': (_action(_STATE, 'POWER_OFF'),),
+    'brake release': (_action(_STATE, 'BRAKE_RELEASE'),),
+    'unlock protective stop': (_action(_STATE, 'UNLOCK_PROTECTIVE_STOP'),),
+    'restart safety': (_action(_STATE, 'RESTART_SAFETY'),),
+    'load': (
+        ApiCommand(method='PUT', path='/program/v1/loaded', body={'name': '{}'}, since=(10, 12)),
+        ApiCommand(method='PUT', path='/program/v1/load', body={'programName': '{}'}),
+    ),
+    'play': (_action(_PROGRAM, 'play'),),
+    'pause': (_action(_PROGRAM, 'pause'),),
+    'stop': (_action(_PROGRAM, 'stop'),),
+    'programState': (_query(_PROGRAM, 'state', FIRST_VERSION),),
+    'running': (
+        _query(
+            _PROGRAM,
+            'state',
+            FIRST_VERSION,
+            {'PLAYING': 'true', 'PAUSED': 'false', 'STOPPED': 'false'},
         ),
-        'play': (_action(_PROGRAM, 'play'),),
-        'pause': (_action(_PROGRAM, 'pause'),),
-        'stop': (_action(_PROGRAM, 'stop'),),
-        'programState': (_query(_PROGRAM, 'state', FIRST_VERSION),),
-        'running': (
-            _query(
-                _PROGRAM,
-                'state',
-                FIRST_VERSION,
-                {'PLAYING': 'true', 'PAUSED': 'false', 'STOPPED': 'false'},
-            ),
+    ),
+    'robotmode': (_query('/robotstate/v1/robotmode', 'mode', (10, 12)),),
+    'safetymode': (_query('/robotstate/v1/safetymode', 'mode', (10, 12)),),
+    'get loaded program': (_query('/program/v1/loaded', 'name', (10, 12)),),
+    'get operational mode': (_query('/system/v1/operationalmode', 'mode', (10, 12)),),
+    'is in remote control': (
+        _query(
+            '/system/v1/controlmode',
+            'mode',
+            (10, 12),
+            {'REMOTE': 'true', 'LOCAL': 'false'},
         ),
-        'robotmode': (_query('/robotstate/v1/robotmode', 'mode', (10, 12)),),
-        'safetymode': (_query('/robotstate/v1/safetymode', 'mode', (10, 12)),),
-        'get loaded program': (_query('/program/v1/loaded', 'name', (10, 12)),),
-        'get operational mode': (_query('/system/v1/operationalmode', 'mode', (10, 12)),),
-        'is in remote control': (
-            _query(
-                '/system/v1/controlmode',
-                'mode',
-                (10, 12),
-                {'REMOTE': 'true', 'LOCAL': 'false'},
-            ),
+    ),
+    'PolyscopeVersion': (_query('/versions/v1', 'marketingVersion', (10, 14)),),
+    'get robot model': (_query(_INFORMATION, 'robotType', (10, 14)),),
+    'get serial number': (_query(_INFORMATION, 'serialNumber', (10, 14)),),
+    'popup': (
+        ApiCommand(
+            method='POST',
+            path=_POPUP,
+            body={'title': 'Message', 'message': '{}'},
+            since=(10, 14),
         ),
-        'PolyscopeVersion': (_query('/versions/v1', 'marketingVersion', (10, 14)),),
-        'get robot model': (_query(_INFORMATION, 'robotType', (10, 14)),),
-        'get serial number': (_query(_INFORMATION, 'serialNumber', (10, 14)),),
-        'popup': (
-            ApiCommand(
-                method='POST',
-                path=_POPUP,
-                body={'title': 'Message', 'message': '{}'},
-                since=(10, 14),
-            ),
-        ),
-        'close popup': (ApiCommand(method='DELETE', path=_POPUP, since=(10, 14)),),
-        'close safety popup': (
-            ApiCommand(method='DELETE', path=f'{_POPUP}/safety', since=(10, 14)),
-        ),
-        'addToLog': (
-            ApiCommand(
-                method='POST', path='/system/v1/log', body={'message': '{}'}, since=(10, 14)
-            ),
-        ),
-        # There is one kind of report: the type, the argument on the dashboard, is not sent.
-        'generate flight report': (
-            ApiCommand(method='POST', path='/supportfiles/v1', since=(10, 14)),
-        ),
-        'shutdown': (ApiCommand(method='PUT', path='/system/v1/shutdown', since=(10, 14)),),
-    }
-)
+    ),
+    'close popup': (ApiCommand(method='DELETE', path=_POPUP, since=(10, 14)),),
+    'close safety popup': (ApiCommand(method='DELETE', path=f'{_POPUP}/safety', since=(10, 14)),),
+    'addToLog': (
+        ApiCommand(method='POST', path='/system/v1/log', body={'message': '{}'}, since=(10, 14)),
+    ),
+    # There is one kind of report: the type, the argument on the dashboard, is not sent.
+    'generate flight report': (
+        ApiCommand(method='POST', path='/supportfiles/v1', since=(10, 14)),
+    ),
+    'shutdown': (ApiCommand(method='PUT', path='/system/v1/shutdown', since=(10, 14)),),
+}
 #: The requests for programs as files; ``{}`` in a path stands for the name of a program.
 LIST_PROGRAMS = ApiCommand(method='GET', path='/programs/v1/', since=(10, 12))
 UPLOAD_PROGRAM = ApiCommand(method='POST', path='/programs/v1/', since=(10, 12))

@@ -94,6 +94,10 @@ def timestamped(text: str, before: str = '') -> str:
     return f'{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC: {text}'
 
 
+#: Modes out of which the arm can be switched on, or its brakes released.
+UNPOWERED_MODES = frozenset({RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE})
+
+
 def is_stopped(robot: RobotState) -> bool:
     """Return whether the safety system keeps the arm from moving."""
     return robot.safety_mode not in (SafetyMode.NORMAL, SafetyMode.REDUCED)
@@ -139,10 +143,14 @@ def required_action(
     if state is not ConnectionState.CONNECTED:
         return ''
     if robot.robot_mode is not RobotMode.RUNNING:
-        return (
-            f'The arm is in mode {robot.robot_mode.name}; switch it on and release its '
-            'brakes, then start the robot program.'
-        )
+        if robot.robot_mode in UNPOWERED_MODES:
+            return (
+                f'The arm is in mode {robot.robot_mode.name}; switch it on and release its '
+                'brakes, then start the robot program.'
+            )
+        if robot.robot_mode is RobotMode.CONFIRM_SAFETY:
+            return 'The robot waits for a person to confirm its safety configuration.'
+        return f'The arm is in mode {robot.robot_mode.name}; wait until it can be switched on.'
     if program_connected and not has_ended(robot):
         if stale:
             return stale

@@ -21,7 +21,7 @@ import asyncio
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 import logging
-from math import inf
+from math import inf, isfinite
 from typing import NoReturn
 
 from ur_cartesian_driver.kinematics.robot_models import DhTable, JointLimits, MODELS
@@ -246,6 +246,7 @@ class RobotLink:
             settings.max_state_age,
             self._on_state,
             lower_registers=settings.lower_registers,
+            on_text=lambda text: self._callbacks.log(logging.WARNING, f'robot (RTDE): {text}'),
         )
         try:
             self.version = await stream.open(settings.robot_ip, settings.rtde_port)
@@ -321,7 +322,7 @@ class RobotLink:
         assert self.version is not None
         models = model_names(configuration.robot_type, self.version.major)
         expected = self._settings.ur_type
-        found = ' or '.join(models)
+        found = ' or '.join(models) or f'robot of the unknown type {configuration.robot_type}'
         if expected in models:
             self._callbacks.limits(
                 JointLimits(
@@ -340,7 +341,10 @@ class RobotLink:
                 ConnectionEvent.ROBOT_REFUSED,
                 robot_model=found,
                 polyscope_version=str(self.version),
-                message=f'The robot is a {found}, but ur_type is {expected}; correct ur_type.',
+                message=f'The robot is a {found}, but ur_type is {expected}; correct ur_type.'
+                if models
+                else f'The robot reports the type {configuration.robot_type}, which this driver '
+                'does not know; a newer version may.',
             )
 
     def _on_kinematics(self, geometry: DhTable) -> None:
@@ -367,9 +371,9 @@ class RobotLink:
         self._review_state()
 
     def _on_program_lost(self, reason: str) -> None:
-        self.event_log.note(
-            f'{reason}, {self.event_log.keepalive_age():.3f} s after the last keepalive was sent'
-        )
+        age = self.event_log.keepalive_age()
+        since = f', {age:.3f} s after the last keepalive was sent' if isfinite(age) else ''
+        self.event_log.note(f'{reason}{since}')
         if self._explain_timer is None:
             self._explain_timer = asyncio.get_running_loop().call_later(
                 CAUSE_TIMEOUT, self.explain, 'The robot program is gone.'
@@ -406,6 +410,7 @@ class RobotLink:
             calibration_known=False,
             program_is_own=False,
             motion_version=0,
+            serial_number='',
             last_error=last_error,
             message=f'No connection to the robot: {status_text.rstrip(".")}.',
         )
@@ -456,10 +461,13 @@ class RobotLink:
 
 
 def model_names(robot_type: int, software_major: int) -> list[str]:
-    """Return the models that report this type; for example, a UR7e reports the type of a UR5."""
-    names = [
+    """
+    Return the models that report this type; for example, a UR7e reports the type of a UR5.
+
+    A type of a newer robot has none.
+    """
+    return [
         name
         for name, model in MODELS.items()
         if model.wire_type == robot_type and (model.series == 'CB3') == (software_major < 5)
     ]
-    return names or [f'robot of the unknown type {robot_type}']

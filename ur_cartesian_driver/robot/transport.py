@@ -315,7 +315,7 @@ class TcpListener:
         :param allowed: addresses that may connect; empty = all.
         :raises OSError: the port is taken; the text names the parameter to change.
         """
-        self._allowed = frozenset(map(plain_address, allowed))
+        self.allow(allowed)
         try:
             # In two steps, so that close() finds the server if we are cancelled between them.
             self._server = await asyncio.get_running_loop().create_server(
@@ -330,6 +330,10 @@ class TcpListener:
                 f'cannot listen on {host} port {port} ({error_reason(error)}): {remedy}'
             ) from error
         self.port = int(self._server.sockets[0].getsockname()[1])
+
+    def allow(self, allowed: frozenset[str]) -> None:
+        """Set the addresses that may connect from now on; empty = all."""
+        self._allowed = frozenset(map(plain_address, allowed))
 
     def close(self) -> None:
         """Close the port and its connection."""

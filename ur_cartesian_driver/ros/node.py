@@ -43,6 +43,7 @@ from ur_cartesian_driver.ros.services.append_service import AppendService
 from ur_cartesian_driver.ros.services.command_services import CommandServices
 from ur_cartesian_driver.ros.services.contact_action import ContactAction
 from ur_cartesian_driver.ros.state.joint_states_check import JointStatesCheck
+from ur_cartesian_driver.ros.state.pulse_publisher import PulsePublisher
 from ur_cartesian_driver.ros.state.state_publisher import StatePublisher
 from ur_cartesian_driver.ros.ur_driver_names.names_process import NamesProcess
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
@@ -118,6 +119,7 @@ class CartesianDriverNode(Node):
         self.path_offsets = PathOffsetSubscriber(self, self.action_server)
         self.feed_overrides = FeedOverrideSubscriber(self, self.action_server)
         arbiter = self.action_server.arbiter
+        self._pulse_publisher = PulsePublisher(self, self.driver, settings.frames.base)
         if settings.node.servo_state_rate > 0.0:
             self._servo_state_publisher = ServoStatePublisher(
                 self, self.driver, settings.node.servo_state_rate

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from math import hypot
-from types import MappingProxyType
 from typing import Any
 
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -124,81 +123,73 @@ def _scaled_momentum(controller: Controller) -> float:
 
 
 #: Output -> function that computes it.
-COMPUTED: Mapping[str, Getter] = MappingProxyType(
-    {
-        'timestamp': lambda c: c.timestamp,
-        'control_step': lambda c: c.cycles,
-        'target_q': lambda c: c.target.q,
-        'actual_q': lambda c: c.actual.q,
-        'target_qd': lambda c: c.target.qd,
-        'actual_qd': lambda c: c.actual.qd,
-        'target_qdd': lambda c: c.motion.qdd,
-        'target_TCP_pose': _tcp,
-        'actual_TCP_pose': lambda c: c.actual.T_base_tcp.rotation_vector(),
-        'target_TCP_speed': lambda c: c.target.tcp_twist,
-        'actual_TCP_speed': lambda c: c.actual.tcp_twist,
-        'tcp_offset': lambda c: (
-            ZERO6 if c.motion.T_flange_tcp is IDENTITY else c.motion.T_flange_tcp.rotation_vector()
-        ),
-        'speed_scaling': lambda c: c.speed_scaling,
-        'target_speed_fraction': lambda c: c.speed_slider,
-        'robot_mode': lambda c: c.power.mode,
-        'safety_mode': lambda c: c.safety.mode,
-        'safety_status': lambda c: c.safety.mode,
-        'runtime_state': lambda c: c.programs.state,
-        'robot_status_bits': lambda c: c.robot_status,
-        'safety_status_bits': lambda c: c.safety_status,
-        'joint_mode': lambda c: (_joint_mode(c),) * 6,
-        'tool_mode': _tool_mode,
-        'actual_joint_voltage': lambda c: (_VOLTAGE if _powered(c) else 0.0,) * 6,
-        'actual_robot_voltage': lambda c: _VOLTAGE if _powered(c) else 0.0,
-        'actual_robot_current': lambda c: _CURRENT if _powered(c) else 0.0,
-        'target_current': _target_currents,
-        'actual_current': _joint_currents,
-        'target_moment': _payload_moments,
-        'actual_current_as_torque': _payload_moments,
-        'target_TCP_acceleration': _tcp_acceleration,
-        'actual_TCP_acceleration': _actual_acceleration,
-        'actual_tool_accelerometer': lambda c: c.tool_accelerometer,
-        'elbow_velocity': _elbow_velocity,
-        'actual_momentum': _scaled_momentum,
-        'payload': lambda c: c.payload.mass,
-        'payload_cog': lambda c: c.payload.cog,
-        'payload_inertia': lambda c: c.payload.inertia,
-        'target_gravity': lambda c: c.gravity,
-        'actual_TCP_force': lambda c: c.tcp_wrench,
-        'ft_raw_wrench': lambda c: c.io.external_force if c.external_ft else c.contact.wrench,
-        'tcp_force_scalar': lambda c: hypot(*c.tcp_wrench[:3]),
-        'actual_digital_input_bits': lambda c: c.io.digital_in.packed(),
-        'actual_digital_output_bits': lambda c: c.io.digital_out.packed(),
-        'actual_configurable_digital_input_bits': lambda c: pack_bits(
-            c.io.digital_in.configurable
-        ),
-        'actual_configurable_digital_output_bits': lambda c: pack_bits(
-            c.io.digital_out.configurable
-        ),
-        'analog_io_types': lambda c: c.io.analog_types(),
-        'standard_analog_input0': lambda c: c.io.analog_in[0],
-        'standard_analog_input1': lambda c: c.io.analog_in[1],
-        'standard_analog_output0': lambda c: c.io.analog_out[0],
-        'standard_analog_output1': lambda c: c.io.analog_out[1],
-        'tool_analog_input0': lambda c: c.io.tool_analog_in[0],
-        'tool_analog_input1': lambda c: c.io.tool_analog_in[1],
-        'tool_output_voltage': lambda c: c.io.tool_voltage,
-        'elbow_position': _elbow,
-    }
-)
+COMPUTED: Mapping[str, Getter] = {
+    'timestamp': lambda c: c.timestamp,
+    'control_step': lambda c: c.cycles,
+    'target_q': lambda c: c.target.q,
+    'actual_q': lambda c: c.actual.q,
+    'target_qd': lambda c: c.target.qd,
+    'actual_qd': lambda c: c.actual.qd,
+    'target_qdd': lambda c: c.motion.qdd,
+    'target_TCP_pose': _tcp,
+    'actual_TCP_pose': lambda c: c.actual.T_base_tcp.rotation_vector(),
+    'target_TCP_speed': lambda c: c.target.tcp_twist,
+    'actual_TCP_speed': lambda c: c.actual.tcp_twist,
+    'tcp_offset': lambda c: (
+        ZERO6 if c.motion.T_flange_tcp is IDENTITY else c.motion.T_flange_tcp.rotation_vector()
+    ),
+    'speed_scaling': lambda c: c.speed_scaling,
+    'target_speed_fraction': lambda c: c.speed_slider,
+    'robot_mode': lambda c: c.power.mode,
+    'safety_mode': lambda c: c.safety.mode,
+    'safety_status': lambda c: c.safety.mode,
+    'runtime_state': lambda c: c.programs.state,
+    'robot_status_bits': lambda c: c.robot_status,
+    'safety_status_bits': lambda c: c.safety_status,
+    'joint_mode': lambda c: (_joint_mode(c),) * 6,
+    'tool_mode': _tool_mode,
+    'actual_joint_voltage': lambda c: (_VOLTAGE if _powered(c) else 0.0,) * 6,
+    'actual_robot_voltage': lambda c: _VOLTAGE if _powered(c) else 0.0,
+    'actual_robot_current': lambda c: _CURRENT if _powered(c) else 0.0,
+    'target_current': _target_currents,
+    'actual_current': _joint_currents,
+    'target_moment': _payload_moments,
+    'actual_current_as_torque': _payload_moments,
+    'target_TCP_acceleration': _tcp_acceleration,
+    'actual_TCP_acceleration': _actual_acceleration,
+    'actual_tool_accelerometer': lambda c: c.tool_accelerometer,
+    'elbow_velocity': _elbow_velocity,
+    'actual_momentum': _scaled_momentum,
+    'payload': lambda c: c.payload.mass,
+    'payload_cog': lambda c: c.payload.cog,
+    'payload_inertia': lambda c: c.payload.inertia,
+    'target_gravity': lambda c: c.gravity,
+    'actual_TCP_force': lambda c: c.tcp_wrench,
+    'ft_raw_wrench': lambda c: c.io.external_force if c.external_ft else c.contact.wrench,
+    'tcp_force_scalar': lambda c: hypot(*c.tcp_wrench[:3]),
+    'actual_digital_input_bits': lambda c: c.io.digital_in.packed(),
+    'actual_digital_output_bits': lambda c: c.io.digital_out.packed(),
+    'actual_configurable_digital_input_bits': lambda c: pack_bits(c.io.digital_in.configurable),
+    'actual_configurable_digital_output_bits': lambda c: pack_bits(c.io.digital_out.configurable),
+    'analog_io_types': lambda c: c.io.analog_types(),
+    'standard_analog_input0': lambda c: c.io.analog_in[0],
+    'standard_analog_input1': lambda c: c.io.analog_in[1],
+    'standard_analog_output0': lambda c: c.io.analog_out[0],
+    'standard_analog_output1': lambda c: c.io.analog_out[1],
+    'tool_analog_input0': lambda c: c.io.tool_analog_in[0],
+    'tool_analog_input1': lambda c: c.io.tool_analog_in[1],
+    'tool_output_voltage': lambda c: c.io.tool_voltage,
+    'elbow_position': _elbow,
+}
 
 #: Output -> its constant value, because its cause is not simulated.
-FIXED: Mapping[str, Any] = MappingProxyType(
-    {
-        'joint_temperatures': (25.0,) * 6,
-        'actual_main_voltage': _VOLTAGE,
-        'tool_temperature': 25.0,
-        # Both inputs are in volts, as on the primary interface.
-        'tool_analog_input_types': 3,
-    }
-)
+FIXED: Mapping[str, Any] = {
+    'joint_temperatures': (25.0,) * 6,
+    'actual_main_voltage': _VOLTAGE,
+    'tool_temperature': 25.0,
+    # Both inputs are in volts, as on the primary interface.
+    'tool_analog_input_types': 3,
+}
 
 
 def _register_getters(direction: str, of: Callable[[Controller], Registers]) -> dict[str, Getter]:
@@ -214,12 +205,10 @@ def _register_getters(direction: str, of: Callable[[Controller], Registers]) -> 
     }
 
 
-REGISTERS: Mapping[str, Getter] = MappingProxyType(
-    {
-        **_register_getters('input', lambda c: c.io.inputs),
-        **_register_getters('output', lambda c: c.io.outputs),
-    }
-)
+REGISTERS: Mapping[str, Getter] = {
+    **_register_getters('input', lambda c: c.io.inputs),
+    **_register_getters('output', lambda c: c.io.outputs),
+}
 
 
 def output_getter(name: str, zero: Any) -> Getter:

@@ -113,6 +113,8 @@ class SimulatedRobot:
         :param clock: the clock for the cycles; None = a clock with the rate of the configuration.
         """
         self.config = config or SimulatorConfig()
+        #: The error that has ended the thread; None = none has.
+        self._failure: Exception | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         #: Called in the robot's thread with a peer's port and the bytes received from this peer.
         self.on_socket_data: Callable[[int, bytes], None] | None = None
@@ -211,8 +213,9 @@ class SimulatedRobot:
             asyncio.run(self._serve(listening))
         except asyncio.CancelledError:
             pass
-        except OSError as error:
+        except Exception as error:
             if listening.done():
+                self._failure = error
                 raise
             listening.set_exception(error)
 
@@ -323,7 +326,10 @@ class SimulatedRobot:
         Call a function with the controller between two cycles, and return its result.
 
         :raises TimeoutError: the robot's thread did not call the function within 10 s.
+        :raises RuntimeError: the robot's thread was ended by an error.
         """
+        if self._failure is not None:
+            raise RuntimeError('The simulated robot was ended by an error.') from self._failure
         loop = self._loop
         if loop is None or _is_running_in(loop):
             return function(self.controller)

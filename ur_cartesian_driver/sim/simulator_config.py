@@ -190,7 +190,7 @@ class SimulatorConfig:
         if (self.version[0] >= 5) == (model.series == 'CB3'):
             raise ValueError(
                 f'polyscope {self.polyscope} does not run a {self.model}; use 3.x '
-                'for CB3 models and 5.x for all others.'
+                'for CB3 models, and 5.x or 10.x for all others.'
             )
         if self.motion_version not in (1, 2):
             raise ValueError(f'motion_version is {self.motion_version}; use 1 or 2.')

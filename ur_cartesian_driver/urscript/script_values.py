@@ -400,6 +400,8 @@ def set_part(container: Value, path: Sequence[Key], value: Value) -> Value:
 
 def _set_in_matrix(matrix: Matrix, key: tuple[Value, ...], value: Value) -> None:
     row = _position(key[0], matrix.shape[0])
+    if len(key) == 2 and type(value) in (list, Matrix):
+        raise RuntimeException(NESTED_LIST)
     if len(key) == 2:
         matrix.rows[row][_position(key[1], matrix.shape[1])] = value
     elif type(value) is list and len(value) == matrix.shape[1]:

@@ -27,6 +27,7 @@ def sim(request):
     fields: dict[str, Any] = {
         **dict.fromkeys(ports, 0),
         'when_late': 'wait',
+        'frequency': 125.0,  # each cycle costs computing time
         'programs': {'weld.urp': WELD},
         **getattr(request, 'param', {}),
     }
@@ -56,7 +57,7 @@ def make_ur(ur_interfaces, no_thread_left, sim, make_cell):
     """Return a function that makes a client of the UR driver's names, with a robot behind them."""
 
     def make(names_parameters=None, **driver_parameters):
-        cell = make_cell(sim, **driver_parameters)
+        cell = make_cell(sim, 'events', **driver_parameters)
         names = UrDriverNames(parameter_overrides=names_parameters, context=cell.context)
         made.append(names)
         cell.executor.add_node(names)

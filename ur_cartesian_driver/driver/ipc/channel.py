@@ -27,7 +27,7 @@ from ur_cartesian_driver.execution.live.live_targets import LiveSettings
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import DhTable, JointLimits, RobotModel
 from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, LocalProtocolError
-from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.events import Outcome, Progress, Pulse
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector3
 from ur_cartesian_driver.motion.state.io_signals import Signals
@@ -244,6 +244,13 @@ class ServoProgress:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PulsesGiven:
+    """The robot program has given pulses."""
+
+    pulses: tuple[Pulse, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MotionEnded:
     """The end of a motion."""
 
@@ -302,6 +309,7 @@ Notification: TypeAlias = (
     | LimitsReceived
     | MotionProgress
     | ServoProgress
+    | PulsesGiven
     | AppendAnswered
     | MotionEnded
     | CallAnswered

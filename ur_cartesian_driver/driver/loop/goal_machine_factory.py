@@ -51,7 +51,7 @@ def make_machine(request: StartMotion, config: DriverConfig) -> GoalMachine:
     feeder = FEEDERS[request.job.execution](request, config)
     if (bounds := request.job.feed_override) is not None:
         feed_input = parse_feed_input(config.feed_override_input)
-        feeder.parts = (_feed(feeder, bounds, feed_input), *feeder.parts)
+        feeder.add_part(_feed(feeder, bounds, feed_input))
     return GoalMachine(
         feeder,
         feedback_period=1.0 / config.feedback_rate,

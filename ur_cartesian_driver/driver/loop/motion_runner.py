@@ -18,6 +18,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
     CancelMotion,
     MotionEnded,
     MotionProgress,
+    PulsesGiven,
     ServoProgress,
     SetFeedOverride,
     SetLiveTarget,
@@ -46,6 +47,7 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     OpenOffsets,
     OpenServo,
     ReportProgress,
+    ReportPulses,
     ReportServo,
     RestoreOutputs,
     RestoreTcp,
@@ -163,7 +165,7 @@ class MotionRunner:
         self._outputs.forget()
         self._ends.begin()
         self._link.set_executing(True)
-        self._execute(commands)
+        self._guarded(lambda: commands)
         if self._link.contact_watch.is_active:
             self.handle_event(ContactWatchChanged(is_active=True))
 
@@ -246,16 +248,22 @@ class MotionRunner:
         self._newest.publish()
 
     def _step(self, machine: GoalMachine, event: Event | AppendJob) -> None:
-        """Give an event to the machine; if the machine raises an error, stop the arm."""
+        """Give an event to the machine, and carry out its commands."""
+        self._guarded(lambda: machine.step(event, _now()))
+
+    def _guarded(self, make_commands: Callable[[], list[GoalCommand]]) -> None:
+        """Make and carry out commands; if that raises an error, stop the arm."""
         try:
-            self._execute(machine.step(event, _now()))
+            self._execute(make_commands())
         except Exception as error:
             if self._machine is None:
                 raise
-            text = f'The motion cannot go on ({type(error).__name__}: {error}).'
+            reason = f'{type(error).__name__}: {error}'.rstrip('.')
+            text = f'The motion cannot go on ({reason}).'
             self._pipe.log(logging.ERROR, f'{text} {traceback.format_exc()}')
-            self._finish(Outcome(code=ErrorCode.EXECUTION_FAILED, text=text))
+            # First: once no motion runs, the next goal could be given to the program.
             self._link.control.stop(text)
+            self._finish(Outcome(code=ErrorCode.EXECUTION_FAILED, text=text))
 
     def _execute(self, commands: list[GoalCommand]) -> None:
         for command in commands:
@@ -286,6 +294,8 @@ class MotionRunner:
                     self._link.control.stop(reason)
                 case ReportProgress(progress=progress):
                     self._pipe.send(MotionProgress(motion=self._number, progress=progress))
+                case ReportPulses(pulses=pulses):
+                    self._pipe.send(PulsesGiven(pulses=pulses))
                 case WriteInputs(values=values):
                     if self._inputs is not None:
                         self._inputs.write_row(values)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Coroutine
 import logging
+from typing import Any
 
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
@@ -39,9 +40,12 @@ class OutputSecurer:
         """
         self._config, self._link, self._pipe = config, link, pipe
         self._spawn, self._on_event = spawn, on_event
-        #: The number of the newest order; older orders end.
-        self._newest = 0
-        self._is_pending = False
+        #: Numbers of the newest order, and of the first one of this motion.
+        self._newest = self._first = 0
+        #: How many orders to secure outputs have not ended their first attempt.
+        self._pending = 0
+        #: The changed outputs with their values before the first change, until they are restored.
+        self._originals: dict[tuple[int, int], SafeOutput] = {}
         #: Allows only one write at a time: a late restore must not undo a safe value.
         self._lock = asyncio.Lock()
         #: Why outputs of the motion are not safe, as a sentence; empty = no failure is known.
@@ -51,7 +55,7 @@ class OutputSecurer:
     def secure(self, outputs: tuple[SafeOutput, ...]) -> None:
         """Write the safe values of outputs, with retries after a failure."""
         self._newest += 1
-        self._is_pending = True
+        self._pending += 1
         self._spawn(self._secure(outputs, self._newest))
 
     def restore(self, outputs: tuple[SafeOutput, ...]) -> None:
@@ -62,11 +66,12 @@ class OutputSecurer:
     def forget(self) -> None:
         """Drop the orders of the previous motion, because another motion begins."""
         self._newest += 1
-        self._is_pending, self.failure = False, ''
+        self._first = self._newest
+        self._pending, self._originals, self.failure = 0, {}, ''
 
     def when_done(self, callback: Callable[[], None]) -> None:
         """Call back after the first attempt to secure outputs; at once if none is pending."""
-        if self._is_pending:
+        if self._pending:
             self._on_done = callback
         else:
             callback()
@@ -74,35 +79,52 @@ class OutputSecurer:
     async def _secure(self, outputs: tuple[SafeOutput, ...], number: int) -> None:
         loop = asyncio.get_running_loop()
         give_up, is_first = loop.time() + RETRY_TIMEOUT, True
-        while number == self._newest:
-            async with self._lock:
-                result = await self._write(outputs)
-            if number != self._newest:
-                return
-            self.failure = result.failure
+        before: dict[str, Any] = {}
+        try:
+            while number == self._newest:
+                async with self._lock:
+                    result = await self._write(outputs, before)
+                    if number < self._first:
+                        return
+                    for output in result.changed:
+                        self._originals.setdefault((output.output, output.pin), output)
+                if number == self._newest:
+                    self.failure = result.failure
+                if is_first and result.failure:
+                    self._link.report_error(result.failure)
+                if is_first or result.changed:
+                    originals = tuple(self._originals.values())
+                    self._on_event(OutputsSecured(changed=originals, failure=result.failure))
+                if is_first:
+                    is_first = False
+                    self._end_first_attempt(number)
+                if not result.failure or loop.time() >= give_up:
+                    return
+                await asyncio.sleep(RETRY_PERIOD)
+        finally:
             if is_first:
-                is_first = False
-                self._report(result)
-            if not result.failure or loop.time() >= give_up:
-                return
-            await asyncio.sleep(RETRY_PERIOD)
+                self._end_first_attempt(number)
 
-    def _report(self, result: OutputsSecured) -> None:
-        self._is_pending = False
-        if result.failure:
-            self._link.report_error(result.failure)
-        self._on_event(result)
-        done, self._on_done = self._on_done, None
-        if done is not None:
+    def _end_first_attempt(self, number: int) -> None:
+        if number < self._first:
+            return
+        self._pending -= 1
+        if not self._pending and self._on_done is not None:
+            done, self._on_done = self._on_done, None
             done()
 
     async def _restore(self, outputs: tuple[SafeOutput, ...], number: int) -> None:
         async with self._lock:
             if number != self._newest:
-                return
-            result = await self._write(outputs)
+                return  # another pause has begun; they stay safe, and are restored after it
+            result = await self._write(outputs, {})
+            if number >= self._first and not result.failure:
+                for output in outputs:
+                    self._originals.pop((output.output, output.pin), None)
         if result.failure:
             self._pipe.log(logging.WARNING, f'not restored after the pause: {result.failure}')
 
-    async def _write(self, outputs: tuple[SafeOutput, ...]) -> OutputsSecured:
-        return await write_outputs(self._config.robot_ip, self._config.rtde_port, outputs)
+    async def _write(
+        self, outputs: tuple[SafeOutput, ...], before: dict[str, Any]
+    ) -> OutputsSecured:
+        return await write_outputs(self._config.robot_ip, self._config.rtde_port, outputs, before)

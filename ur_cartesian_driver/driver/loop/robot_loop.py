@@ -119,13 +119,16 @@ class RobotLoop:
             async with asyncio.TaskGroup() as tasks:
                 link = tasks.create_task(self._link.run())
                 ticks = tasks.create_task(self._tick())
-                await self._serve_requests(requests)
+                try:
+                    await self._serve_requests(requests)
+                finally:
+                    self._motion.close()
+                    # While the link is open. Our robot program restores the TCP by itself, but
+                    # another program may be running.
+                    self._tcp_restorer.restore_if_due(self._newest.latest)
                 for task in (link, ticks, *self._tasks):
                     task.cancel()
         finally:
-            self._motion.close()
-            # Our robot program restores the TCP by itself, but another program may be running.
-            self._tcp_restorer.restore_if_due(self._newest.latest)
             self._link.close()
             self._newest.clear()
             self._motion.close_recorder()  # last, because the arm must not wait for a disk

@@ -36,6 +36,7 @@ _NUMBER_COLUMNS = (
     'lag',
     'buffered',
     'digital_output',
+    'pulse_counts',
     'points_begun',
     'waypoint',
     'robot_mode',

@@ -30,6 +30,7 @@ from ur_cartesian_driver.driver.recordings import recording_format as disk
 from ur_cartesian_driver.driver.recordings.recording_folder import RecordingFolder
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.motion.events import Outcome
+from ur_cartesian_driver.motion.goal.output_names import output_text
 from ur_cartesian_driver.motion.plan.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.state.io_signals import Signals
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
@@ -95,6 +96,7 @@ def motion_metadata(
         'T_tcp_controlled': job.T_tcp_controlled.row(),
         'path_tolerance': asdict(job.path_tolerance),
         'goal_tolerance': asdict(job.goal_tolerance),
+        'pulse_outputs': [output_text(*output) for output in job.pulse_outputs],
         **known,
         'parameters': {**_parameters(parameters), **planning},
         'outcome': None,
@@ -215,6 +217,7 @@ class Recorder:
             state.target_speed_fraction,
             *self._analog,
             self._digital,
+            state.pulse_counts,
             points_begun,
             waypoint,
             state.robot_mode,

@@ -28,6 +28,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats, Int32s
 from ur_cartesian_driver.motion.geometry.pose import pose_from_row
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.motion.state.effective_speed import EffectiveSpeed
+from ur_cartesian_driver.protocol.program.registers import PULSE_COUNTS
 
 
 class _NoRecording(ValueError):
@@ -88,6 +89,8 @@ class Recording:
     analog_output: Floats = field(repr=False)
     #: (n,) digital outputs as bits: 0-7 standard, 8-15 configurable, 16-17 tool; -1 = unknown.
     digital_output: Int32s = field(repr=False)
+    #: (n,) counts of pulses, which :attr:`pulses` reads.
+    pulse_counts: Int32s = field(repr=False)
     #: (n,) number of motions that the robot program has begun; the goal's point to which the arm
     #: moves, -1 = unknown.
     points_begun: Int32s = field(repr=False)
@@ -150,6 +153,20 @@ class Recording:
     def tool_speed(self) -> Floats:
         """(n,) measured speed of the TCP [m/s]."""
         return np.asarray(np.linalg.norm(self.actual_twist[:, :3], axis=1))
+
+    @property
+    def pulses(self) -> dict[str, NDArray[np.int_]]:
+        """
+        By output, such as 'standard_digital 2': (k,) the packet that shows each of its pulses.
+
+        A packet that shows more than one, because others were lost, is there as often.
+        """
+        found = {}
+        for slot, output in enumerate(self.metadata.get('pulse_outputs', ())):
+            given = self.pulse_counts // PULSE_COUNTS**slot
+            new = np.diff(given, prepend=given[:1]) % PULSE_COUNTS
+            found[str(output)] = np.repeat(np.arange(len(new)), new)
+        return found
 
     @property
     def effective_speed(self) -> Floats:
@@ -259,10 +276,11 @@ def _from_folder(path: Path, max_rows: int) -> Recording:
 
 
 def _complete(columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Return all columns, with NaN in those that an older recording does not have."""
+    """Return all columns, also those that an older recording does not have."""
     unknown = {
-        name: np.full((len(columns['time']), *disk.EXECUTED_DTYPE[name].shape), np.nan)
+        name: np.full((len(columns['time']), *kind.shape), disk.ADDED_COLUMNS[name], kind.base)
         for name in disk.ADDED_COLUMNS
+        for kind in (disk.EXECUTED_DTYPE[name],)
     }
     return unknown | columns
 

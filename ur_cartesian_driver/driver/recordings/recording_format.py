@@ -48,6 +48,7 @@ EXECUTED_DTYPE = np.dtype(
         ('slider', '<f8'),
         ('analog_output', '<f8', 2),
         ('digital_output', '<i4'),
+        ('pulse_counts', '<i4'),
         ('points_begun', '<i4'),
         ('waypoint', '<i4'),
         ('robot_mode', '<i4'),
@@ -63,8 +64,8 @@ EXECUTED_STRUCT = struct.Struct(
         for name in EXECUTED_DTYPE.names or ()
     )
 )
-#: Columns that older recordings do not have; missing columns are read as NaN.
-ADDED_COLUMNS = ('wrench',)
+#: Columns that older recordings do not have, and what is read in their place.
+ADDED_COLUMNS = {'wrench': np.nan, 'pulse_counts': 0}
 #: One sample of the planned path.
 PLANNED_DTYPE = np.dtype([('time', '<f8'), ('pose', '<f8', 7), ('point', '<i4')])
 

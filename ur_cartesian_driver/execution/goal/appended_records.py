@@ -117,6 +117,6 @@ class AppendedRecords(Phrasing, Reporting):
         times = how_often(self._stop_count)
         return (
             f'the motion was brought to rest {times}, the last time behind point '
-            f'{self._last_stop_point}, because no more points came in time; what was appended '
-            'later is later by as much as that took',
+            f'{self._last_stop_point}, because no more points came in time; points '
+            'appended afterwards are delayed by these stops',
         )

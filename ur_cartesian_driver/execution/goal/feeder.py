@@ -49,6 +49,10 @@ class Feeder(ABC):
         """Keep the monitor of the goal; nothing is sent yet."""
         self.monitor = monitor
 
+    def add_part(self, part: object) -> None:
+        """Give the feeder more capabilities, before a machine looks them up."""
+        self.parts = (part, *self.parts)
+
     @abstractmethod
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
         """
@@ -153,10 +157,11 @@ class Overridable:
         :param now: time of a steady clock [s].
         """
 
-    def feed_state(self, packet: RobotState, now: float) -> FeedState:
+    def observe_feed(self, packet: RobotState, now: float) -> FeedState:
         """
-        Return the feed that the motion has now.
+        Read the signal if an input of the robot gives it, and return the feed of the motion.
 
+        :param packet: the newest packet of the robot.
         :param now: time of a steady clock [s].
         """
         return FULL_FEED
@@ -256,7 +261,9 @@ class Capabilities:
             return tuple(each for each in (feeder, *feeder.parts) if isinstance(each, kind))
 
         def one_of(kind: type[T]) -> T:
-            return (*all_of(kind), kind())[0]
+            found, *others = *all_of(kind), kind()
+            assert len(others) <= 1, f'{kind.__name__} has two providers'
+            return found
 
         self.preparation = one_of(Prepared)
         self.appending = one_of(Appendable)
@@ -270,6 +277,11 @@ class Capabilities:
         self.phrasing = one_of(Phrasing)
         self.ageing = all_of(Ageing)
         self.reporting = all_of(Reporting)
+
+
+def counted(count: int, noun: str) -> str:
+    """Return a count with its noun and verb, for a report: "1 path offset was"."""
+    return f'1 {noun} was' if count == 1 else f'{count} {noun}s were'
 
 
 def how_often(count: int) -> str:

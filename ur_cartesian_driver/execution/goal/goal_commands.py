@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.events import Outcome, Progress, Pulse
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import SafeOutput
 from ur_cartesian_driver.motion.state.servo_report import ServoReport
@@ -97,6 +97,13 @@ class ReportProgress(GoalCommand):
     """Report the progress of the motion."""
 
     progress: Progress
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportPulses(GoalCommand):
+    """Report pulses that the robot program has given."""
+
+    pulses: tuple[Pulse, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -24,6 +24,7 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     GoalCommand,
     LogWarning,
     ReportProgress,
+    ReportPulses,
     RestoreTcp,
     SetTemporaryTcp,
     StopProgram,
@@ -50,6 +51,7 @@ from ur_cartesian_driver.execution.goal.outcome_codes import (
     RESULT_SIGNALS,
 )
 from ur_cartesian_driver.execution.goal.output_guard import OutputGuard
+from ur_cartesian_driver.execution.goal.pulse_counter import PulseCounter
 from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
 from ur_cartesian_driver.motion import events
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -130,7 +132,9 @@ class GoalMachine:
         """
         self._packet = packet
         job = self.job
-        self._guard = OutputGuard(job.safe_outputs, packet, job.following_outputs)
+        own = job.following_outputs.union(job.pulse_outputs)
+        self._guard = OutputGuard(job.safe_outputs, packet, own)
+        self._pulses = PulseCounter(job.pulse_outputs, packet)
         commands = [*self.can.preparation.prepare(), *self._guard.arm()]
         if job.T_flange_tcp is not None:
             self.temporary_tcp = TemporaryTcp(job.T_flange_active, job.T_flange_tcp)
@@ -185,7 +189,7 @@ class GoalMachine:
         return self._monitor.records.end_time(records)
 
     def _observe(self, packet: RobotState, now: float) -> list[GoalCommand]:
-        """Process a packet, and return the commands that secure or restore the outputs."""
+        """Process a packet; return the commands for its outputs, and the report of pulses."""
         self._packet, self._packet_time = packet, now - packet.state_age
         if self.temporary_tcp is not None:
             self.temporary_tcp.observe(packet, now)
@@ -196,12 +200,15 @@ class GoalMachine:
             behind,
             moving=self.state in RUNNING_STATES,
             applied_offset=self.can.displacement.applied_offset(packet),
-            feed=self.can.overriding.feed_state(packet, now),
+            feed=self.can.overriding.observe_feed(packet, now),
         )
         if self.state is GoalState.SETTLING:  # its deadlines run on the controller's clock
             self._deadline += self._monitor.held_time
             self._arrival_due += self._monitor.held_time
-        return self._guard.observe(packet, goes_on=self.state in INTERRUPTIBLE_STATES)
+        commands = self._guard.observe(packet, goes_on=self.state in INTERRUPTIBLE_STATES)
+        if pulses := self._pulses.observe(packet):
+            commands = [*commands, ReportPulses(pulses=pulses)]
+        return commands
 
     def _append(self, append_job: AppendJob, now: float) -> list[GoalCommand]:
         commands = self.can.appending.append(append_job, self.state)
@@ -410,7 +417,7 @@ class GoalMachine:
         """
         if self.job.due is None or tolerance < 0.0:
             return ''
-        due = self.job.due + self._monitor.start_delay
+        due = self.job.due + self._monitor.allowed_delay
         late = self._monitor.scaled_time - due
         if late <= tolerance:
             return ''
@@ -469,7 +476,9 @@ class GoalMachine:
         progress = self._monitor.progress(
             buffered=self.feeder.buffered,
             lag=self.can.streaming.lag,
-            at_end=waits or self.state is GoalState.SETTLING,
+            at_end=waits
+            or self.state is GoalState.SETTLING
+            or (self._succeeds() and not self._touched),
             waits=waits,
         )
         return [ReportProgress(progress=progress)]

@@ -76,9 +76,9 @@ class GoalMonitor:
         self._applied_offset, self._feed = NO_OFFSET, FULL_FEED
         #: Whether a watch beside the goal stops the arm at contact, and moves it back.
         self.contact_is_watched = False
-        #: Scaled time: time since the start, as the controller's clock ran [s]; the part of that
-        #: time before the motion began [s].
-        self.scaled_time = self.start_delay = 0.0
+        #: Scaled time: time since the start, as the controller's clock ran [s]; by how much the
+        #: goal may end later, because the motion began late, waited or was slowed [s].
+        self.scaled_time = self.allowed_delay = 0.0
         #: How long the slider or a pause held up the controller's clock before the newest packet
         #: [s], whether or not the arm moved.
         self.held_time = 0.0
@@ -99,7 +99,7 @@ class GoalMonitor:
         self._motions_begun = self._motions_before = self.records.motions_before(sent)
         self._standstill.restart()
         # What was late before is past, and the wait at rest is no delay of the motion.
-        self.scaled_time, self.start_delay = self._tracker.time(), 0.0
+        self.scaled_time, self.allowed_delay = self._tracker.time(), 0.0
 
     def update(
         self,
@@ -122,7 +122,7 @@ class GoalMonitor:
         before, self.latest = self.latest, state
         self._applied_offset = applied_offset
         # The time of the goal passes as slowly as its feed says: that is no delay.
-        self.start_delay += feed.delay - self._feed.delay
+        self.allowed_delay += feed.delay - self._feed.delay
         self._feed = feed
         passed = 0.0 if before is None else max(0.0, state.timestamp - before.timestamp)
         playing = state.runtime_state is RuntimeState.PLAYING
@@ -324,19 +324,21 @@ class GoalMonitor:
 
     def start_offset(self, state: RobotState) -> str | None:
         """Return a clause if the arm is away from the start of the plan, else None."""
-        return _offset_clause(self._start, state.actual_tcp_pose)
+        return _offset_clause(self._start, state.actual_tcp_pose, 'the start of the plan')
 
     def rest_offset(self, state: RobotState) -> str | None:
         """Return a clause if the target is away from the place where the arm waits, else None."""
-        return _offset_clause(self._tracker.pose(), state.target_tcp_pose)
+        return _offset_clause(self._tracker.pose(), state.target_tcp_pose, 'where it waits')
 
     def missed_end(self, state: RobotState) -> str:
         """Return a clause if the controller's target is not at the end, else ''."""
         deviation = self._tracker.deviation(self._stiff(state.target_tcp_pose))
-        for value, limit in zip(deviation, self._max_plan_deviation, strict=True):
+        for unit, value, limit in zip(
+            ('m', 'rad'), deviation, self._max_plan_deviation, strict=True
+        ):
             if 0.0 < limit < value:
                 return (
-                    f'the robot program reports the end {value:.4f} m or rad away from the last '
+                    f'the robot program reports the end {value:.4f} {unit} away from the last '
                     f'point: it skipped motions that it does not know; {REMEDY}'
                 )
         return ''
@@ -451,11 +453,8 @@ class GoalMonitor:
         return behind if behind.distance_to(pose) < planned.distance_to(pose) else planned
 
 
-def _offset_clause(start: Pose, pose: Pose) -> str | None:
-    distance, angle = start.distance_to(pose), start.angle_to(pose)
+def _offset_clause(planned: Pose, pose: Pose, place: str) -> str | None:
+    distance, angle = planned.distance_to(pose), planned.angle_to(pose)
     if distance <= START_POSITION_TOLERANCE and angle <= START_ANGLE_TOLERANCE:
         return None
-    return (
-        f'the arm is {distance:.4f} m and {angle:.4f} rad away from the start of the plan: '
-        'it moved meanwhile'
-    )
+    return f'the arm is {distance:.4f} m and {angle:.4f} rad away from {place}: it moved meanwhile'

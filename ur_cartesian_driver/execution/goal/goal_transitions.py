@@ -24,9 +24,9 @@ state, and the error code if the signal decides the outcome of the goal.
   inside the goal tolerance, within the goal's time tolerance. If the controller's target is not
   at the last point, the program skipped motions (DEVIATION).
 * A goal that ends when the tool touches (CONTACT) succeeds without SETTLING: the program has
-  moved the arm back to the place of contact. A goal that such a contact ends for the sake of a
-  watch beside it (TOUCHED) fails, also at rest between or after its trajectories. It is cancelled,
-  too: the program may have read START just after the contact, and then runs the trajectory.
+  moved the arm back to the place of contact. If a watch beside the goal ends it at contact
+  (TOUCHED), the goal fails, even at rest between or after its trajectories. It is cancelled, too:
+  the program may have read START just after the contact, and then runs the trajectory.
 * **CANCELLING**: CANCEL has been sent. The program brakes, discards the points that it has not
   run and answers CANCELED. A SUCCESS in this state means that the last point was reached before
   the program read CANCEL; this is not the answer to CANCEL: CANCELED still follows.
@@ -64,6 +64,7 @@ from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
     RobotState,
     RuntimeState,
+    SafetyMode,
     SafetyStatus,
 )
 
@@ -223,6 +224,19 @@ _SAFETY_STOPS = _EMERGENCY_STOPS | int(
 NO_STOP = SafetyStatus(0)
 #: Stops after which the robot goes on once somebody unlocks it and plays its program.
 RESUMABLE_STOPS = SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.SAFEGUARD_STOPPED
+#: Modes of newer safety functions, and the stop that each of them is. It is not documented whether
+#: the safety status has the bit of that stop, too.
+_STOP_OF_MODE = {
+    SafetyMode.AUTOMATIC_MODE_SAFEGUARD_STOP: SafetyStatus.SAFEGUARD_STOPPED,
+    SafetyMode.SYSTEM_THREE_POSITION_ENABLING_STOP: SafetyStatus.SAFEGUARD_STOPPED,
+    SafetyMode.TP_THREE_POSITION_ENABLING_STOP: SafetyStatus.SAFEGUARD_STOPPED,
+    SafetyMode.IMMI_SAFEGUARD_STOP: SafetyStatus.SAFEGUARD_STOPPED,
+    SafetyMode.PROFISAFE_AUTOMATIC_MODE_SAFEGUARD_STOP: SafetyStatus.SAFEGUARD_STOPPED,
+    SafetyMode.PROFISAFE_SAFEGUARD_STOP: SafetyStatus.SAFEGUARD_STOPPED,
+    SafetyMode.SAFETY_API_SAFEGUARD_STOP: SafetyStatus.SAFEGUARD_STOPPED,
+    SafetyMode.IMMI_EMERGENCY_STOP: SafetyStatus.EMERGENCY_STOPPED,
+    SafetyMode.PROFISAFE_EMERGENCY_STOP: SafetyStatus.EMERGENCY_STOPPED,
+}
 #: An arm is at rest if the target speed of every joint is below this [rad/s].
 REST_SPEED = 1e-3
 #: An arm at rest may ring with measured joint speeds below this [rad/s]. Recorded arms ring above
@@ -244,7 +258,10 @@ def detect_stop(state: RobotState, ignored_stops: SafetyStatus = NO_STOP) -> Fau
 
     :param ignored_stops: safety stops that do not end the goal.
     """
-    safety = int(state.safety_status) & _SAFETY_STOPS & ~int(ignored_stops)
+    safety = int(state.safety_status) & _SAFETY_STOPS
+    if state.safety_mode in _STOP_OF_MODE:
+        safety |= int(_STOP_OF_MODE[state.safety_mode])
+    safety &= ~int(ignored_stops)
     if safety:
         return _safety_stop(safety, state)
     if state.robot_mode is not RobotMode.RUNNING:

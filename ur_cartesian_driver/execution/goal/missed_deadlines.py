@@ -52,13 +52,15 @@ def _why_not_armed(monitor: GoalMonitor, tcp: TemporaryTcp | None, guard: Output
         return (
             f'the robot program did not confirm the safe_outputs of the goal within '
             f'{ARMING_TIMEOUT:g} s: it is paused, its command socket is dead, or RTDE carries too '
-            'little; nothing was moved'
+            'little'
         )
-    if packet is not None and tcp is not None and tcp.is_active(packet):
+    if tcp is None:
+        return f'the robot was not ready within {ARMING_TIMEOUT:g} s'
+    if packet is not None and tcp.is_active(packet):
         return monitor.start_offset(packet) or ''
     return (
         f'the robot did not take the TCP of the goal within {ARMING_TIMEOUT:g} s: its program '
-        'is paused, or does not know that command; nothing was moved'
+        'is paused, or does not know that command'
     )
 
 

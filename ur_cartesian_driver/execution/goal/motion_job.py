@@ -25,12 +25,14 @@ from ur_cartesian_driver.motion.goal.goal import (
     DEFAULT_YIELDS,
     FeedOverride,
     OnPathTolerance,
+    OutputKind,
     PRESS_AXES,
     PressFrame,
     SafeOutput,
     Tolerance,
 )
 from ur_cartesian_driver.motion.goal.joint_goal import JointTolerances
+from ur_cartesian_driver.motion.goal.output_names import pulse_outputs
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.move_rows import blend_radii, has_optimized, stops
 from ur_cartesian_driver.motion.plan.offset_band import OffsetBand
@@ -119,9 +121,11 @@ class MotionJob:
     safe_outputs: tuple[SafeOutput, ...] = ()
     #: How long the motion waits for an arm that is off its path [s]; 0 = it does not wait.
     stall_timeout: float = 0.0
-    #: Pins of the analog outputs that follow the speed (``proportional_outputs``): after a pause
-    #: the robot program writes them again, so the driver does not restore them.
-    following_outputs: frozenset[int] = frozenset()
+    #: The analog outputs that follow the speed (``proportional_outputs``), and the digital ones
+    #: that give pulses, in the order in which the program counts them. After a pause the robot
+    #: program writes them again, so the driver does not restore them.
+    following_outputs: frozenset[tuple[OutputKind, int]] = frozenset()
+    pulse_outputs: tuple[tuple[OutputKind, int], ...] = ()
     #: The band within which offsets may displace the path; None = no offsets.
     offset_band: OffsetBand | None = None
     #: The bounds within which a signal may slow the motion, all given; None = no signal may.
@@ -153,6 +157,8 @@ class MotionJob:
         """A feature of the job that only our own robot program has, as a noun; '' = none."""
         if self.following_outputs:
             return 'outputs that follow the speed (proportional_outputs)'
+        if self.pulse_outputs:
+            return 'pulses'
         if not self.is_motion.all():
             return 'outputs (io_commands)'
         if self.has_stops:
@@ -229,7 +235,10 @@ def job_from_plan(
         offset_band=plan.offset_band,
         feed_override=_feed_override(goal.feed_override),
         safe_outputs=goal.safe_outputs,
-        following_outputs=frozenset(output.pin for output in goal.proportional_outputs),
+        following_outputs=frozenset(
+            (OutputKind.STANDARD_ANALOG, output.pin) for output in goal.proportional_outputs
+        ),
+        pulse_outputs=pulse_outputs(goal.pulses),
         stall_timeout=(goal.stall_timeout or DEFAULT_STALL_TIMEOUT) if stalls else 0.0,
         ending_records=ending_records,
         has_stops=bool(standing),
@@ -246,7 +255,7 @@ def job_from_plan(
 
 
 def _holds(standing: Mapping[int, Stop], end_times: Floats) -> Iterator[Hold]:
-    """Yield a hold for each row of consecutive stops."""
+    """Yield a hold for each run of consecutive stops."""
     for row in standing:
         if row - 1 in standing:
             continue

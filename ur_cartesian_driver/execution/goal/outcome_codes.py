@@ -27,7 +27,7 @@ class GoalSignal(Enum):
     CANCELED = 'the trajectory was cancelled', ErrorCode.EXECUTION_FAILED
     FAILURE = 'the robot program failed', ErrorCode.EXECUTION_FAILED
     CONTACT = 'the tool touched, where that ends the goal', ErrorCode.SUCCESSFUL
-    TOUCHED = 'the tool touched, which a watch beside the goal awaits', ErrorCode.EXECUTION_FAILED
+    TOUCHED = 'a watch beside the goal noticed contact', ErrorCode.EXECUTION_FAILED
     # Requests of users.
     CANCEL = 'the client cancels', ErrorCode.CANCELLED
     PREEMPT = 'a newer goal takes over', ErrorCode.PREEMPTED
@@ -82,7 +82,7 @@ RESULT_SIGNALS: dict[TrajectoryResult, Fault] = {
     TrajectoryResult.CONTACT: (GoalSignal.CONTACT, 'the tool touched'),
     TrajectoryResult.TOUCHED: (
         GoalSignal.TOUCHED,
-        'the tool touched, and the watch for contact (detect_tool_contact) stops every motion',
+        'the tool touched something while detect_tool_contact watched, which stops every motion',
     ),
     TrajectoryResult.NO_CONTACT: (
         GoalSignal.FAILURE,

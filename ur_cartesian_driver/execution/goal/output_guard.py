@@ -3,8 +3,8 @@
 """
 The outputs of a goal that have to be safe whenever its motion does not go on as planned.
 
-The robot program gets the safe values before the motion; the thread of the program that stops the
-arm also sets the outputs. A program that is paused or gone runs no thread: then the driver writes
+The robot program gets the safe values before the motion; whichever of its threads stops the arm
+also sets the outputs. A program that is paused or gone runs no thread: then the driver writes
 the values to the robot. An order is regarded as carried out only once it is confirmed: the robot
 program confirms it by a token, the driver by the list of outputs that its write has changed.
 """
@@ -33,16 +33,16 @@ class OutputGuard:
         self,
         outputs: tuple[SafeOutput, ...],
         packet: RobotState,
-        following: frozenset[int] = frozenset(),
+        own: frozenset[tuple[OutputKind, int]] = frozenset(),
     ) -> None:
         """
         Keep the outputs of a goal; without outputs the guard does nothing.
 
         :param packet: the newest packet of the robot.
-        :param following: pins of the analog outputs that follow the speed; they are not restored
-            after a pause, because the robot program writes them again.
+        :param own: the outputs that follow the speed or give pulses; they are not restored after
+            a pause, because the robot program writes them again.
         """
-        self._outputs, self._following = outputs, following
+        self._outputs, self._own = outputs, own
         self._token = packet.safe_outputs_token
         self._is_held = False
         #: Whether the driver's write was ordered, in this pause or at the end of the goal.
@@ -133,9 +133,7 @@ class OutputGuard:
             return []
         changed, self._changed = self._changed, ()
         restored = tuple(
-            output
-            for output in changed
-            if output.output is not OutputKind.STANDARD_ANALOG or output.pin not in self._following
+            output for output in changed if (output.output, output.pin) not in self._own
         )
         if not restored:
             return []

@@ -96,6 +96,6 @@ class TemporaryTcp:
         if packet is not None and same_tcp(packet.T_flange_tcp, self.T_flange_original):
             return 'the TCP of the robot was set for the goal, and is what it was before'
         return (
-            'the TCP of the robot was set for the goal; somebody else has set another one since, '
-            'which is left alone'
+            'the TCP of the robot is neither the one of the goal nor the one before it: somebody '
+            'else has set it, and it is left alone'
         )

@@ -22,6 +22,4 @@ EARLY_CANCELED_TIMEOUT = 1.0
 CAUSE_TIMEOUT = 0.1
 
 #: The clause for a motion for which the robot did not grant its RTDE inputs.
-NO_INPUTS = (
-    f'the robot did not give its RTDE inputs within {ARMING_TIMEOUT:g} s; nothing was moved'
-)
+NO_INPUTS = f'the robot did not give its RTDE inputs within {ARMING_TIMEOUT:g} s'

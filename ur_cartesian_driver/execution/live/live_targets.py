@@ -13,7 +13,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import inf
 
-from ur_cartesian_driver.execution.goal.feeder import Ageing, how_often, Reporting, Steerable
+from ur_cartesian_driver.execution.goal.feeder import (
+    Ageing,
+    counted,
+    how_often,
+    Reporting,
+    Steerable,
+)
 from ur_cartesian_driver.execution.goal.goal_commands import GoalCommand
 from ur_cartesian_driver.execution.live.online_trajectory import (
     LiveLimits,
@@ -102,9 +108,9 @@ class LiveTargets(Steerable, Ageing, Reporting):
         """The lines about targets that were followed or ignored, and about stops."""
         taken, dropped = self.freshness.accepted, self.freshness.dropped
         age = f'older than {self.settings.max_age:g} s'
-        lines = ['1 target was followed' if taken == 1 else f'{taken} targets were followed']
+        lines = [f'{counted(taken, "target")} followed']
         if dropped:
-            lines.append(f'{dropped} came after a newer one or were {age}, and were ignored')
+            lines.append(f'{counted(dropped, "target")} ignored: older than a newer one, or {age}')
         if self.pauses:
             times = how_often(self.pauses)
             lines.append(f'the arm was stopped {times} because the newest target was {age}')

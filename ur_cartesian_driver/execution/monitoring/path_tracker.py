@@ -295,7 +295,9 @@ class PathTracker:
         if row == 0 and not fraction:
             return self.pose()
         end = row + 1 if fraction else row
-        found, _ = self._nearest(self._coordinates(pose, 0), 0, end, 0.0, fraction or 1.0)
+        # By the sign of the last quaternion: those of a tool that has turned far differ in sign.
+        point = self._coordinates(pose, end - 1)
+        found, _ = self._nearest(point, 0, end, 0.0, fraction or 1.0)
         return self.pose(found)
 
     def deviation(self, target: Pose) -> tuple[float, float]:

@@ -4,8 +4,8 @@
 The signal that overrides the feed of a goal: the newest value, its age, and a report.
 
 The signal may come at any time, jump, stop or be nonsense. A valid value, 0 to 1, is cut to the
-bounds of the goal. An invalid or stale value becomes the lower bound, because nobody knows what
-the process would bear. Who runs the motion changes its feed at the rate of the goal.
+bounds of the goal. Without a valid value the lower bound applies, because nobody knows what the
+process would bear. Whichever side runs the motion changes the feed at the goal's rate.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 from ur_cartesian_driver.execution.goal.feed_state import FeedState
 from ur_cartesian_driver.execution.goal.feeder import (
     Ageing,
+    counted,
     how_often,
     Overridable,
     Reporting,
@@ -94,18 +95,15 @@ class FeedRequests(Overridable, Ageing, Reporting):
         """The lines about the values that were followed or ignored, and about the delay."""
         taken, dropped = self._freshness.accepted, self._freshness.dropped
         lines = [
-            f'feed_override: {taken} value{"s" * (taken != 1)} followed; the feed went down to '
+            f'feed_override: {counted(taken, "value")} followed; the feed went down to '
             f'{self._lowest:.0%}, and the goal took {self._delay:.2f} s more'
         ]
         if self._invalid:
-            lines.append(
-                f'feed_override: {self._invalid} value{"s" * (self._invalid != 1)} not within 0 '
-                'to 1'
-            )
+            lines.append(f'feed_override: {counted(self._invalid, "value")} not within 0 to 1')
         if dropped:
             lines.append(
-                f'feed_override: {dropped} value{"s" * (dropped != 1)} ignored: older than '
-                f'{self.bounds.timeout:g} s, or came after a newer one'
+                f'feed_override: {counted(dropped, "value")} ignored: older than a newer one or '
+                f'than {self.bounds.timeout:g} s'
             )
         if self._lost:
             lines.append(

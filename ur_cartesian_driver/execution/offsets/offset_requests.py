@@ -15,6 +15,7 @@ from math import isfinite, nan
 
 from ur_cartesian_driver.execution.goal.feeder import (
     Ageing,
+    counted,
     Displaceable,
     how_often,
     Reporting,
@@ -70,7 +71,7 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
     def target(self, time: float) -> Vector3:
         """Return the offset to which the tool should move, at a time of the motion [s]."""
         if not self._band.opens(time):
-            if self._is_stale:  # behind a turn of the path it would point another way
+            if self._is_stale:  # after a turn of the path, it would point another way
                 self._newest = ZERO3
             return ZERO3
         return ZERO3 if self._is_stale and self._fades else self._newest
@@ -89,16 +90,16 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
             if value
         )
         lines = [
-            ('1 path offset was' if taken == 1 else f'{taken} path offsets were')
-            + f' followed; the path gave way by {largest or "nothing"} at most'
+            f'{counted(taken, "path offset")} followed; the path gave way by '
+            f'{largest or "nothing"} at most'
         ]
         if dropped:
             lines.append(
-                f'{dropped} path offsets came after a newer one, were older than '
-                f'{self._band.timeout:g} s or not finite, and were ignored'
+                f'{counted(dropped, "path offset")} ignored: older than a newer one or than '
+                f'{self._band.timeout:g} s, or not finite'
             )
         if self._cut:
-            lines.append(f'{self._cut} path offsets were beyond path_offset.limits, and were cut')
+            lines.append(f'{counted(self._cut, "path offset")} cut to path_offset.limits')
         if self._stale_count:
             times, age = how_often(self._stale_count), self._band.timeout
             lines.append(f'the path offset was stale {times}: older than {age:g} s')

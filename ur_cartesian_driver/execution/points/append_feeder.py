@@ -98,21 +98,20 @@ class AppendFeeder(PointFeeder, Appendable):
 
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
         """Return the commands that begin a stream, close it with its ending, or cancel it."""
-        match state:
-            case GoalState.MOVING:
-                self._appended.go_on()
-                self._is_stream_end_sent = False
-                self._stream_first_record = self._window.sent
-                self._stream_start_time = packet.timestamp
-                self.monitor.start(packet.points_begun, sent=self._window.sent)
-                return [SendControl(action=TrajectoryAction.STREAM_START), *self._release()]
-            case GoalState.RUNNING_OUT:
-                return self._window.send(self._appended.run_out()) + self._end_stream()
-            case GoalState.AWAITING_POINTS:
-                self._appended.rest(self.monitor.records.end_time(self._window.sent))
-            case GoalState.CANCELLING:
-                return [SendControl(action=TrajectoryAction.CANCEL, count=self._stream_length())]
-        return []
+        commands = super().enter(state, packet)
+        if state is GoalState.RUNNING_OUT:
+            return self._window.send(self._appended.run_out()) + self._end_stream()
+        if state is GoalState.AWAITING_POINTS:
+            self._appended.rest(self.monitor.records.end_time(self._window.sent))
+        return commands
+
+    def _start(self, packet: RobotState) -> list[GoalCommand]:
+        self._appended.go_on()
+        self._is_stream_end_sent = False
+        self._stream_first_record = self._window.sent
+        self._stream_start_time = packet.timestamp
+        self.monitor.start(packet.points_begun, sent=self._window.sent)
+        return [SendControl(action=TrajectoryAction.STREAM_START), *self._release()]
 
     def _release(self) -> list[GoalCommand]:
         """Send the records up to the horizon, except the ending; close a complete stream."""
@@ -126,7 +125,7 @@ class AppendFeeder(PointFeeder, Appendable):
         if self._is_stream_end_sent or self._window.sent != self.monitor.records.total:
             return []
         self._is_stream_end_sent = True
-        return [SendControl(action=TrajectoryAction.STREAM_END, count=self._stream_length())]
+        return [SendControl(action=TrajectoryAction.STREAM_END, count=self._sent_points())]
 
-    def _stream_length(self) -> int:
+    def _sent_points(self) -> int:
         return self._window.sent - self._stream_first_record

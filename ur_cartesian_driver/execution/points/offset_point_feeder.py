@@ -57,6 +57,8 @@ class OffsetPointFeeder(PointFeeder, Prepared, Displaced):
         self._first: int | None = None
         self._sequence = 0
         self._moves = self._is_closed = False
+        #: Whether the program may read offsets, now or in the motion to come.
+        self._is_read = True
         self._applied = NO_OFFSET
 
     def prepare(self) -> list[GoalCommand]:
@@ -69,7 +71,8 @@ class OffsetPointFeeder(PointFeeder, Prepared, Displaced):
 
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
         """Return START with the first points, CANCEL, or the command that releases the inputs."""
-        self._moves = state is GoalState.MOVING
+        # Numbers that are written and not read would be taken for those of the next goal.
+        self._moves = self._is_read = state is GoalState.MOVING
         commands = super().enter(state, packet)
         if state in (GoalState.RESTORING, GoalState.ENDED) and not self._is_closed:
             self._is_closed = True
@@ -83,7 +86,7 @@ class OffsetPointFeeder(PointFeeder, Prepared, Displaced):
         if self._is_closed:
             return []
         self._observe(event.feedback)
-        return [WriteInputs(values=self._row())]
+        return [WriteInputs(values=self._row())] if self._is_read else []
 
     def _observe(self, feedback: OffsetFeedback) -> None:
         last = feedback.last_sequence

@@ -24,20 +24,36 @@ class PointFeeder(Feeder):
         """Begin with no record sent."""
         super().__init__(monitor)
         self._window = SendWindow()
+        #: Whether the program runs a trajectory of this goal, as far as is known.
+        self._is_running = False
 
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
-        """Return START with the first points, or CANCEL."""
+        """
+        Return START with the first points, or CANCEL.
+
+        A goal that ends while its trajectory runs (a connection other than the program's is lost)
+        cancels it, too: points that were sent and not read would run in the next goal.
+        """
+        was_running = self._is_running
+        self._is_running = state in (GoalState.MOVING, GoalState.RUNNING_OUT)
         if state is GoalState.MOVING:
-            self.monitor.start(packet.points_begun)
-            start = SendControl(
-                action=TrajectoryAction.START,
-                count=self.monitor.job.points,
-                takes_offsets=self._takes_offsets,
-            )
-            return [start, *self._release()]
-        if state is GoalState.CANCELLING:
-            return [SendControl(action=TrajectoryAction.CANCEL, count=self._window.sent)]
+            return self._start(packet)
+        if state is GoalState.CANCELLING or (state is GoalState.ENDED and was_running):
+            return [SendControl(action=TrajectoryAction.CANCEL, count=self._sent_points())]
         return []
+
+    def _start(self, packet: RobotState) -> list[GoalCommand]:
+        self.monitor.start(packet.points_begun)
+        start = SendControl(
+            action=TrajectoryAction.START,
+            count=self.monitor.job.points,
+            takes_offsets=self._takes_offsets,
+        )
+        return [start, *self._release()]
+
+    def _sent_points(self) -> int:
+        """Return how many points of the trajectory were sent."""
+        return self._window.sent
 
     def feed(self, event: Event, now: float) -> list[GoalCommand]:
         """Return the command that sends the records that the send window permits."""

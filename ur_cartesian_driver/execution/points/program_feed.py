@@ -14,8 +14,8 @@ from ur_cartesian_driver.execution.offsets.feed_requests import FeedRequests
 from ur_cartesian_driver.motion.goal.goal import FeedOverride
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
-#: Smaller changes are sent only to an end of the range: else the noise of an analog input would be
-#: a message to the robot program in each packet, and CANCEL would wait behind them.
+#: Smaller changes are sent only if they reach an end of the range; otherwise the noise of an
+#: analog input would cost a message per packet, and CANCEL would wait behind them.
 MIN_CHANGE = 0.005
 
 
@@ -50,8 +50,8 @@ class ProgramFeed(FeedRequests, Prepared):
         self._sent = self.target
         return [SetFeedTarget(fraction=self._sent, rate=self.bounds.rate)]
 
-    def feed_state(self, packet: RobotState, now: float) -> FeedState:
-        """Return the feed as the robot program reports it."""
+    def observe_feed(self, packet: RobotState, now: float) -> FeedState:
+        """Read the input, if it gives the signal, and return the feed that the program reports."""
         self.read_input(packet, now)
         if self._first_delay is None:
             self._first_delay = packet.feed_delay

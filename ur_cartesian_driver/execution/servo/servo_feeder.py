@@ -9,7 +9,7 @@ goal (:mod:`~ur_cartesian_driver.execution.goal.goal_transitions`) then mean:
 * in ARMING the inputs of the robot are claimed, the divergence thresholds are written and the
   robot program has to answer. If the inputs belong to another client, or the program does not
   answer, the goal ends before anything moves;
-* MOVING begins with a full buffer and ends when the robot has carried out the last set-point;
+* MOVING first fills the buffer, and ends when the robot has carried out the last set-point;
 * SETTLING holds that set-point until the arm is there and at rest;
 * in CANCELLING the mode IDLE is written instead of a CANCEL; the program answers by leaving the
   servo.
@@ -110,8 +110,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         if self.stream.phase is not ServoPhase.READY:
             return (
                 'the robot program did not answer through its registers within '
-                f'{ARMING_TIMEOUT:g} s: it is paused, or knows no buffered servo; '
-                'nothing was moved'
+                f'{ARMING_TIMEOUT:g} s: it is paused, or knows no buffered servo'
             )
         # If the arm was moved after planning, the servo would pull it back to the start.
         error = 0.0 if packet is None else self._joint_distance(packet, 0)
@@ -174,7 +173,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         if self.stream.phase is ServoPhase.SERVOING and not self._has_filled:
             # The time of the goal begins with its motion, not when the buffer begins to fill.
             self._has_filled = True
-            self.monitor.start_delay = (
+            self.monitor.allowed_delay = (
                 self.monitor.scaled_time - self.stream.source_time + self.stream.lag
             )
         commands: list[GoalCommand] = [] if row is None else [WriteInputs(values=row)]
@@ -193,7 +192,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         if self._holds and self.monitor.motions_begun >= self._holds[0].motions:
             hold = self._holds.popleft()
             stream.go_on(hold.end - hold.begin, self._next_hold())
-        self.monitor.start_delay += stream.held_time - self._held_time
+        self.monitor.allowed_delay += stream.held_time - self._held_time
         self._held_time = stream.held_time
 
     def interpret(self, event: Event, state: GoalState) -> Meaning | None:
@@ -230,7 +229,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         return begun, begun - self._pieces_begun(time - self._max_servo_lag)
 
     def _behind(self, begun: int) -> int:
-        """Return how many motions the controller's target may lag behind that one [count]."""
+        """Return by how many motions the controller's target may lag behind ``begun``."""
         records = self.monitor.records
         begin = records.end_time(records.begun_records(begun) - 1)
         first = records.count_until(begin - self._max_servo_lag)

@@ -206,21 +206,28 @@ class ServoStream:
         self._unread: deque[_Setpoint] = deque()
         #: Set-points that the robot has not carried out yet.
         self._unfinished: deque[_Setpoint] = deque()
-        #: Time of the source [s]: at the newest set-point; at the last one carried out.
-        self.source_time = self.motion_time = 0.0
+        #: Time of the source at the newest set-point [s].
+        self.source_time = 0.0
+        #: Time of the source at the last set-point carried out [s].
+        self.motion_time = 0.0
         #: Rate of the motion's time relative to the stream's time, 0 to 1.
         self._motion_rate = 1.0
-        #: Whether the motion is stalled on its path; its total delay by stalls [s].
-        self.is_stalled, self.stalled_time = False, 0.0
-        #: The time of the source at which set-points are repeated until :meth:`go_on` [s]; by how
-        #: much this delays the motion in total, beyond rests of the source [s].
-        self.next_hold, self.held_time = inf, 0.0
+        #: Whether the motion is stalled on its path.
+        self.is_stalled = False
+        #: Total delay of the motion by stalls [s].
+        self.stalled_time = 0.0
+        #: The time of the source at which set-points are repeated until :meth:`go_on` [s].
+        self.next_hold = inf
+        #: Total delay of the motion by such holds, beyond rests of the source [s].
+        self.held_time = 0.0
         #: Time of the motion [s]: that of the source without the rests that were left out.
         self._moved_time = 0.0
-        #: What a feed override leaves of the motion's rate, 0 to 1; where it goes, and how fast
-        #: [1/s]; by how much it has delayed the motion in total [s].
-        self.feed = self.feed_target = 1.0
-        self.feed_rate = self.feed_delay = 0.0
+        #: What a feed override leaves of the motion's rate, 0 to 1.
+        self.feed = 1.0
+        #: The value to which :attr:`feed` goes, and how fast [1/s].
+        self.feed_target, self.feed_rate = 1.0, 0.0
+        #: Total delay of the motion by the feed override [s].
+        self.feed_delay = 0.0
         self._recovers = False
         self._last_write = -inf
         self._sent = self._underruns = 0

@@ -35,7 +35,7 @@ class SetpointFeed(FeedRequests):
         self._stream.feed_target = self.target
         return warnings
 
-    def feed_state(self, packet: RobotState, now: float) -> FeedState:
-        """Return the feed of the newest set-point."""
+    def observe_feed(self, packet: RobotState, now: float) -> FeedState:
+        """Read the input, if it gives the signal, and return the feed of the newest set-point."""
         self.read_input(packet, now)
         return self.noted(self._stream.feed, self._stream.feed_delay)

@@ -25,7 +25,7 @@ class WaitForArm(Stallable, Ageing, Reporting):
         self._timeout = monitor.job.stall_timeout
         self._since = self._timestamp = 0.0
         self._count, self._longest = 0, 0.0
-        #: The delay by stalls that is already part of the monitor's ``start_delay`` [s].
+        #: The delay by stalls that is already part of the monitor's ``allowed_delay`` [s].
         self._stalled_time = 0.0
         self._unsaid: list[GoalCommand] = []
 
@@ -40,7 +40,7 @@ class WaitForArm(Stallable, Ageing, Reporting):
             self._since += packet.timestamp - self._timestamp
         self._timestamp = packet.timestamp
         # The time of the goal stands still while the motion is stalled.
-        self._monitor.start_delay += stream.stalled_time - self._stalled_time
+        self._monitor.allowed_delay += stream.stalled_time - self._stalled_time
         self._stalled_time = stream.stalled_time
         if fault is None or not stream.is_stalled:
             return fault

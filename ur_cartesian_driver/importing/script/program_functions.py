@@ -39,24 +39,21 @@ from ur_cartesian_driver.urscript import (
 
 #: After this many cycles without an event, no more events are expected from other threads.
 QUIET_CYCLES = 500
-#: The functions that read the arm, and what each needs: only the pose, or the joints as well.
-_POSE, _JOINTS = False, True
-_READERS = {
-    'get_actual_tcp_pose': _POSE,
-    'get_target_tcp_pose': _POSE,
-    'get_target_tcp_pose_along_path': _POSE,
-    'get_target_waypoint': _POSE,
-    'get_actual_tool_flange_pose': _POSE,
-    'get_actual_joint_positions': _JOINTS,
-    'get_target_joint_positions': _JOINTS,
-    'get_joint_positions': _JOINTS,
-    'get_forward_kin': _JOINTS,
-    'get_inverse_kin': _JOINTS,
-    'get_inverse_kin_has_solution': _JOINTS,
-    'is_within_safety_limits': _JOINTS,
-    'get_jacobian': _JOINTS,
-    'get_jacobian_time_derivative': _JOINTS,
-}
+#: The functions that return the pose of the TCP, and of the flange.
+_TCP_POSES = (
+    'get_actual_tcp_pose',
+    'get_target_tcp_pose',
+    'get_target_tcp_pose_along_path',
+    'get_target_waypoint',
+)
+_FLANGE_POSE = 'get_actual_tool_flange_pose'
+#: The functions that read the joints, too.
+_OF_JOINTS = (
+    *('get_actual_joint_positions', 'get_target_joint_positions', 'get_joint_positions'),
+    *('get_forward_kin', 'get_inverse_kin', 'get_inverse_kin_has_solution'),
+    *('is_within_safety_limits', 'get_jacobian', 'get_jacobian_time_derivative'),
+)
+_READERS = (*_TCP_POSES, _FLANGE_POSE, *_OF_JOINTS)
 
 
 class NoPeer:
@@ -112,11 +109,8 @@ class ProgramFunctions:
     def by_name(self) -> Mapping[str, Builtin]:
         """Return all functions by name."""
         own: dict[str, Any] = {
-            'get_actual_tcp_pose': self._tcp_pose,
-            'get_target_tcp_pose': self._tcp_pose,
-            'get_target_tcp_pose_along_path': self._tcp_pose,
-            'get_target_waypoint': self._tcp_pose,
-            'get_actual_tool_flange_pose': self._flange_pose,
+            **dict.fromkeys(_TCP_POSES, self._tcp_pose),
+            _FLANGE_POSE: self._flange_pose,
             'set_tcp': self._set_tcp,
             **dict.fromkeys(
                 ('rpc_factory', 'eip_reader_factory', 'eip_writer_factory'), self._server
@@ -172,7 +166,7 @@ class ProgramFunctions:
 
     def _reader(self, name: str, does: Any) -> Any:
         """Wrap a function so that it first reports the arm's position if that is only assumed."""
-        place, of_joints, signature = self._place, _READERS[name], inspect.signature(does)
+        place, of_joints, signature = self._place, name in _OF_JOINTS, inspect.signature(does)
 
         @functools.wraps(does)
         def read(*values: Value, **named: Value) -> Any:

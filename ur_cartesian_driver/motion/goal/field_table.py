@@ -34,6 +34,8 @@ class Form(Enum):
     PLAIN = auto()
     #: The number of a pin, uint8.
     PIN = auto()
+    #: A number of things, uint32.
+    COUNT = auto()
     #: The index of a point, uint32.
     INDEX = auto()
     #: A member of an enumeration, sent as its number, uint8.

@@ -175,6 +175,8 @@ MAX_OUTPUT_OFFSET = 60.0
 MAX_OUTPUT_LEAD = 1.0
 #: The longest way between a point and the place where an output is switched [m].
 MAX_OUTPUT_DISTANCE = 10.0
+#: The longest distance between two pulses [m], the longest pulse [s], and the most in one train.
+MAX_PULSE_DISTANCE, MAX_PULSE_WIDTH, MAX_PULSE_COUNT = 2.0, 1.0, 1_000_000
 
 FINITE, NOT_NEGATIVE = Range(), Range(0.0)
 FRACTION, SMALL_LEAD = Range(0.0, 1.0), Range(0.0, 10.0)
@@ -326,6 +328,8 @@ class IOCommand:
     fraction: Annotated[float, Range(-1.0, 1.0)] = 0.0
     #: Name of a lead: the command comes earlier by its dead time, see ``lead_file``; '' = none.
     lead: str = ''
+    #: The name of the lead whose dead time ``offset`` contains; '' = none.
+    lead_name: Annotated[str, Mark.NOT_SENT] = field(default='', compare=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -399,6 +403,24 @@ class ProportionalOutput:
     filter_time: Annotated[float, SMALL_LEAD] = 0.0
     #: Value while the output does not follow the speed, a fraction of the range.
     idle: Annotated[float, FRACTION] = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PulseTrain:
+    """Pulses of a digital output, evenly along the path between two waypoints."""
+
+    first_waypoint: Annotated[int, FIRST_POINT]
+    last_waypoint: Annotated[int, LAST_POINT]
+    output: OutputKind
+    pin: int
+    #: Way along the path from pulse to pulse [m].
+    distance: Annotated[float, Sent(always=False), Range(0.0, MAX_PULSE_DISTANCE, 'm', above=True)]
+    #: Way along the path from the first waypoint to the first pulse [m].
+    phase: Annotated[float, Range(0.0, MAX_OUTPUT_DISTANCE, 'm')] = 0.0
+    #: How long the output stays on [s], in real time; 0 = one cycle of the controller.
+    width: Annotated[float, Range(0.0, MAX_PULSE_WIDTH, 's')] = 0.0
+    #: Number of pulses; 0 = as many as there is room for.
+    count: Annotated[int, Sent(form=Form.COUNT), Range(0, MAX_PULSE_COUNT)] = 0
 
 
 #: ``Press.first_waypoint`` of the driver's own presses that begin where the motion begins.
@@ -548,3 +570,4 @@ class Goal:
     #: Largest turn of the tool from its programmed orientation there [rad]; 0 = the default.
     corner_angle: Annotated[float, CORNER_ANGLE] = 0.0
     feed_override: FeedOverride = FeedOverride()
+    pulses: tuple[PulseTrain, ...] = ()

@@ -94,4 +94,9 @@ def _earlier(command: IOCommand, leads: dict[str, Lead], field: str, file: str) 
             'ahead of its place or after it',
             'set the offset to 0, and move the place by a distance',
         )
-    return replace(command, offset=command.offset - lead.dead_time(command.value), lead='')
+    return replace(
+        command,
+        offset=command.offset - lead.dead_time(command.value),
+        lead='',
+        lead_name=lead.name,
+    )

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ur_cartesian_driver.motion.goal.goal import OutputKind, SafeOutput
+from ur_cartesian_driver.motion.goal.goal import OutputKind, PulseTrain, SafeOutput
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 #: For each kind: its name in a sentence, and the number of pins.
@@ -57,6 +57,11 @@ def output_fault(kind: OutputKind, pin: int, value: float) -> tuple[str, str, st
         takes = '0 to 1, the fraction of its range' if is_analog else '0 (off) or 1 (on)'
         return 'value', f'is {value:g}; a {name} takes {takes}', ''
     return None
+
+
+def pulse_outputs(trains: Sequence[PulseTrain]) -> tuple[tuple[OutputKind, int], ...]:
+    """Return the outputs that give pulses, in the order in which the robot program counts them."""
+    return tuple(dict.fromkeys((train.output, train.pin) for train in trains))
 
 
 def repeated_output(outputs: Sequence[SafeOutput]) -> int | None:

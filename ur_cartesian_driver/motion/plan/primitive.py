@@ -150,6 +150,8 @@ class SwitchOutput:
     #: Whether an analog output follows the speed, by the :class:`SpeedLaw` before this record,
     #: until the next record switches it.
     follows_speed: bool = False
+    #: Whether pulses begin, by the :class:`PulseLaw` before this record.
+    begins_pulses: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -192,8 +194,28 @@ class LeadLaw:
     turns: bool = False
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PulseLaw:
+    """
+    Not a motion: the law of the pulses that begin with the next output.
+
+    :param slot: which of the robot program's counts is that of the output.
+    :param distance: way of the tool from pulse to pulse [m].
+    :param phase: way from the place of the next output to the first pulse [m].
+    :param width: how long a pulse is [s].
+    """
+
+    slot: int
+    output: OutputKind
+    pin: int
+    distance: float
+    phase: float
+    width: float
+    count: int
+
+
 #: A record that is neither a motion nor a stop.
-OutputRecord: TypeAlias = SwitchOutput | SpeedLaw | LeadLaw
+OutputRecord: TypeAlias = SwitchOutput | SpeedLaw | LeadLaw | PulseLaw
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -167,6 +167,8 @@ class RobotState:
     safe_outputs_token: Annotated[int, Rtde('output_int_register_35', optional=True)] = 0
     #: Motion version of movej and movel when our robot program connected; 0 = unknown.
     motion_version: Annotated[int, Rtde('output_int_register_36', optional=True)] = 0
+    #: Counts of the pulses that our robot program has given; see the module ``registers``.
+    pulse_counts: Annotated[int, Rtde('output_int_register_37', optional=True)] = 0
     #: Feed override of the robot program's splines, 0 to 1; by how much it has delayed them since
     #: our robot program connected [s].
     feed_override: Annotated[

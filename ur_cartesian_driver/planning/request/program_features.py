@@ -100,6 +100,11 @@ FEATURES = (
         'leave it empty, or let the driver send its own robot program',
     ),
     Feature(
+        'pulses',
+        'is not empty, but robot programs of {dialect} give none',
+        'leave it empty, or let the driver send its own robot program',
+    ),
+    Feature(
         _safe_outputs,
         'is not empty, but robot programs of {dialect} do not know it',
         'leave it empty (the parameter too), or let the driver send its own robot program',

@@ -42,6 +42,9 @@ pose although its word 16 is 1, and its words 0 - 4 are gain [1/(m/s)], offset, 
 and the time constant of the filter [s]. A record of the output kind 6 gives the lead of the next
 output, likewise: words 0 - 11 are the planned speeds from its place back to its trigger pose, word
 13 is the lead [s], 15 the way between the two [m or rad], and 17 is 1 if the tool only turns.
+Likewise a record of the output kind 7 gives the law of the pulses that begin with the next record
+of kind 8: words 0 - 6 are the distance between pulses [mm], the way to the first one [m], their
+width [s], their number in millions, the slot of their count, and kind and pin of the output.
 
 The stops, which only our own program knows, are motions during which the arm stands still.
 WAIT waits: word 18 is the time from the end of the previous motion until the next one may begin.
@@ -102,6 +105,7 @@ from ur_cartesian_driver.motion.plan.primitive import (
     OutputRecord,
     PressLaw,
     Primitive,
+    PulseLaw,
     SpeedLaw,
     Spline,
     Stop,
@@ -171,11 +175,13 @@ class SplineKind(IntEnum):
 
 
 class FollowKind(IntEnum):
-    """Word 12 of a SWITCH_OUTPUT that follows the speed, or has a law; else an OutputKind."""
+    """Word 12 of a SWITCH_OUTPUT that has a law, or begins by one; else an OutputKind."""
 
     LAW = 4
     BEGIN = 5
     LEAD = 6
+    PULSE_LAW = 7
+    PULSES = 8
 
 
 class PointField(IntEnum):
@@ -319,6 +325,8 @@ def to_fields(primitive: Instruction) -> PointFields:
         return _law_fields(primitive)
     if isinstance(primitive, LeadLaw):
         return _lead_fields(primitive)
+    if isinstance(primitive, PulseLaw):
+        return _pulse_fields(primitive)
     if isinstance(primitive, Spline):
         return _spline_fields(primitive)
     if isinstance(primitive, Stop):
@@ -389,7 +397,7 @@ def _output_fields(output: SwitchOutput) -> PointFields:
     return (
         *(_numbers(trigger_pose) if trigger_pose else ZERO6),
         *output.trigger_direction,
-        FollowKind.BEGIN if output.follows_speed else output.output,
+        _output_kind(output),
         output.pin,
         output.value,
         output.domain,
@@ -399,6 +407,12 @@ def _output_fields(output: SwitchOutput) -> PointFields:
         0,
         MotionType.SWITCH_OUTPUT,
     )
+
+
+def _output_kind(output: SwitchOutput) -> int:
+    if output.begins_pulses:
+        return FollowKind.PULSES
+    return FollowKind.BEGIN if output.follows_speed else output.output
 
 
 def _law_fields(law: SpeedLaw) -> PointFields:
@@ -411,6 +425,12 @@ def _law_fields(law: SpeedLaw) -> PointFields:
 def _lead_fields(law: LeadLaw) -> PointFields:
     switch = (FollowKind.LEAD, law.lead, 1, law.distance, 1, law.turns)
     return (*law.speeds, *switch, 0, 0, MotionType.SWITCH_OUTPUT)
+
+
+def _pulse_fields(law: PulseLaw) -> PointFields:
+    numbers = (1e3 * law.distance, law.phase, law.width, 1e-6 * law.count)
+    output, switch = (law.slot, law.output, law.pin), (FollowKind.PULSE_LAW, 0, 1, 0, 1, 0)
+    return (*numbers, *output, *(0.0,) * 5, *switch, 0, 0, MotionType.SWITCH_OUTPUT)
 
 
 def _stop_fields(stop: Stop) -> PointFields:
@@ -522,11 +542,25 @@ def _output(fields: Sequence[float]) -> OutputRecord:
             speeds=tuple(fields[: LEAD_PIECES + 1]),
             turns=bool(fields[17]),
         )
-    follows_speed = fields[12] == FollowKind.BEGIN
+    if fields[12] == FollowKind.PULSE_LAW:
+        return PulseLaw(
+            distance=1e-3 * fields[0],
+            phase=fields[1],
+            width=fields[2],
+            count=round(1e6 * fields[3]),
+            slot=round(fields[4]),
+            output=_enum_member(OutputKind, fields[5], 'kind of output (word 5)'),
+            pin=round(fields[6]),
+        )
+    follows_speed, begins_pulses = (
+        fields[12] == kind for kind in (FollowKind.BEGIN, FollowKind.PULSES)
+    )
     trigger_pose = Pose.from_rotation_vector(vector6(fields[:6])) if fields[16] else None
     return SwitchOutput(
         output=OutputKind.STANDARD_ANALOG
         if follows_speed
+        else OutputKind.STANDARD_DIGITAL
+        if begins_pulses
         else _enum_member(OutputKind, fields[12], 'kind of output (word 12)'),
         pin=int(fields[13]),
         value=fields[14],
@@ -536,6 +570,7 @@ def _output(fields: Sequence[float]) -> OutputRecord:
         starts_beyond=bool(fields[17]),
         delay=fields[18],
         follows_speed=follows_speed,
+        begins_pulses=begins_pulses,
     )
 
 

@@ -37,6 +37,7 @@ from the program   int         33         random number, drawn when the program 
 from the program   int         34         count of connections, changes with each connection
 from the program   int         35         token of the last SET_SAFE_OUTPUTS that was carried out
 from the program   int         36         motion version of movej and movel; 0 = unknown
+from the program   int         37         pulses given, see :data:`PULSE_COUNTS`
 =================  ==========  =========  ====================================================
 
 The program's ints from 26 up are ours; a program that follows the guide lacks them. The counts in
@@ -91,6 +92,7 @@ class OutputInteger(IntEnum):
     PROGRAM_RUN = 34
     SAFE_OUTPUTS_TOKEN = 35
     MOTION_VERSION = 36
+    PULSES = 37
 
 
 class OutputDouble(IntEnum):
@@ -161,7 +163,10 @@ class ExternalError(IntEnum):
 
 
 #: Incremented when the robot program gains a feature that the driver relies on.
-PROGRAM_VERSION = 4
+PROGRAM_VERSION = 5
+#: The register of pulses has four counts, each less than this: the count of slot i is multiplied
+#: by the i-th power of this. Counts wrap around, and go on from one goal to the next.
+PULSE_COUNTS = 128
 
 Register: TypeAlias = (
     InputInteger

@@ -63,6 +63,8 @@ from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, DIALECTS
 MAX_PENDING_OUTPUTS = 64
 #: Number of outputs that may have passed their trigger poses and wait for their leads.
 MAX_LEADS = 8
+#: Number of outputs that may give pulses in one goal.
+MAX_PULSE_TRAINS = 4
 POINT_FIELDS = 21
 POINT_SIZE = 4 * POINT_FIELDS
 

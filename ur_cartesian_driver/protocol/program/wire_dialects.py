@@ -46,7 +46,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import TypeVar
 
 import numpy as np
@@ -198,22 +197,20 @@ class Dialect:
 
 
 #: All dialects by name, oldest first.
-DIALECTS: Mapping[str, Dialect] = MappingProxyType(
-    {
-        dialect.name: dialect
-        for dialect in (
-            Dialect(name='2.0', time_scale=1000, motion_types=_FIRST_TYPES),
-            Dialect(name='2.10', motion_types=_FIRST_TYPES | _OPTIMOVES),
-            Dialect(name='2.12', motion_types=_LIBRARY_TYPES, supports_q_near=True),
-            Dialect(
-                name='2.14',
-                motion_types=frozenset(MotionType),
-                supports_q_near=True,
-                supports_append=True,
-                is_own=True,
-            ),
-        )
-    }
-)
+DIALECTS: Mapping[str, Dialect] = {
+    dialect.name: dialect
+    for dialect in (
+        Dialect(name='2.0', time_scale=1000, motion_types=_FIRST_TYPES),
+        Dialect(name='2.10', motion_types=_FIRST_TYPES | _OPTIMOVES),
+        Dialect(name='2.12', motion_types=_LIBRARY_TYPES, supports_q_near=True),
+        Dialect(
+            name='2.14',
+            motion_types=frozenset(MotionType),
+            supports_q_near=True,
+            supports_append=True,
+            is_own=True,
+        ),
+    )
+}
 #: The dialect of this package's robot program.
 NEWEST_DIALECT = DIALECTS['2.14']

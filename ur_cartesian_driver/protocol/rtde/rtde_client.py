@@ -149,7 +149,7 @@ class DataReceived:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UnexpectedPackage:
-    """A package that was not requested; harmless, but worth a line in a log."""
+    """A package that was not requested; harmless."""
 
     package: RtdeReply
 
@@ -338,7 +338,7 @@ class RtdeClientCodec:
         if self._frequency > limit:
             raise LocalProtocolError(
                 f'The robot, software {reply}, streams at {limit:g} Hz at most, but '
-                f'{self._frequency:g} Hz were requested.'
+                f'{self._frequency:g} Hz were requested; request {limit:g} Hz, or 0 for the most.'
             )
         self._frequency = self._frequency or limit
         return self._request_outputs()

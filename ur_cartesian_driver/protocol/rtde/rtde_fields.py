@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import Enum
 import re
-from types import MappingProxyType
 
 
 class DataType(Enum):
@@ -75,31 +74,28 @@ def _table(names: Mapping[DataType, str]) -> dict[str, DataType]:
 
 
 #: Fields that a client may write.
-INPUT_TYPES: Mapping[str, DataType] = MappingProxyType(
-    {
-        **_table(
-            {
-                DataType.UINT32: 'speed_slider_mask',
-                DataType.DOUBLE: (
-                    'speed_slider_fraction standard_analog_output_0 standard_analog_output_1'
-                ),
-                DataType.UINT8: """
+INPUT_TYPES: Mapping[str, DataType] = {
+    **_table(
+        {
+            DataType.UINT32: 'speed_slider_mask',
+            DataType.DOUBLE: (
+                'speed_slider_fraction standard_analog_output_0 standard_analog_output_1'
+            ),
+            DataType.UINT8: """
             standard_digital_output_mask standard_digital_output configurable_digital_output_mask
             configurable_digital_output tool_digital_output_mask tool_digital_output
             standard_analog_output_mask standard_analog_output_type""",
-                DataType.VECTOR6D: 'external_force_torque',
-            }
-        ),
-        **_registers('input'),
-    }
-)
+            DataType.VECTOR6D: 'external_force_torque',
+        }
+    ),
+    **_registers('input'),
+}
 
 #: Fields that a client may read; the input registers can be read back.
-OUTPUT_TYPES: Mapping[str, DataType] = MappingProxyType(
-    {
-        **_table(
-            {
-                DataType.DOUBLE: """
+OUTPUT_TYPES: Mapping[str, DataType] = {
+    **_table(
+        {
+            DataType.DOUBLE: """
             timestamp actual_execution_time target_execution_time speed_scaling
             target_speed_fraction actual_momentum actual_main_voltage actual_robot_voltage
             actual_robot_current standard_analog_input0 standard_analog_input1
@@ -108,34 +104,33 @@ OUTPUT_TYPES: Mapping[str, DataType] = MappingProxyType(
             euromap67_24V_voltage euromap67_24V_current tool_analog_input0 tool_analog_input1
             tool_output_current tool_temperature tcp_force_scalar joint_position_deviation_ratio
             collision_detection_ratio payload""",
-                DataType.VECTOR6D: """
+            DataType.VECTOR6D: """
             target_q target_qd target_qdd target_current target_moment actual_q actual_qd
             actual_current actual_current_window actual_current_as_torque joint_control_output
             actual_TCP_pose actual_TCP_speed actual_TCP_force target_TCP_pose target_TCP_speed
             tcp_offset actual_TCP_acceleration target_TCP_acceleration joint_temperatures
             actual_joint_voltage ft_raw_wrench wrench_calc_from_currents payload_inertia
             target_base_acceleration target_base_wrench""",
-                DataType.VECTOR3D: """
+            DataType.VECTOR3D: """
             actual_tool_accelerometer elbow_position elbow_velocity payload_cog target_gravity""",
-                DataType.VECTOR6INT32: 'joint_mode',
-                DataType.UINT64: """
+            DataType.VECTOR6INT32: 'joint_mode',
+            DataType.UINT64: """
             actual_digital_input_bits actual_configurable_digital_input_bits
             actual_digital_output_bits actual_configurable_digital_output_bits control_step""",
-                DataType.INT32: """
+            DataType.INT32: """
             robot_mode safety_mode safety_status encoder0_raw encoder1_raw tool_output_voltage
             time_scale_source""",
-                DataType.UINT32: """
+            DataType.UINT32: """
             runtime_state robot_status_bits safety_status_bits analog_io_types
             euromap67_input_bits euromap67_output_bits tool_mode tool_analog_input_types
             script_control_line""",
-                DataType.UINT8: """
+            DataType.UINT8: """
             tool_output_mode tool_digital_output0_mode tool_digital_output1_mode""",
-            }
-        ),
-        **_registers('input'),
-        **_registers('output'),
-    }
-)
+        }
+    ),
+    **_registers('input'),
+    **_registers('output'),
+}
 
 #: The fields whose introduction the manufacturer's guide dates: the first software version that
 #: has them on CB3 (None = no version), the same on e-Series, and the pattern of their names. Of

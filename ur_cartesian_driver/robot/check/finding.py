@@ -58,9 +58,10 @@ def note(check: str, text: str, **data: Any) -> Finding:
     return Finding(check=check, verdict=Verdict.NOTE, text=text, data=data)
 
 
-def problem(check: str, clause: str) -> Finding:
+def problem(check: str, clause: str, **data: Any) -> Finding:
     """Return a finding that keeps the driver from working; a full stop is added to the clause."""
-    return Finding(check=check, verdict=Verdict.PROBLEM, text=f'{clause.rstrip(".")}.')
+    text = f'{clause.rstrip(".")}.'
+    return Finding(check=check, verdict=Verdict.PROBLEM, text=text, data=data)
 
 
 def skipped(check: str, reason: str) -> Finding:

@@ -143,9 +143,10 @@ async def observe_primary(
         assert configuration is not None
         if version is not None:
             models = model_names(configuration.robot_type, version.major)
-            yield _model(models)
+            yield _model(models, configuration.robot_type)
             yield _limits(configuration)
-            yield _calibration(models[0], await probe.find_geometry(), state)
+            if models:
+                yield _calibration(models[0], await probe.find_geometry(), state)
         rights = await _rights(probe)
         yield rights
         if version is not None:
@@ -154,9 +155,11 @@ async def observe_primary(
         await probe.close()
 
 
-def _model(models: list[str]) -> Finding:
-    if models[0].startswith('robot'):
-        return problem('model', f'It is a {models[0]}')
+def _model(models: list[str], robot_type: int) -> Finding:
+    if not models:
+        return problem(
+            'model', f'It reports the type {robot_type}, which this driver does not know'
+        )
     return ok('model', f'It is a {" or ".join(models)}: set ur_type to that.', models=list(models))
 
 
@@ -184,15 +187,11 @@ def _calibration(model: str, geometry: DhTable | None, state: Mapping[str, Any])
     """Compare the reported pose with the computed one, as the driver does before goals."""
     if geometry is None or 'actual_q' not in state:
         return skipped('calibration', 'The robot did not report its calibration')
-    try:
-        nominal = Arm(robot_model(model))
-    except ValueError as error:
-        return skipped('calibration', str(error).rstrip('.'))
     arm = Arm(robot_model(model), geometry)
     T_flange_tcp = Pose.from_rotation_vector(state['tcp_offset'])
     reported = Pose.from_rotation_vector(state['actual_TCP_pose'])
     pose_error = 1e3 * (arm.forward(state['actual_q']) @ T_flange_tcp).distance_to(reported)
-    difference = 1e3 * arm.max_flange_distance(nominal)
+    difference = 1e3 * arm.max_flange_distance(Arm(robot_model(model)))
     text = (
         f'The calibration moves the flange by up to {difference:.2f} mm, and the reported pose is '
         f'{pose_error:.3f} mm from that of the calibrated kinematics.'

@@ -21,7 +21,6 @@ from ur_cartesian_driver.robot.check.finding import (
     problem,
     RobotAddress,
     skipped,
-    Verdict,
 )
 from ur_cartesian_driver.robot.check.rtde_recorder import RtdeRecorder
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
@@ -66,8 +65,9 @@ def _software(version: ControllerVersion) -> Finding:
     needed = MIN_VERSIONS.get(version.major)
     data = {'version': str(version)}
     if needed is not None and number < needed:
-        text = f'The software is {version}; the robot program needs {".".join(map(str, needed))}.'
-        return Finding(check='software', verdict=Verdict.PROBLEM, text=text, data=data)
+        oldest = '.'.join(map(str, needed))
+        text = f'The software is {version}; the robot program needs {oldest}'
+        return problem('software', text, **data)
     return ok('software', f'The software is {version}.', **data)
 
 
@@ -75,12 +75,8 @@ def _outputs(recorder: RtdeRecorder) -> Finding:
     missing = recorder.missing
     data = {'missing': list(missing)}
     if needed := [name for name in missing if name in REQUIRED_FIELDS]:
-        return Finding(
-            check='rtde_outputs',
-            verdict=Verdict.PROBLEM,
-            text=f'The robot lacks RTDE outputs that the driver needs: {", ".join(needed)}.',
-            data=data,
-        )
+        text = f'The robot lacks RTDE outputs that the driver needs: {", ".join(needed)}'
+        return problem('rtde_outputs', text, **data)
     if missing:
         return note(
             'rtde_outputs', f'The robot lacks the optional outputs {", ".join(missing)}.', **data

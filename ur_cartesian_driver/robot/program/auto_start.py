@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The first start of the robot program: when the arm is ready, and no other program runs.
+Starts the robot program once, on the first connection: when the arm is ready and no program runs.
 
 Later the driver starts nothing by itself: a person who has switched the robot on, or has stopped
 it, decides when the program may run.
@@ -13,12 +13,14 @@ import asyncio
 from collections.abc import Callable
 
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RobotState, RobotStatus
-from ur_cartesian_driver.robot.connection_status import ConnectionStatus, has_ended
+from ur_cartesian_driver.robot.connection_status import (
+    ConnectionStatus,
+    has_ended,
+    UNPOWERED_MODES,
+)
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 
-#: Modes of an arm that can be switched on.
-_UNPOWERED_MODES = frozenset({RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE})
 #: How long the arm may take to be switched on [s].
 POWER_UP_TIMEOUT = 30.0
 
@@ -78,7 +80,7 @@ class ProgramAutoStart:
         s = self._settings
         if (
             not (s.auto_power and s.headless_mode)
-            or robot.robot_mode not in _UNPOWERED_MODES
+            or robot.robot_mode not in UNPOWERED_MODES
             or status.state is ConnectionState.STOPPED
         ):
             return False

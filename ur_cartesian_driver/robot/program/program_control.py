@@ -19,7 +19,7 @@ from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.link_status import LinkStatus, OUT_OF_REACH
 from ur_cartesian_driver.robot.primary_client import PrimaryClient
 from ur_cartesian_driver.robot.program.auto_start import ProgramAutoStart
-from ur_cartesian_driver.robot.program.program_sockets import HAS_OLDER_PROGRAM, ProgramSockets
+from ur_cartesian_driver.robot.program.program_sockets import ProgramSockets
 from ur_cartesian_driver.robot.program.program_tracker import ProgramTracker
 from ur_cartesian_driver.robot.program.tcp_setter import TemporaryTcpSetter
 
@@ -136,7 +136,7 @@ class ProgramControl:
                 "another program runs on the robot, possibly another driver's; let it end, or "
                 'stop it'
             )
-        return '' if self._sockets.text else HAS_OLDER_PROGRAM
+        return self._sockets.missing_program
 
     def stop(self, reason: str) -> None:
         """End the robot program, so that its motion cannot resume."""

@@ -36,8 +36,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.transport import TcpConnection, TcpListener
 
-#: Why the driver has no program for the robot.
-HAS_OLDER_PROGRAM = 'wire_dialect says that the robot has an older one; play that on the pendant'
+_HAS_OLDER_PROGRAM = 'wire_dialect is set to an older program; play that one on the pendant'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,8 +130,19 @@ class ProgramSockets:
                 port.close()
             self._host = host
         for port in (*self._program_ports, self._sender):
-            if not port.is_open:
+            if port.is_open:
+                port.allow(allowed)
+            else:
                 await port.open(host, getattr(self._settings, port.name), allowed)
+
+    @property
+    def missing_program(self) -> str:
+        """Why the driver has no program for the robot, as a clause; '' = it has one."""
+        if self.text:
+            return ''
+        if not self._settings.runs_own_program:
+            return _HAS_OLDER_PROGRAM
+        return 'it cannot be made from the settings; the status of the driver says why'
 
     def render(self, host: str, version: ControllerVersion) -> None:
         """
@@ -305,8 +315,7 @@ class ProgramSockets:
             return
         if not self.text:
             self._sender.warn_limited(
-                'the robot requests a robot program, but wire_dialect says that it has an older '
-                'one; remove wire_dialect to run the program of this driver'
+                f'the robot requests a robot program, but there is none: {self.missing_program}'
             )
             return
         for _ in range(wanted):

@@ -55,13 +55,15 @@ class TemporaryTcpSetter:
         Otherwise a secondary program does, if we may send programs and no foreign program runs. If
         we may not send programs, the robot program sets the TCP, rounded as on the wire.
 
-        :param is_wanted: returns whether the secondary program may be sent again, if the
-            connection was read-only.
+        :param is_wanted: returns whether the TCP still has to be restored and no foreign program
+            runs; asked again if the first connection was read-only.
         """
         listens = self._program.connected and not is_paused(robot)
         if listens and (self._program_remembers or not self._headless_mode):
             self._send(T_flange_tcp, TcpPersistence.RESTORE)
-        elif self._headless_mode and (listens or robot.runtime_state not in _RUNNING_STATES):
+        elif self._headless_mode and (
+            listens or (robot.runtime_state not in _RUNNING_STATES and is_wanted())
+        ):
             program = tcp_program(T_flange_tcp.rotation_vector())
             self._primary.send(primary.encode_program(program), is_wanted)
 

@@ -15,7 +15,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_client import (
     RtdeClientCodec,
     RtdeEvent,
 )
-from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion, RtdeTextMessage
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe, RtdeValue, RtdeValues
 from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
@@ -23,6 +23,12 @@ from ur_cartesian_driver.robot.transport import dial, TcpConnection
 ANSWER_TIMEOUT = 2.0
 #: Silence of the stream after which the robot is lost [s].
 SILENCE_TIMEOUT = 1.0
+#: Level of text messages up to which they are warnings or errors.
+WARNING_LEVEL = 2
+
+
+def ignore(_: str) -> None:
+    """Do nothing with a text."""
 
 
 class RtdeConnection:
@@ -34,6 +40,7 @@ class RtdeConnection:
         on_values: Callable[[Sequence[str], RtdeValues], None],
         *,
         silence: float = SILENCE_TIMEOUT,
+        on_text: Callable[[str], None] = ignore,
     ) -> None:
         """
         Prepare a connection.
@@ -42,10 +49,11 @@ class RtdeConnection:
         :param on_values: called for each packet with the names and values of its fields, possibly
             before :meth:`open` returns.
         :param silence: the longest pause between two packets [s]; after that the robot is lost.
+        :param on_text: called with each warning and error that the controller sends.
         """
         self._client = client
         self._on_values = on_values
-        self._silence = silence
+        self._silence, self._on_text = silence, on_text
         self._names: tuple[str, ...] = ()
         self._inputs: tuple[Recipe, ...] = ()
         self._last_packet = self._last_request = 0.0
@@ -137,6 +145,8 @@ class RtdeConnection:
             self._names, self._inputs = event.outputs.names, event.inputs
             self._version = event.controller_version
             self._answered.set()
+        elif isinstance(event, RtdeTextMessage) and event.level <= WARNING_LEVEL:
+            self._on_text(event.text)
 
     def _take_values(self, values: RtdeValues) -> None:
         self._on_values(self._names, values)  # first: it may make the driver send a CANCEL

@@ -13,7 +13,7 @@ from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.state_age import STALE_TIMEOUT, StateAge
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
-from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
+from ur_cartesian_driver.robot.rtde.rtde_connection import ignore, RtdeConnection
 from ur_cartesian_driver.robot.rtde.state_decoding import (
     in_recipe_order,
     OPTIONAL_FIELDS,
@@ -32,6 +32,7 @@ class StateStream(RtdeConnection):
         on_state: Callable[[RobotState], None],
         *,
         lower_registers: bool = False,
+        on_text: Callable[[str], None] = ignore,
     ) -> None:
         """
         Prepare a stream.
@@ -40,6 +41,7 @@ class StateStream(RtdeConnection):
         :param max_age: the connection ends when its states stay older than this [s]; 0 = never.
         :param on_state: called for each packet, possibly before :meth:`open` returns.
         :param lower_registers: whether the robot program reports in the registers from 0 on.
+        :param on_text: as for the connection.
         """
         super().__init__(
             RtdeClientCodec(
@@ -49,6 +51,7 @@ class StateStream(RtdeConnection):
                 lower_registers=lower_registers,
             ),
             self._on_row,
+            on_text=on_text,
         )
         self._on_state = on_state
         self._effective_speed = EffectiveSpeed()

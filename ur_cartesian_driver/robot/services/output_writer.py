@@ -13,10 +13,12 @@ import asyncio
 from collections.abc import Iterable
 from dataclasses import replace
 from math import isclose
+from typing import Any
 
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.events import OutputsSecured
 from ur_cartesian_driver.motion.goal.goal import SafeOutput
+from ur_cartesian_driver.motion.goal.output_names import output_name
 from ur_cartesian_driver.robot.services.rtde_input_writer import (
     joint_write,
     value_before,
@@ -29,19 +31,29 @@ from ur_cartesian_driver.robot.services.service_calls import SetOutputCall
 WRITE_TIMEOUT, RETRY_PERIOD = 0.25, 0.02
 
 
-async def write_outputs(host: str, port: int, outputs: Iterable[SafeOutput]) -> OutputsSecured:
-    """Write the values of outputs; return the outputs that have changed, and the failures."""
+async def write_outputs(
+    host: str, port: int, outputs: Iterable[SafeOutput], before: dict[str, Any]
+) -> OutputsSecured:
+    """
+    Write the values of outputs; return the outputs that have changed, and the failures.
+
+    :param before: the outputs before the first attempt, kept for the next one; empty at first.
+    """
     by_kind: dict[int, list[SafeOutput]] = {}
     for output in outputs:
         by_kind.setdefault(output.output, []).append(output)
-    results = await asyncio.gather(*(_write(host, port, group) for group in by_kind.values()))
+    results = await asyncio.gather(
+        *(_write(host, port, group, before) for group in by_kind.values())
+    )
     return OutputsSecured(
         changed=tuple(output for changed, _ in results for output in changed),
         failure=' '.join(failure for _, failure in results if failure),
     )
 
 
-async def _write(host: str, port: int, outputs: list[SafeOutput]) -> tuple[list[SafeOutput], str]:
+async def _write(
+    host: str, port: int, outputs: list[SafeOutput], before: dict[str, Any]
+) -> tuple[list[SafeOutput], str]:
     """Write outputs of one kind; return the changed ones with their old values, or a failure."""
     calls = [
         SetOutputCall(kind=o.output, pin=o.pin, value=o.value, domain=o.domain) for o in outputs
@@ -51,7 +63,7 @@ async def _write(host: str, port: int, outputs: list[SafeOutput]) -> tuple[list[
         async with asyncio.timeout(WRITE_TIMEOUT):
             while True:
                 try:
-                    done, values = await write_and_compare(host, port, write)
+                    done = await write_and_compare(host, port, write, before)
                     break
                 except (OSError, DriverError) as error:
                     reason = str(error).rstrip('.')
@@ -59,16 +71,12 @@ async def _write(host: str, port: int, outputs: list[SafeOutput]) -> tuple[list[
     except TimeoutError:
         done = False
     if not done:
-        names = ' and '.join(f'{_name(output)} output {output.pin}' for output in outputs)
+        names = ' and '.join(output_name(output.output, output.pin) for output in outputs)
         verb = 'is as it was' if len(outputs) == 1 else 'are as they were'
         return [], f'The {names} {verb}, or not known to be safe: {reason}.'
-    before = [value_before(call, values) for call in calls]
+    old_calls = [value_before(call, before) for call in calls]
     return [
         replace(output, value=old.value, domain=old.domain)
-        for output, call, old in zip(outputs, calls, before, strict=True)
+        for output, call, old in zip(outputs, calls, old_calls, strict=True)
         if old.domain is not call.domain or not isclose(old.value, call.value, abs_tol=0.02)
     ], ''
-
-
-def _name(output: SafeOutput) -> str:
-    return output.output.name.lower().replace('_', ' ')

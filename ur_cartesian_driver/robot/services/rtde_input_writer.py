@@ -133,24 +133,25 @@ async def write_inputs(host: str, port: int, input_write: InputWrite) -> bool:
 
     :raises OSError: there is no connection, or another client holds the inputs.
     """
-    return (await write_and_compare(host, port, input_write))[0]
+    return await write_and_compare(host, port, input_write, {})
 
 
 async def write_and_compare(
-    host: str, port: int, input_write: InputWrite
-) -> tuple[bool, Mapping[str, Any]]:
+    host: str, port: int, input_write: InputWrite, before: dict[str, Any]
+) -> bool:
     """
-    Write inputs; return whether the robot reported the effect, and the outputs before the write.
+    Write inputs, and return whether the robot reported the effect.
 
+    :param before: gets the outputs as they were before the write, unless it has them from an
+        earlier attempt, which may have had an effect.
     :raises OSError: there is no connection, or another client holds the inputs.
     """
     reported, done = asyncio.Event(), asyncio.Event()
-    before: dict[str, Any] = {}
 
     def check(names: Sequence[str], values: RtdeValues) -> None:
         now = dict(zip(names, values, strict=True))
         if not reported.is_set():
-            before.update(now)
+            before.update({name: now[name] for name in now if name not in before})
             reported.set()
         if input_write.done(now):
             done.set()
@@ -166,7 +167,7 @@ async def write_and_compare(
             connection.write(input_write.inputs)
             await done.wait()
     except TimeoutError:
-        return False, before
+        return False
     finally:
         connection.close()
-    return True, before
+    return True

@@ -18,16 +18,9 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector3
 from ur_cartesian_driver.motion.goal.declared_types import declare_types, WrongType
 from ur_cartesian_driver.motion.goal.goal import OutputKind
 from ur_cartesian_driver.motion.goal.inertia import inertia_problem, MAX_TRANSITION_TIME
+from ur_cartesian_driver.motion.goal.output_names import OUTPUTS
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol.dashboard import DashboardRequest
-
-#: Number of outputs of each kind.
-PINS = {
-    OutputKind.STANDARD_DIGITAL: 8,
-    OutputKind.CONFIGURABLE_DIGITAL: 8,
-    OutputKind.TOOL_DIGITAL: 2,
-    OutputKind.STANDARD_ANALOG: 2,
-}
 
 #: How long a script may take: by default [s]; at most [s].
 SCRIPT_TIMEOUT, MAX_SCRIPT_TIMEOUT = 30.0, 600.0
@@ -59,28 +52,42 @@ class ServiceAnswer:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DashboardCall:
+class _CheckedCall:
+    """A call whose fields get their declared types and are checked."""
+
+    def __post_init__(self) -> None:
+        """Check all fields."""
+        try:
+            declare_types(self)
+        except WrongType as error:
+            raise LocalProtocolError(f'{type(self).__name__}.{error}') from None
+        self._check()
+
+    def _check(self) -> None:
+        """Refuse values that cannot be sent."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DashboardCall(_CheckedCall):
     """Send a command to the dashboard, and wait until the robot has carried it out."""
 
     command: str
     argument: str = ''
 
-    def __post_init__(self) -> None:
+    def _check(self) -> None:
         """Check that the command exists and fits into a line."""
-        _declare_types(self)
         DashboardRequest(name=self.command, argument=self.argument)
         _check_length(self.argument)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DashboardLineCall:
+class DashboardLineCall(_CheckedCall):
     """Send any line to the dashboard, and return its answer."""
 
     line: str
 
-    def __post_init__(self) -> None:
+    def _check(self) -> None:
         """Check that the text is one line."""
-        _declare_types(self)
         if not self.line.strip() or '\n' in self.line or '\r' in self.line:
             raise LocalProtocolError(
                 f'A request to the dashboard is one line of text, not {self.line!r:.100}.'
@@ -94,7 +101,7 @@ class ListProgramsCall:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class UploadProgramCall:
+class UploadProgramCall(_CheckedCall):
     """
     Send a program to the robot; PolyScope X only.
 
@@ -105,9 +112,8 @@ class UploadProgramCall:
     program: str
     replaces: bool = False
 
-    def __post_init__(self) -> None:
+    def _check(self) -> None:
         """Check the length of the program."""
-        _declare_types(self)
         if not self.program.strip():
             raise LocalProtocolError('The program is empty; give the content of a .urpx file.')
         if len(self.program) > MAX_PROGRAM_LENGTH:
@@ -118,28 +124,26 @@ class UploadProgramCall:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DownloadProgramCall:
+class DownloadProgramCall(_CheckedCall):
     """Ask for a program of the robot, the content of a `.urpx` file; PolyScope X only."""
 
     program_name: str
 
-    def __post_init__(self) -> None:
+    def _check(self) -> None:
         """Check that there is a name."""
-        _declare_types(self)
         if not self.program_name.strip():
             raise LocalProtocolError('program_name is empty; ask for the list of programs.')
         _check_length(self.program_name)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetTcpCall:
+class SetTcpCall(_CheckedCall):
     """Set the active TCP, given in the flange frame."""
 
     T_flange_tcp: Pose
 
-    def __post_init__(self) -> None:
+    def _check(self) -> None:
         """Check that the TCP is a pose, in metres."""
-        _declare_types(self)
         position, quaternion = self.T_flange_tcp.position, self.T_flange_tcp.quaternion
         if not all(abs(value) <= MAX_TOOL_OFFSET for value in position):  # NaN fails, too
             raise LocalProtocolError(
@@ -154,7 +158,7 @@ class SetTcpCall:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetPayloadCall:
+class SetPayloadCall(_CheckedCall):
     """
     Set the payload.
 
@@ -170,9 +174,8 @@ class SetPayloadCall:
     inertia: tuple[float, ...] = ()
     transition_time: float = 0.0
 
-    def __post_init__(self) -> None:
+    def _check(self) -> None:
         """Check all values."""
-        _declare_types(self)
         if not 0.0 <= self.mass <= MAX_PAYLOAD_MASS or not all(
             abs(value) <= MAX_TOOL_OFFSET for value in self.cog
         ):  # NaN fails, too
@@ -197,14 +200,13 @@ class SetPayloadCall:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetGravityCall:
+class SetGravityCall(_CheckedCall):
     """Set the acceleration that opposes gravity, in base axes [m/s^2]."""
 
     gravity: Vector3
 
-    def __post_init__(self) -> None:
+    def _check(self) -> None:
         """Check the length."""
-        _declare_types(self)
         if not 0.0 < hypot(*self.gravity) <= MAX_GRAVITY:  # NaN fails, too
             raise LocalProtocolError(
                 f'gravity is {self.gravity} m/s^2; its length has to be more than 0 and at most '
@@ -218,7 +220,7 @@ class ZeroFtSensorCall:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetOutputCall:
+class SetOutputCall(_CheckedCall):
     """
     Set an output.
 
@@ -231,14 +233,14 @@ class SetOutputCall:
     value: float
     domain: AnalogDomain = AnalogDomain.CURRENT
 
-    def __post_init__(self) -> None:
+    def _check(self) -> None:
         """Check pin and value."""
-        _declare_types(self)
-        if self.kind not in PINS:
+        if self.kind not in OUTPUTS:
             raise LocalProtocolError(f'kind is {self.kind}, which is no OutputKind.')
-        if not 0 <= self.pin < PINS[self.kind]:
+        _, pins = OUTPUTS[self.kind]
+        if not 0 <= self.pin < pins:
             raise LocalProtocolError(
-                f'pin is {self.pin}, but {self.kind.name} has the pins 0 to {PINS[self.kind] - 1}.'
+                f'pin is {self.pin}, but {self.kind.name} has the pins 0 to {pins - 1}.'
             )
         if self.is_analog and not 0.0 <= self.value <= 1.0:
             raise LocalProtocolError(
@@ -255,14 +257,13 @@ class SetOutputCall:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetSpeedSliderCall:
+class SetSpeedSliderCall(_CheckedCall):
     """Move the speed slider to a fraction, 0 to 1."""
 
     fraction: float
 
-    def __post_init__(self) -> None:
+    def _check(self) -> None:
         """Check the range."""
-        _declare_types(self)
         if not 0.0 <= self.fraction <= 1.0:
             raise LocalProtocolError(
                 f'speed_slider_fraction is {self.fraction}, but the slider takes 0 (the arm '
@@ -291,7 +292,7 @@ class HandBackCall:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RunScriptCall:
+class RunScriptCall(_CheckedCall):
     """
     Run a script: a secondary program, or in headless mode a primary one.
 
@@ -301,9 +302,8 @@ class RunScriptCall:
     script: str
     timeout: float = SCRIPT_TIMEOUT
 
-    def __post_init__(self) -> None:
+    def _check(self) -> None:
         """Check the length of the script, and the time."""
-        _declare_types(self)
         if not self.script.strip():
             raise LocalProtocolError('The script is empty; give a def or sec of URScript.')
         if len(self.script) > MAX_SCRIPT_LENGTH:
@@ -319,15 +319,11 @@ class RunScriptCall:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RecoverCall:
+class RecoverCall(_CheckedCall):
     """Bring a stopped robot back to READY, as far as software is allowed to."""
 
     #: A person has looked for the cause of a protective stop, and allows unlocking it.
     unlock_protective_stop: bool = False
-
-    def __post_init__(self) -> None:
-        """Check the type."""
-        _declare_types(self)
 
 
 #: The calls that change what a goal was planned for.
@@ -342,13 +338,6 @@ def succeeded(text: str) -> ServiceAnswer:
 def failed(text: str) -> ServiceAnswer:
     """Return the answer of a call that failed, with the reason."""
     return ServiceAnswer(ok=False, text=text)
-
-
-def _declare_types(call: object) -> None:
-    try:
-        declare_types(call)
-    except WrongType as error:
-        raise LocalProtocolError(f'{type(call).__name__}.{error}') from None
 
 
 def _check_length(text: str) -> None:

@@ -13,7 +13,7 @@ contact lasts until it is ended.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from math import dist, isnan
 
 from ur_cartesian_driver.motion.errors import DriverError
@@ -28,6 +28,7 @@ from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.program.program_tracker import NEEDS_OWN_PROGRAM
 from ur_cartesian_driver.robot.services import rtde_input_writer
+from ur_cartesian_driver.robot.services import service_calls as calls
 from ur_cartesian_driver.robot.services.dashboard_connection import REPORT_TIMEOUTS
 from ur_cartesian_driver.robot.services.dashboard_service import (
     DashboardPorts,
@@ -38,28 +39,10 @@ from ur_cartesian_driver.robot.services.polling import wait_for_state
 from ur_cartesian_driver.robot.services.program_files import ProgramFiles
 from ur_cartesian_driver.robot.services.recovery import RecoveryRunner
 from ur_cartesian_driver.robot.services.service_calls import (
-    DashboardCall,
-    DashboardLineCall,
-    DownloadProgramCall,
-    EndContactWatchCall,
     failed,
-    HandBackCall,
-    ListProgramsCall,
-    RecoverCall,
-    RunScriptCall,
-    SendProgramCall,
     ServiceAnswer,
     ServiceCall,
-    SetGravityCall,
-    SetOutputCall,
-    SetPayloadCall,
-    SetSpeedSliderCall,
-    SetTcpCall,
-    SettingCall,
     succeeded,
-    UploadProgramCall,
-    WatchContactCall,
-    ZeroFtSensorCall,
 )
 
 #: Longest duration of a call [s].
@@ -137,12 +120,12 @@ class ServiceDispatcher:
 
     async def dispatch(self, call: ServiceCall) -> ServiceAnswer:
         """Carry out a call; errors become answers."""
-        if isinstance(call, WatchContactCall):
+        if isinstance(call, calls.WatchContactCall):
             return self._refusal(call) or await self._execute(call)
-        bound = RECOVERY_TIMEOUT if isinstance(call, RecoverCall) else CALL_TIMEOUT
-        if isinstance(call, RunScriptCall):
+        bound = RECOVERY_TIMEOUT if isinstance(call, calls.RecoverCall) else CALL_TIMEOUT
+        if isinstance(call, calls.RunScriptCall):
             bound += call.timeout
-        elif isinstance(call, DashboardCall):
+        elif isinstance(call, calls.DashboardCall):
             bound += REPORT_TIMEOUTS.get(call.command, 0.0)
         try:
             async with asyncio.timeout(bound):
@@ -152,44 +135,50 @@ class ServiceDispatcher:
         except (OSError, DriverError) as error:
             return failed(f'{str(error).rstrip(".")}.')
 
-    async def _refuse_script(self, call: RunScriptCall) -> ServiceAnswer:
+    async def _refuse_script(self, call: calls.RunScriptCall) -> ServiceAnswer:
         return failed('The parameter allow_scripts is false: no scripts of others are run.')
 
     async def _execute(self, call: ServiceCall) -> ServiceAnswer:
         match call:
-            case DashboardCall():
+            case calls.DashboardCall():
                 return await self._dashboard.request(call)
-            case DashboardLineCall():
+            case calls.DashboardLineCall():
                 return await self._dashboard.request_raw(call)
-            case ListProgramsCall() | UploadProgramCall() | DownloadProgramCall():
+            case (
+                calls.ListProgramsCall() | calls.UploadProgramCall() | calls.DownloadProgramCall()
+            ):
                 return await self._program_files.carry_out(call)
-            case SetTcpCall() | SetPayloadCall() | SetGravityCall():
-                return await self._set(call)
-            case ZeroFtSensorCall():
+            case calls.SetTcpCall():
+                return await self._set(self._set_tcp(call))
+            case calls.SetPayloadCall():
+                return await self._set(self._set_payload(call))
+            case calls.SetGravityCall():
+                return await self._set(self._set_gravity(call))
+            case calls.ZeroFtSensorCall():
                 return self._zero_ftsensor()
-            case SetOutputCall():
+            case calls.SetOutputCall():
                 return await self._write(
                     rtde_input_writer.output_write(call), 'The output is set.'
                 )
-            case SetSpeedSliderCall():
+            case calls.SetSpeedSliderCall():
                 return await self._write(
                     rtde_input_writer.speed_slider_write(call),
                     f'The speed slider is at {call.fraction:.0%}.',
                 )
-            case WatchContactCall():
+            case calls.WatchContactCall():
                 return await self._watch_contact()
-            case EndContactWatchCall():
+            case calls.EndContactWatchCall():
                 # A call that was made before this one may still wait for it, too.
                 await self._link.control.tracker.wait_for_identity()
                 self._link.contact_watch.end()
                 return succeeded('The watch for contact is being ended.')
-            case SendProgramCall():
+            case calls.SendProgramCall():
                 return await self._send_program()
-            case HandBackCall():
+            case calls.HandBackCall():
                 return await self._hand_back()
-            case RunScriptCall():
+            case calls.RunScriptCall():
                 return await self._run_script(call)
-            case RecoverCall(unlock_protective_stop=unlock):
+            case calls.RecoverCall(unlock_protective_stop=unlock):
                 return await self._recovery.run(
                     may_unlock=unlock or self._settings.unlock_protective_stops
                 )
@@ -197,19 +186,19 @@ class ServiceDispatcher:
     def _refusal(self, call: ServiceCall) -> ServiceAnswer | None:
         """Return the refusal of a call that is not allowed now; None = it is allowed."""
         status = self._link.status
-        if isinstance(call, ListProgramsCall | DownloadProgramCall) or (
-            isinstance(call, DashboardCall) and call.command in QUERY_COMMANDS
+        if isinstance(call, calls.ListProgramsCall | calls.DownloadProgramCall) or (
+            isinstance(call, calls.DashboardCall) and call.command in QUERY_COMMANDS
         ):
             return None
         if status.state is ConnectionState.REFUSED:
             return failed(status.message)
-        if isinstance(call, SetTcpCall) and self._link.control.tcp_restore_pending:
+        if isinstance(call, calls.SetTcpCall) and self._link.control.tcp_restore_pending:
             return failed(
                 'The TCP of the last goal is being restored; try again when the status is READY.'
             )
         if status.state is ConnectionState.EXECUTING and (
-            isinstance(call, SettingCall | SendProgramCall | HandBackCall)
-            or (isinstance(call, DashboardCall) and call.command in INTERFERING_COMMANDS)
+            isinstance(call, calls.SettingCall | calls.SendProgramCall | calls.HandBackCall)
+            or (isinstance(call, calls.DashboardCall) and call.command in INTERFERING_COMMANDS)
         ):
             return failed(
                 'A goal is running, and this would disturb it; wait for its end or cancel '
@@ -277,21 +266,15 @@ class ServiceDispatcher:
         x, y, z = link.robot.actual_tcp_pose.position
         return succeeded(f'The tool touched at x {x:.4f}, y {y:.4f}, z {z:.4f} m in base.')
 
-    async def _set(self, call: SettingCall) -> ServiceAnswer:
-        """Set TCP, payload or gravity; no goal starts meanwhile."""
+    async def _set(self, setting: Awaitable[ServiceAnswer]) -> ServiceAnswer:
+        """Carry out a change of TCP, payload or gravity; no goal starts meanwhile."""
         self._pending_settings += 1
         try:
-            match call:
-                case SetTcpCall():
-                    return await self._set_tcp(call)
-                case SetPayloadCall():
-                    return await self._set_payload(call)
-                case SetGravityCall():
-                    return await self._set_gravity(call)
+            return await setting
         finally:
             self._pending_settings -= 1
 
-    async def _set_tcp(self, call: SetTcpCall) -> ServiceAnswer:
+    async def _set_tcp(self, call: calls.SetTcpCall) -> ServiceAnswer:
         wanted = Pose(call.T_flange_tcp.position, normalize(call.T_flange_tcp.quaternion))
 
         def is_reported(robot: RobotState) -> bool:
@@ -314,7 +297,7 @@ class ServiceDispatcher:
             'on the pendant.'
         )
 
-    async def _set_payload(self, call: SetPayloadCall) -> ServiceAnswer:
+    async def _set_payload(self, call: calls.SetPayloadCall) -> ServiceAnswer:
         inertia = vector6(call.inertia or ZERO6)
         command: script_command.AnyScriptCommand
         if call.is_point_mass:
@@ -344,7 +327,7 @@ class ServiceDispatcher:
             'payload', command, lambda signals: signals.payload, is_reported, call.transition_time
         )
 
-    async def _set_gravity(self, call: SetGravityCall) -> ServiceAnswer:
+    async def _set_gravity(self, call: calls.SetGravityCall) -> ServiceAnswer:
         return await self._set_reported(
             'gravity',
             script_command.SetGravityCommand(gravity=call.gravity),

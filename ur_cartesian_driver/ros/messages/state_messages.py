@@ -24,7 +24,7 @@ from std_msgs.msg import Header
 from ur_cartesian_driver.driver import ConnectionStatus
 from ur_cartesian_driver.kinematics.link_shapes import LinkFrames
 from ur_cartesian_driver.kinematics.robot_description import LINK_NAMES
-from ur_cartesian_driver.motion.events import Progress
+from ur_cartesian_driver.motion.events import Progress, Pulse
 from ur_cartesian_driver.motion.geometry.pose import conjugate, Pose, pose_from_row, rotate
 from ur_cartesian_driver.motion.goal.known_frames import (
     BASE,
@@ -38,6 +38,7 @@ from ur_cartesian_driver.motion.state.io_signals import AnalogChannel, Signals
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RobotState, SafetyMode
 from ur_cartesian_driver.motion.state.servo_report import ServoReport
 from ur_cartesian_driver.msg import DriverStatus, IOStates, ServoState, ToolData
+from ur_cartesian_driver.msg import Pulse as PulseMessage
 from ur_cartesian_driver.msg import RobotMode as RobotModeMessage
 from ur_cartesian_driver.msg import SafetyMode as SafetyModeMessage
 from ur_cartesian_driver.ros.message_fields import (
@@ -223,6 +224,18 @@ def tool_data_message(signals: Signals, stamp: Time) -> ToolData:
         payload=signals.payload,
         payload_center_of_gravity=vector_message(signals.payload_cog),
         payload_inertia=signals.payload_inertia,
+    )
+
+
+def pulse_message(pulse: Pulse, base: str, stamp: Time) -> PulseMessage:
+    """Return a pulse; a pose that is not known is NaN."""
+    return PulseMessage(
+        header=Header(stamp=stamp, frame_id=base),
+        timestamp=pulse.timestamp,
+        output=int(pulse.output),
+        pin=pulse.pin,
+        number=pulse.number,
+        pose=pose_message(pose_from_row([nan] * 7) if pulse.pose is None else pulse.pose),
     )
 
 

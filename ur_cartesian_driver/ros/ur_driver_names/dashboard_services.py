@@ -301,7 +301,6 @@ def _services() -> Iterable[UrName]:
         # The driver dials for each request: this one shows that the robot answers.
         source='dashboard/program_running',
         source_type=Trigger,
-        call=same_request,
         words=lambda value: 'The robot answers.',
     )
     for name, (kind, command, fill) in _QUERIES.items():

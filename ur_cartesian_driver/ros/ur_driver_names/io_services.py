@@ -151,7 +151,6 @@ def _services() -> Iterable[UrName]:
             type='std_srvs/srv/Trigger',
             source=name,
             source_type=Trigger,
-            call=same_request,
         )
     for name, call in (('set_io', _set_io), ('set_analog_output', _set_analog_output)):
         yield Service(

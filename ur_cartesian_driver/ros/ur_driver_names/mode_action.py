@@ -9,7 +9,6 @@ Each goal has a thread, which waits for the driver's answers; the executor stays
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 import threading
 import traceback
@@ -26,7 +25,7 @@ from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionS
 from ur_cartesian_driver.ros.message_fields import Message
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode, DriverSilent
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
-from ur_cartesian_driver.ros.ur_driver_names.offered_name import UrName
+from ur_cartesian_driver.ros.ur_driver_names.offered_name import Served, UrName
 
 #: How long the arm may take to the target mode after the last command [s].
 MODE_TIMEOUT = 30.0
@@ -48,37 +47,19 @@ class _Ended(Exception):
     """A goal ends without success; the text says why."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SetModeAction(UrName):
-    """``ur_robot_state_helper/set_mode``."""
-
-    kind: str = 'action'
-    name: str = 'ur_robot_state_helper/set_mode'
-    type: str = 'ur_dashboard_msgs/action/SetMode'
-
-    @property
-    def served_by(self) -> str:
-        """The driver's services."""
-        return '`~/dashboard/*`, `~/resend_robot_program`'
-
-    def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
-        """Serve the action."""
-        return _ModeServer(self.name, driver, settings, kind)
-
-
 class _ModeServer:
     """Serves one goal at a time."""
 
     def __init__(
-        self, name: str, driver: DriverNode, settings: NamesSettings, action: Any
+        self, row: UrName, driver: DriverNode, settings: NamesSettings, action: Any
     ) -> None:
-        self._name, self._driver, self._settings, self._action = name, driver, settings, action
+        self._name, self._driver, self._settings, self._action = row.name, driver, settings, action
         self._run: ModeRun | None = None
         self._reported: tuple[int, int] | None = None
         self._server = DeferredActionServer(  # type: ignore[no-untyped-call]  # rclpy's
             driver.node,
             action,
-            name,
+            row.name,
             self._begin,
             callback_group=ReentrantCallbackGroup(),
             goal_callback=self._judge,
@@ -292,4 +273,10 @@ def _target(number: int) -> RobotMode:
     raise _Ended(f'target_robot_mode is {number}, but must be one of {allowed}.')
 
 
-MODE_ACTION = SetModeAction()
+MODE_ACTION = Served(
+    kind='action',
+    name='ur_robot_state_helper/set_mode',
+    type='ur_dashboard_msgs/action/SetMode',
+    source='dashboard/*, resend_robot_program',
+    server=_ModeServer,
+)

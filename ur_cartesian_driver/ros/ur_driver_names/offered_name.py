@@ -8,7 +8,6 @@ Types are texts, ``ur_msgs/srv/SetIO``: the packages of most of them are not on 
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
@@ -30,7 +29,7 @@ Call: TypeAlias = Callable[['Service', DriverNode, Message], Future[ServiceAnswe
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class UrName(ABC):
+class UrName:
     """One name of the UR ROS 2 driver."""
 
     #: topic, service or action.
@@ -39,6 +38,8 @@ class UrName(ABC):
     name: str
     #: Package, kind and name of the type.
     type: str
+    #: The driver's topics, services or actions that serve it, separated by commas; empty = none.
+    source: str = ''
     #: The only release that has it; empty = all have.
     release: str = ''
 
@@ -47,18 +48,18 @@ class UrName(ABC):
         return self.release in ('', release)
 
     @property
-    @abstractmethod
     def served_by(self) -> str:
         """The driver's interface behind the name, or ''."""
+        return ', '.join(f'`~/{name}`' for name in self.source.split(', ') if name)
 
-    @abstractmethod
     def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
         """
-        Start to serve.
+        Start to serve; by default there is nothing to do.
 
         :param kind: the class of the type.
         :returns: what the node has to keep, and to ``close()`` if it can be.
         """
+        return None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,15 +68,6 @@ class Absent(UrName):
 
     #: Why not, in a sentence.
     reason: str
-
-    @property
-    def served_by(self) -> str:
-        """Nothing serves it."""
-        return ''
-
-    def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
-        """Offer nothing."""
-        return None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,9 +81,17 @@ class ByDriver(UrName):
         """The driver."""
         return f'`{self.name}`'
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Served(UrName):
+    """A name with a server of its own."""
+
+    #: Starts to serve; takes the row, and then the arguments of :meth:`UrName.offer`.
+    server: Callable[[UrName, DriverNode, NamesSettings, Any], object]
+
     def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
-        """Offer nothing more."""
-        return None
+        """Start the server."""
+        return self.server(self, driver, settings, kind)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,8 +100,7 @@ class Topic(UrName):
 
     kind: str = 'topic'
 
-    #: The driver's topic, and the class of its messages.
-    source: str
+    #: The class of the messages of the driver's topic.
     source_type: Any
     #: Returns the message for one of the driver's; None = nothing is published.
     convert: Callable[[Any, Message, NamesSettings], Message | None]
@@ -109,11 +108,6 @@ class Topic(UrName):
     latched: bool = False
     #: The driver publishes on change, but subscribers of this name expect a stream.
     repeated: bool = False
-
-    @property
-    def served_by(self) -> str:
-        """The driver's topic."""
-        return f'`~/{self.source}`'
 
     def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
         """Publish what the driver publishes."""
@@ -167,29 +161,33 @@ class _Relay:
             self._publisher.publish(self._last)
 
 
+def same_request(
+    row: Service, driver: DriverNode, request: Message, timeout: float = ANSWER_TIMEOUT
+) -> Future[ServiceAnswer]:
+    """Call the driver's service with the values of the fields that both requests have."""
+    ours = row.source_type.Request()
+    for field in ours.get_fields_and_field_types().keys() & request.get_fields_and_field_types():
+        setattr(ours, field, getattr(request, field))
+    return driver.call(row.source_type, row.source, ours, timeout)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Service(UrName):
     """A service that calls one of the driver's, and responds when that has answered."""
 
     kind: str = 'service'
 
-    #: The driver's service and its class, or a topic of which the node keeps the last message,
-    #: and None.
-    source: str
+    #: The class of the driver's service; None = the source is a topic of which the node keeps the
+    #: last message.
     source_type: Any
     #: Starts the driver's call for a request; gets the row, too.
-    call: Call
+    call: Call = same_request
     #: Writes the text of an answer into the fields of the response.
     #:
     #: :raises ValueError: the text is not what the response can say.
     fill: Callable[[Message, str], None] = lambda response, text: None
     #: Returns what the response says for the text of a successful answer.
     words: Callable[[str], str] = str
-
-    @property
-    def served_by(self) -> str:
-        """The driver's service or topic."""
-        return f'`~/{self.source}`'
 
     def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
         """Respond with the driver's answers."""
@@ -223,13 +221,3 @@ class Service(UrName):
             if not ok:
                 driver.warn(f'{self.name}: {text}')
         return response
-
-
-def same_request(
-    row: Service, driver: DriverNode, request: Message, timeout: float = ANSWER_TIMEOUT
-) -> Future[ServiceAnswer]:
-    """Call the driver's service with the values of the fields that both requests have."""
-    ours = row.source_type.Request()
-    for field in ours.get_fields_and_field_types().keys() & request.get_fields_and_field_types():
-        setattr(ours, field, getattr(request, field))
-    return driver.call(row.source_type, row.source, ours, timeout)

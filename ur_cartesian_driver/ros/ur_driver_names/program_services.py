@@ -23,11 +23,7 @@ from ur_cartesian_driver.ros.services.deferred_service import DeferredService
 from ur_cartesian_driver.ros.ur_driver_names.dashboard_services import DASHBOARD
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
-from ur_cartesian_driver.ros.ur_driver_names.offered_name import (
-    same_request,
-    Service,
-    UrName,
-)
+from ur_cartesian_driver.ros.ur_driver_names.offered_name import Service, UrName
 from ur_cartesian_driver.srv import DownloadProgram, UploadProgram
 
 
@@ -59,19 +55,12 @@ class _FileService(UrName):
     """A service that moves a program between the robot and a file."""
 
     kind: str = 'service'
-    #: The driver's service.
-    source: str
     #: Starts the driver's call for a request and a directory; returns the future of its answer.
     #:
     #: :raises _Refused: the file may not be used.
     #: :raises OSError: the file cannot be read.
     #: :raises ValueError: the file is not UTF-8, or its name is invalid.
     start: Callable[[DriverNode, str, Message, str], Future[ServiceAnswer]]
-
-    @property
-    def served_by(self) -> str:
-        """The driver's service."""
-        return f'`~/{self.source}`'
 
     def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
         """Serve files of the directory of programs."""
@@ -138,7 +127,6 @@ PROGRAM_SERVICES: tuple[UrName, ...] = (
         type='ur_dashboard_msgs/srv/GetPrograms',
         source='dashboard/get_programs',
         source_type=Trigger,
-        call=same_request,
         fill=_list,
     ),
     *(

@@ -10,9 +10,7 @@ suit their type. A rejection carries no reason, which therefore is logged.
 from __future__ import annotations
 
 from concurrent.futures import Future
-from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 from rcl_interfaces.srv import GetParameters
 
@@ -21,9 +19,8 @@ from ur_cartesian_driver.goal_files.goal_schema import message_of, with_defaults
 from ur_cartesian_driver.goal_files.goal_writing import fields_of_goal
 from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
 from ur_cartesian_driver.ros.message_fields import Message
-from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode, DriverSilent
-from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
-from ur_cartesian_driver.ros.ur_driver_names.offered_name import UrName
+from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverSilent
+from ur_cartesian_driver.ros.ur_driver_names.offered_name import Served
 from ur_cartesian_driver.ros.ur_driver_names.primitive_sequence import (
     check_targets,
     goal_of_sequence,
@@ -34,30 +31,8 @@ from ur_cartesian_driver.ros.ur_driver_names.trajectory_actions import Forwarded
 _MAX_INDEX = 255
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SequenceAction(UrName):
-    """``motion_primitive_forward_controller/motion_sequence``."""
-
-    kind: str = 'action'
-    name: str = 'motion_primitive_forward_controller/motion_sequence'
-    type: str = 'control_msgs/action/ExecuteMotionPrimitiveSequence'
-
-    @property
-    def served_by(self) -> str:
-        """The driver's own action."""
-        return '`~/follow_cartesian_trajectory`'
-
-    def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
-        """Forward goals, feedback, results and cancels."""
-        return _SequenceForwarder(driver, self.name, kind)
-
-
 class _SequenceForwarder(GoalForwarder):
-    preempts = False
-
-    def __init__(self, driver: DriverNode, name: str, action: Any) -> None:
-        target = 'follow_cartesian_trajectory', FollowCartesianTrajectory
-        super().__init__(driver, name, action, target)
+    target_type = FollowCartesianTrajectory
 
     def rejection(self, goal: Message) -> str:
         """Return why the controller rejects a sequence; empty = it does not."""
@@ -106,4 +81,10 @@ class _SequenceForwarder(GoalForwarder):
         )
 
 
-SEQUENCE_ACTION = SequenceAction()
+SEQUENCE_ACTION = Served(
+    kind='action',
+    name='motion_primitive_forward_controller/motion_sequence',
+    type='control_msgs/action/ExecuteMotionPrimitiveSequence',
+    source='follow_cartesian_trajectory',
+    server=_SequenceForwarder,
+)

@@ -9,40 +9,14 @@ reason why a goal is aborted is logged.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 from ur_cartesian_driver.action import DetectToolContact
 from ur_cartesian_driver.ros.message_fields import Message
-from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
-from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
-from ur_cartesian_driver.ros.ur_driver_names.offered_name import UrName
+from ur_cartesian_driver.ros.ur_driver_names.offered_name import Served
 from ur_cartesian_driver.ros.ur_driver_names.trajectory_actions import ForwardedGoal, GoalForwarder
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ToolContactAction(UrName):
-    """``tool_contact_controller/detect_tool_contact``."""
-
-    kind: str = 'action'
-    name: str = 'tool_contact_controller/detect_tool_contact'
-    type: str = 'ur_msgs/action/ToolContact'
-
-    @property
-    def served_by(self) -> str:
-        """The driver's own action."""
-        return '`~/detect_tool_contact`'
-
-    def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
-        """Forward goals, results and cancels."""
-        return _ContactForwarder(driver, self.name, kind)
-
-
 class _ContactForwarder(GoalForwarder):
-    preempts = False
-
-    def __init__(self, driver: DriverNode, name: str, action: Any) -> None:
-        super().__init__(driver, name, action, ('detect_tool_contact', DetectToolContact))
+    target_type = DetectToolContact
 
     def forward(self, run: ForwardedGoal) -> None:
         """Send a goal, which has no fields."""
@@ -62,4 +36,10 @@ class _ContactForwarder(GoalForwarder):
         return self.action.Result()
 
 
-TOOL_CONTACT_ACTION = ToolContactAction()
+TOOL_CONTACT_ACTION = Served(
+    kind='action',
+    name='tool_contact_controller/detect_tool_contact',
+    type='ur_msgs/action/ToolContact',
+    source='detect_tool_contact',
+    server=_ContactForwarder,
+)

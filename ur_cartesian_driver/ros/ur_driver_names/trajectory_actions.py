@@ -12,7 +12,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 import copy
-from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 import threading
@@ -31,7 +30,7 @@ from ur_cartesian_driver.ros.message_fields import class_of, duration_message, M
 from ur_cartesian_driver.ros.topics import Endpoints, feedback_publishers
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
-from ur_cartesian_driver.ros.ur_driver_names.offered_name import UrName
+from ur_cartesian_driver.ros.ur_driver_names.offered_name import Served, UrName
 
 #: From the UR driver's configuration of its controllers: how far a joint may be off its path [rad]
 #: and, at the end, off its last point [rad], and how fast it may still be there [rad/s].
@@ -119,30 +118,6 @@ def _with_end(goal: Message) -> Message:
     return goal
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ControllerAction(UrName):
-    """The action of one trajectory controller."""
-
-    kind: str = 'action'
-    type: str = 'control_msgs/action/FollowJointTrajectory'
-
-    #: The driver's action.
-    target: str = 'follow_joint_trajectory'
-    #: Goals get the tolerances of ros2_control's controller. The pass-through controller has none
-    #: of its own, and takes no goal while one runs.
-    has_defaults: bool = True
-    preempts: bool = True
-
-    @property
-    def served_by(self) -> str:
-        """The driver's joint action."""
-        return f'`~/{self.target}`'
-
-    def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
-        """Forward goals, feedback, results and cancels."""
-        return _TrajectoryForwarder(self, driver, kind)
-
-
 class ForwardedGoal:
     """A goal of a client, and the driver's goal that it became."""
 
@@ -156,30 +131,28 @@ class ForwardedGoal:
 
 
 class GoalForwarder(ABC):
-    """
-    An action server whose goals an action of the driver executes.
-
-    :param name: of the action that is served.
-    :param action: its class.
-    :param target: name of the driver's action, and its class.
-    """
+    """An action server whose goals an action of the driver executes."""
 
     #: A goal replaces the one that runs; if not, it is rejected meanwhile.
-    preempts = True
+    preempts = False
+    #: The class of the driver's action; None = it is the class of the action that is served.
+    target_type: Any = None
 
     def __init__(
-        self, driver: DriverNode, name: str, action: Any, target: tuple[str, Any]
+        self, row: UrName, driver: DriverNode, settings: NamesSettings, action: Any
     ) -> None:
         self.driver, self.action = driver, action
-        self._name, self._target = name, driver.own_name(target[0])
+        self._name, self._target = row.name, driver.own_name(row.source)
         self._lock = threading.Lock()
         self._runs: dict[bytes, ForwardedGoal] = {}
         node, group = driver.node, ReentrantCallbackGroup()
-        self._client = ActionClient(node, target[1], self._target, callback_group=group)
+        self._client = ActionClient(
+            node, self.target_type or action, self._target, callback_group=group
+        )
         self._server = DeferredActionServer(  # type: ignore[no-untyped-call]  # rclpy's
             node,
             action,
-            name,
+            row.name,
             self._begin,
             callback_group=group,
             goal_callback=self._judge,
@@ -309,11 +282,11 @@ def _key(handle: Any) -> bytes:
 
 
 class _TrajectoryForwarder(GoalForwarder):
-    """The action of one trajectory controller."""
+    """The action of a trajectory controller."""
 
-    def __init__(self, row: ControllerAction, driver: DriverNode, action: Any) -> None:
-        super().__init__(driver, row.name, action, (row.target, action))
-        self.preempts, self._has_defaults = row.preempts, row.has_defaults
+    preempts = True
+    #: Goals get the tolerances of ros2_control's controller.
+    has_defaults = True
 
     def rejection(self, goal: Message) -> str:
         if until := getattr(goal, 'until_type', 0):
@@ -322,7 +295,7 @@ class _TrajectoryForwarder(GoalForwarder):
 
     def forward(self, run: ForwardedGoal) -> None:
         goal = _with_end(run.handle.request)
-        if self._has_defaults:
+        if self.has_defaults:
             goal = with_default_tolerances(goal, class_of('control_msgs/msg/JointTolerance'))
         self.send(run, goal)
 
@@ -334,21 +307,38 @@ class _TrajectoryForwarder(GoalForwarder):
         return result
 
 
-TRAJECTORY_ACTIONS: tuple[UrName, ...] = (
+class _PassthroughForwarder(_TrajectoryForwarder):
+    """The pass-through controller: no tolerances of its own, and no goal while one runs."""
+
+    preempts = False
+    has_defaults = False
+
+
+class _UntilForwarder(_TrajectoryForwarder):
+    preempts = False
+
+
+def _row(
+    name: str,
+    server: type[GoalForwarder] = _TrajectoryForwarder,
+    type_name: str = 'control_msgs/action/FollowJointTrajectory',
+    source: str = 'follow_joint_trajectory',
+    release: str = '',
+) -> UrName:
+    return Served(
+        kind='action', name=name, type=type_name, source=source, release=release, server=server
+    )
+
+
+TRAJECTORY_ACTIONS = (
     # Its release for Lyrical has no scaled controller: the other one scales.
-    ControllerAction(
-        name='scaled_joint_trajectory_controller/follow_joint_trajectory', release='jazzy'
-    ),
-    ControllerAction(name='joint_trajectory_controller/follow_joint_trajectory'),
-    ControllerAction(
-        name='passthrough_trajectory_controller/follow_joint_trajectory',
-        has_defaults=False,
-        preempts=False,
-    ),
-    ControllerAction(
-        name='trajectory_until_node/execute',
-        type='ur_msgs/action/FollowJointTrajectoryUntil',
-        target='follow_joint_trajectory_until',
-        preempts=False,
+    _row('scaled_joint_trajectory_controller/follow_joint_trajectory', release='jazzy'),
+    _row('joint_trajectory_controller/follow_joint_trajectory'),
+    _row('passthrough_trajectory_controller/follow_joint_trajectory', _PassthroughForwarder),
+    _row(
+        'trajectory_until_node/execute',
+        _UntilForwarder,
+        'ur_msgs/action/FollowJointTrajectoryUntil',
+        'follow_joint_trajectory_until',
     ),
 )

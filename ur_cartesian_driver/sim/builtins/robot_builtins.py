@@ -36,6 +36,8 @@ from ur_cartesian_driver.urscript.script_values import (
 
 #: The clock of the system (`time(2)`) when the controller's clock is 0: 2026-01-01 00:00 GMT [s].
 SYSTEM_TIME = 1_767_225_600
+#: Largest joint position that set_pos takes [rad]; of a robot it is not known.
+MAX_TURN = 1000.0
 
 
 class TimeBuiltins(BuiltinGroup):
@@ -235,7 +237,10 @@ class RobotBuiltins(BuiltinGroup):
 
     def set_pos(self, q: Value) -> None:
         """Put the arm at joint positions at once, as only a simulated arm can."""
-        self._controller.motion.teleport(six(q, 'q'))
+        q_ = six(q, 'q')
+        if not max(map(abs, q_)) <= MAX_TURN:
+            raise RuntimeException(f'q has positions beyond {MAX_TURN:g} rad.')
+        self._controller.motion.teleport(q_)
 
     def reset_revolution_counter(self, qNear: Value = None) -> None:
         """

@@ -35,6 +35,8 @@ from ur_cartesian_driver.urscript.script_values import (
 
 #: A longer answer [bytes] is treated as an error of the server.
 MAX_ANSWER = 1024 * 1024
+#: Size of the parts in which a request is sent [bytes]; the socket keeps four of them.
+MAX_PART = 16_384
 
 
 class RpcBuiltins(BuiltinGroup):
@@ -97,12 +99,21 @@ class RemoteProcedures(RemoteObject):
                 'Content-Type: text/xml\r\nConnection: close\r\n'
                 f'Content-Length: {len(body)}\r\n\r\n'
             )
-            if not sockets.send(name, head.encode() + body):
-                raise self._failure(method, 'nothing answers there')
+            left = memoryview(head.encode() + body)
+            while left:
+                if sockets.state(name) is not SocketState.OPEN:
+                    raise self._failure(method, 'nothing answers there')
+                if sockets.send(name, bytes(left[:MAX_PART])):
+                    left = left[MAX_PART:]
+                else:  # the server reads slowly
+                    yield
+            received = bytearray()
             while True:
-                received = bytes(sockets.received(name))
                 closed = sockets.state(name) is not SocketState.OPEN
-                answer = self._body(method, received, closed)
+                arrived = sockets.received(name)
+                received += arrived
+                arrived.clear()
+                answer = self._body(method, bytes(received), closed)
                 if answer is not None:
                     return answer
                 if closed:

@@ -29,6 +29,7 @@ READS_PER_CYCLE = 32
 #: Largest number of values in one read of numbers, and of characters in one string that is read
 #: without a suffix.
 MAX_NUMBERS, MAX_CHARACTERS = 30, 1023
+MAX_PORT = 65_535
 
 T = TypeVar('T')
 
@@ -54,8 +55,11 @@ class SocketBuiltins(BuiltinGroup):
         self, address: Value, port: Value, socket_name: Value = 'socket_0'
     ) -> Generator[None, None, bool]:
         """Connect; return whether this succeeds within 2 s."""
-        name = text(socket_name, 'socket_name')
-        self._sockets.open(name, text(address, 'address'), whole(port, 'port'))
+        name, port_ = text(socket_name, 'socket_name'), whole(port, 'port')
+        if not 0 <= port_ <= MAX_PORT:
+            self._sockets.close(name)
+            return False
+        self._sockets.open(name, text(address, 'address'), port_)
         deadline = self._now + CONNECT_TIMEOUT
         while self._sockets.state(name) is SocketState.CONNECTING:
             if self._now >= deadline:

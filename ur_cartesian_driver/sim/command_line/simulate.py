@@ -9,12 +9,13 @@ import asyncio
 from collections.abc import Callable, Mapping
 from pathlib import Path
 import sys
-from types import MappingProxyType
+from typing import Any
 
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model, RobotModel
 from ur_cartesian_driver.motion.twin.twin import UNKNOWN_ARM
 from ur_cartesian_driver.motion.twin.twin_file import read_twin
 from ur_cartesian_driver.sim.calibration import random_calibration, read_calibration
+from ur_cartesian_driver.sim.command_line.simulator_options import fields_from
 from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections, typical_imperfections
 from ur_cartesian_driver.sim.pendant_programs.program_tree import (
     BUILT_IN_PROGRAMS,
@@ -62,35 +63,23 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
         loaded = str(arguments.program)
     elif arguments.program:
         loaded, programs[loaded] = _read_program(arguments.program)
-    return SimulatorConfig(
-        model=model.name,
-        host=arguments.host,
-        polyscope=arguments.polyscope or arm.software,
-        rtde_port=arguments.rtde_port,
-        primary_port=arguments.primary_port,
-        dashboard_port=arguments.dashboard_port,
-        secondary_port=arguments.secondary_port,
-        realtime_port=arguments.realtime_port,
-        interpreter_port=arguments.interpreter_port,
-        robot_api_port=arguments.robot_api_port,
-        power='off' if arguments.power_off else 'running',
-        remote_control=not arguments.local,
-        has_remote_control=not arguments.no_remote_control,
-        rate=arguments.rate,
-        faults=arguments.faults,
-        contacts=arguments.contacts,
-        inputs=arguments.inputs,
-        answers=arguments.answers,
-        motion_version=arguments.motion_version or arm.motion_version or 1,
-        twin=twin,
-        imperfections=imperfections(arguments, model),
-        geometry=calibration(arguments, model),
-        programs=programs,
-        program=loaded,
-        external_control_host=arguments.external_control_host,
-        external_control_port=arguments.external_control_port,
-        **({'q': arguments.joints} if arguments.joints else {}),
-    )
+    fields: dict[str, Any] = {
+        **fields_from(arguments, SimulatorConfig),
+        'model': model.name,
+        'polyscope': arguments.polyscope or arm.software,
+        'power': 'off' if arguments.power_off else 'running',
+        'remote_control': not arguments.local,
+        'has_remote_control': not arguments.no_remote_control,
+        'motion_version': arguments.motion_version or arm.motion_version or 1,
+        'twin': twin,
+        'imperfections': imperfections(arguments, model),
+        'geometry': calibration(arguments, model),
+        'programs': programs,
+        'program': loaded,
+    }
+    if arguments.joints:
+        fields['q'] = arguments.joints
+    return SimulatorConfig(**fields)
 
 
 def _is_built_in(file: Path) -> bool:
@@ -138,9 +127,11 @@ def _read_urpx(file: Path) -> tuple[str, str]:
 
 
 #: Suffix of a program file -> its reader.
-_READERS: Mapping[str, Callable[[Path], tuple[str, SavedProgram]]] = MappingProxyType(
-    {'.script': _read_script, '.urp': _read_urp, URPX_SUFFIX: _read_urpx}
-)
+_READERS: Mapping[str, Callable[[Path], tuple[str, SavedProgram]]] = {
+    '.script': _read_script,
+    '.urp': _read_urp,
+    URPX_SUFFIX: _read_urpx,
+}
 
 
 def imperfections(arguments: argparse.Namespace, model: RobotModel) -> Imperfections | None:

@@ -6,10 +6,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
 import re
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from ur_cartesian_driver.kinematics.robot_models import MAX_JOINT_VALUE, MODELS
 from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
@@ -175,6 +176,12 @@ def add_calibration(command: argparse.ArgumentParser) -> None:
         metavar='N',
         help='seed of a random calibration',
     )
+
+
+def fields_from(arguments: argparse.Namespace, kind: type[Any]) -> dict[str, Any]:
+    """Return the arguments that are named like fields of a dataclass, by name."""
+    given = vars(arguments)
+    return {each.name: given[each.name] for each in fields(kind) if each.name in given}
 
 
 # The kinds of arguments, for `type=` of argparse

@@ -14,8 +14,8 @@ Read faults from text, for the command line and the markers of tests.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from math import isfinite
 import re
-from types import MappingProxyType
 from typing import Any, TypeAlias
 
 from ur_cartesian_driver.sim.faults.fault_values import (
@@ -91,6 +91,8 @@ class _WordReader:
             value = float(self.peek())
         except ValueError:
             raise self.wrong(meaning) from None
+        if not isfinite(value):
+            raise self.wrong(f'a finite number: {meaning}')
         self.take()
         return value
 
@@ -130,32 +132,30 @@ _DEVIATION: dict[str, Reader] = {
 }
 
 #: First word of a fault -> class of the fault, and the readers of the fields in later words.
-_KINDS: Mapping[str, tuple[type[Fault], Mapping[str, Reader]]] = MappingProxyType(
-    {
-        **{event.value: (EventFault, {'action': _constant(event)}) for event in FaultEvent},
-        'slider': (
-            SpeedSliderFault,
-            {'fraction': _number('a fraction of the speed, 0 to 1')},
-        ),
-        'foreign_motion': (
-            ForeignMotionFault,
-            {'axis': _choice(DEVIATION_AXES), 'distance': _number('a distance')},
-        ),
-        **{
-            shape: (DeviationFault, {'shape': _constant(shape), **_DEVIATION})
-            for shape in DEVIATION_SHAPES
-        },
-        'drop': (DropFault, _INTERFACE),
-        'half_open': (HalfOpenFault, _INTERFACE),
-        'silence': (SilenceFault, _INTERFACE),
-        'delay': (DelayFault, {**_INTERFACE, 'seconds': _read_seconds}),
-        'throttle': (
-            ThrottleFault,
-            {**_INTERFACE, 'rate': _number('a rate in bytes per second')},
-        ),
-        'garbage': (GarbageFault, {**_INTERFACE, 'size': _read_size}),
-    }
-)
+_KINDS: Mapping[str, tuple[type[Fault], Mapping[str, Reader]]] = {
+    **{event.value: (EventFault, {'action': _constant(event)}) for event in FaultEvent},
+    'slider': (
+        SpeedSliderFault,
+        {'fraction': _number('a fraction of the speed, 0 to 1')},
+    ),
+    'foreign_motion': (
+        ForeignMotionFault,
+        {'axis': _choice(DEVIATION_AXES), 'distance': _number('a distance')},
+    ),
+    **{
+        shape: (DeviationFault, {'shape': _constant(shape), **_DEVIATION})
+        for shape in DEVIATION_SHAPES
+    },
+    'drop': (DropFault, _INTERFACE),
+    'half_open': (HalfOpenFault, _INTERFACE),
+    'silence': (SilenceFault, _INTERFACE),
+    'delay': (DelayFault, {**_INTERFACE, 'seconds': _read_seconds}),
+    'throttle': (
+        ThrottleFault,
+        {**_INTERFACE, 'rate': _number('a rate in bytes per second')},
+    ),
+    'garbage': (GarbageFault, {**_INTERFACE, 'size': _read_size}),
+}
 
 
 def parse_fault(text: str) -> Fault:

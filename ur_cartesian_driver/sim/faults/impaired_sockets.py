@@ -39,8 +39,13 @@ class ImpairedSockets:
         self._sockets.open(name, address, port)
 
     def state(self, name: str) -> SocketState:
-        """Return the state of a socket."""
-        return self._sockets.state(name)
+        """Return the state of a socket; a delay also delays the end of its data."""
+        state = self._sockets.state(name)
+        impaired = self._impaired.get(name)
+        if impaired is None or state is not SocketState.CLOSED or name not in self._names:
+            return state
+        is_held = bool(impaired.incoming.size or self._sockets.received(name))
+        return SocketState.OPEN if is_held else state
 
     def received(self, name: str) -> bytearray:
         """Return the unread bytes; delayed bytes come before newer ones."""

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 import logging
 from math import hypot, inf
 from random import Random
-from types import MappingProxyType
 
 from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.sim.controller import Controller
@@ -54,22 +53,20 @@ def _safety(event: SafetyEvent) -> Callable[[Controller], object]:
 
 
 #: Event -> function that causes the event; it returns the reason if the controller refuses.
-_ACTIONS: Mapping[FaultEvent, Callable[[Controller], object]] = MappingProxyType(
-    {
-        FaultEvent.PROTECTIVE_STOP: _safety(SafetyEvent.PROTECTIVE_STOP),
-        FaultEvent.EMERGENCY_STOP: _safety(SafetyEvent.EMERGENCY_STOP),
-        FaultEvent.RELEASE_EMERGENCY_STOP: _safety(SafetyEvent.RELEASE),
-        FaultEvent.SAFEGUARD_STOP: _safety(SafetyEvent.SAFEGUARD_STOP),
-        FaultEvent.RESET_SAFEGUARD: _safety(SafetyEvent.SAFEGUARD_RESET),
-        FaultEvent.VIOLATION: _safety(SafetyEvent.VIOLATION),
-        FaultEvent.FAULT: _safety(SafetyEvent.FAULT),
-        FaultEvent.UNLOCK: _safety(SafetyEvent.UNLOCK),
-        FaultEvent.STOP: lambda controller: controller.programs.stop(),
-        FaultEvent.PAUSE: lambda controller: controller.programs.pause(),
-        FaultEvent.PLAY: lambda controller: controller.programs.play(),
-        FaultEvent.POWER_OFF: Controller.power_off,
-    }
-)
+_ACTIONS: Mapping[FaultEvent, Callable[[Controller], object]] = {
+    FaultEvent.PROTECTIVE_STOP: _safety(SafetyEvent.PROTECTIVE_STOP),
+    FaultEvent.EMERGENCY_STOP: _safety(SafetyEvent.EMERGENCY_STOP),
+    FaultEvent.RELEASE_EMERGENCY_STOP: _safety(SafetyEvent.RELEASE),
+    FaultEvent.SAFEGUARD_STOP: _safety(SafetyEvent.SAFEGUARD_STOP),
+    FaultEvent.RESET_SAFEGUARD: _safety(SafetyEvent.SAFEGUARD_RESET),
+    FaultEvent.VIOLATION: _safety(SafetyEvent.VIOLATION),
+    FaultEvent.FAULT: _safety(SafetyEvent.FAULT),
+    FaultEvent.UNLOCK: _safety(SafetyEvent.UNLOCK),
+    FaultEvent.STOP: lambda controller: controller.programs.stop(),
+    FaultEvent.PAUSE: lambda controller: controller.programs.pause(),
+    FaultEvent.PLAY: lambda controller: controller.programs.play(),
+    FaultEvent.POWER_OFF: Controller.power_off,
+}
 
 
 @dataclass(slots=True)

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 import logging
 from pathlib import PurePosixPath
-from types import MappingProxyType
 
 from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.protocol.dashboard import (
@@ -29,7 +28,8 @@ from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 _log = logging.getLogger(__name__)
 
-_RUNTIME_WORDS = {
+#: The states of a program in the words of dashboard and Robot API.
+RUNTIME_WORDS = {
     RuntimeState.STOPPING: 'STOPPED',
     RuntimeState.STOPPED: 'STOPPED',
     RuntimeState.PLAYING: 'PLAYING',
@@ -91,7 +91,7 @@ class DashboardHandlers:
     @property
     def program_state(self) -> str:
         """The state of the program."""
-        return _RUNTIME_WORDS[self.programs.state]
+        return RUNTIME_WORDS[self.programs.state]
 
     @property
     def running(self) -> str:
@@ -169,58 +169,52 @@ class DashboardHandlers:
 
 
 #: Command -> function that carries it out; the command fails if the function returns a reason.
-_CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
-    {
-        'play': lambda controller: controller.programs.play(),
-        'pause': lambda controller: controller.programs.pause(),
-        'stop': lambda controller: controller.programs.stop(),
-        'power on': Controller.power_on,
-        'power off': Controller.power_off,
-        'brake release': Controller.release_brakes,
-        # Switches off only the arm: without a controller, nothing could be tested afterwards.
-        'shutdown': Controller.power_off,
-        'close popup': Controller.close_popups,
-    }
-)
+_CONTROL: Mapping[str, Callable[[Controller], object]] = {
+    'play': lambda controller: controller.programs.play(),
+    'pause': lambda controller: controller.programs.pause(),
+    'stop': lambda controller: controller.programs.stop(),
+    'power on': Controller.power_on,
+    'power off': Controller.power_off,
+    'brake release': Controller.release_brakes,
+    # Switches off only the arm: without a controller, nothing could be tested afterwards.
+    'shutdown': Controller.power_off,
+    'close popup': Controller.close_popups,
+}
 #: Handlers of commands that need more than a call of the controller; all others only reply.
-_HANDLERS: Mapping[str, Callable[[DashboardHandlers, str], str | None]] = MappingProxyType(
-    {
-        'load': DashboardHandlers.load,
-        'load installation': DashboardHandlers.load_installation,
-        'unlock protective stop': DashboardHandlers.unlock,
-        'restart safety': DashboardHandlers.restart_safety,
-        'popup': DashboardHandlers.popup,
-        'addToLog': DashboardHandlers.add_to_log,
-        'setUserRole': DashboardHandlers.set_role,
-        'set operational mode': DashboardHandlers.set_operational_mode,
-        'clear operational mode': DashboardHandlers.clear_operational_mode,
-    }
-)
+_HANDLERS: Mapping[str, Callable[[DashboardHandlers, str], str | None]] = {
+    'load': DashboardHandlers.load,
+    'load installation': DashboardHandlers.load_installation,
+    'unlock protective stop': DashboardHandlers.unlock,
+    'restart safety': DashboardHandlers.restart_safety,
+    'popup': DashboardHandlers.popup,
+    'addToLog': DashboardHandlers.add_to_log,
+    'setUserRole': DashboardHandlers.set_role,
+    'set operational mode': DashboardHandlers.set_operational_mode,
+    'clear operational mode': DashboardHandlers.clear_operational_mode,
+}
 #: Format of the value in a reply, by default {1}; {0} = the handlers, {1} = the argument.
-_VALUES: Mapping[str, str] = MappingProxyType(
-    {
-        'running': '{0.running}',
-        'robotmode': '{0.controller.power.mode.name}',
-        'safetymode': '{0.controller.safety.mode.name}',
-        'safetystatus': '{0.controller.safety.mode.name}',
-        'get loaded program': '/programs/{0.loaded}',
-        'programState': '{0.program_state} {0.loaded}',
-        'isProgramSaved': 'true {0.loaded}',
-        'PolyscopeVersion': '{0.version} (Jan 01 2026)',
-        'version': '{0.version}',
-        'getUserRole': '{0.pendant.user_role}',
-        'set operational mode': '"{1}" is set',
-        'get operational mode': '{0.pendant.operational_mode}',
-        # URSim's words, including the full stop.
-        'clear operational mode': "Current operational mode: 'NONE'.",
-        'is in remote control': '{0.remote_control}',
-        'get serial number': '{0.serial_number}',
-        'get robot model': '{0.robot_model}',
-        # The next two commands only reply; no file is written.
-        'generate flight report': '0',
-        'generate support file': '{1}/ur_{0.serial_number}_2026-01-01_00-00-00.zip',
-    }
-)
+_VALUES: Mapping[str, str] = {
+    'running': '{0.running}',
+    'robotmode': '{0.controller.power.mode.name}',
+    'safetymode': '{0.controller.safety.mode.name}',
+    'safetystatus': '{0.controller.safety.mode.name}',
+    'get loaded program': '/programs/{0.loaded}',
+    'programState': '{0.program_state} {0.loaded}',
+    'isProgramSaved': 'true {0.loaded}',
+    'PolyscopeVersion': '{0.version} (Jan 01 2026)',
+    'version': '{0.version}',
+    'getUserRole': '{0.pendant.user_role}',
+    'set operational mode': '"{1}" is set',
+    'get operational mode': '{0.pendant.operational_mode}',
+    # URSim's words, including the full stop.
+    'clear operational mode': "Current operational mode: 'NONE'.",
+    'is in remote control': '{0.remote_control}',
+    'get serial number': '{0.serial_number}',
+    'get robot model': '{0.robot_model}',
+    # The next two commands only reply; no file is written.
+    'generate flight report': '0',
+    'generate support file': '{1}/ur_{0.serial_number}_2026-01-01_00-00-00.zip',
+}
 
 
 class DashboardSession(ClientSession):

@@ -10,7 +10,6 @@ running program, as on the robot. All input of a client that connected in local 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.programs.script_upload import (
@@ -22,20 +21,18 @@ from ur_cartesian_driver.sim.programs.script_upload import (
 #: Error code of a script port that is read-only.
 READ_ONLY = 210
 
-_CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
-    {
-        'power on': Controller.power_on,
-        'power off': Controller.power_off,
-        'set robotmode run': Controller.release_brakes,
-        'set unlock protective stop': Controller.unlock_soon,
-        'stop program': lambda controller: controller.programs.stop(),
-        'pause program': lambda controller: controller.programs.pause(),
-        'resume program': lambda controller: controller.programs.play(),
-        # On a robot, motions then go to the arm or only to the screen; here, always to the arm.
-        'set real': lambda _: None,
-        'set sim': lambda _: None,
-    }
-)
+_CONTROL: Mapping[str, Callable[[Controller], object]] = {
+    'power on': Controller.power_on,
+    'power off': Controller.power_off,
+    'set robotmode run': Controller.release_brakes,
+    'set unlock protective stop': Controller.unlock_soon,
+    'stop program': lambda controller: controller.programs.stop(),
+    'pause program': lambda controller: controller.programs.pause(),
+    'resume program': lambda controller: controller.programs.unpause(),
+    # On a robot, motions then go to the arm or only to the screen; here, always to the arm.
+    'set real': lambda _: None,
+    'set sim': lambda _: None,
+}
 
 
 def execute_command(controller: Controller, item: UploadedItem, *, may_send: bool) -> None:

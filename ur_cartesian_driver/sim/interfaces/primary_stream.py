@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from types import MappingProxyType
 from typing import Any
 
 from ur_cartesian_driver.motion.state.rtde_state import RobotStatus, RuntimeState, SafetyMode
@@ -34,23 +33,24 @@ from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.rtde_output_values import COMPUTED, FIXED
 
 #: Field of a sub-package -> RTDE output with the same meaning.
-JOINT_OUTPUTS: Mapping[str, str] = MappingProxyType(
-    {
-        'q_actual': 'actual_q',
-        'q_target': 'target_q',
-        'qd_actual': 'actual_qd',
-        'current': 'actual_current',
-        'voltage': 'actual_joint_voltage',
-        'temperature': 'joint_temperatures',
-        'mode': 'joint_mode',
-    }
-)
-MASTERBOARD_OUTPUTS: Mapping[str, str] = MappingProxyType(
-    {'robot_voltage_48v': 'actual_robot_voltage', 'robot_current': 'actual_robot_current'}
-)
-TOOL_OUTPUTS: Mapping[str, str] = MappingProxyType(
-    {'voltage_48v': 'actual_robot_voltage', 'temperature': 'tool_temperature', 'mode': 'tool_mode'}
-)
+JOINT_OUTPUTS: Mapping[str, str] = {
+    'q_actual': 'actual_q',
+    'q_target': 'target_q',
+    'qd_actual': 'actual_qd',
+    'current': 'actual_current',
+    'voltage': 'actual_joint_voltage',
+    'temperature': 'joint_temperatures',
+    'mode': 'joint_mode',
+}
+MASTERBOARD_OUTPUTS: Mapping[str, str] = {
+    'robot_voltage_48v': 'actual_robot_voltage',
+    'robot_current': 'actual_robot_current',
+}
+TOOL_OUTPUTS: Mapping[str, str] = {
+    'voltage_48v': 'actual_robot_voltage',
+    'temperature': 'tool_temperature',
+    'mode': 'tool_mode',
+}
 
 #: Timestamp of the version message, as recorded on four robots (software 3.5 to 5.1).
 NO_TIMESTAMP = 2**64 - 1

@@ -6,53 +6,50 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
-from types import MappingProxyType
 
 from ur_cartesian_driver.protocol.client_interfaces.realtime import packet_size, RealtimeData
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.rtde_output_values import output_getter
 
 #: Field of the packet -> RTDE output with the same meaning.
-OUTPUTS: Mapping[str, str] = MappingProxyType(
-    {
-        'time': 'timestamp',
-        'q_target': 'target_q',
-        'qd_target': 'target_qd',
-        'qdd_target': 'target_qdd',
-        'current_target': 'target_current',
-        'moment_target': 'target_moment',
-        'q_actual': 'actual_q',
-        'qd_actual': 'actual_qd',
-        'current_actual': 'actual_current',
-        'current_control': 'joint_control_output',
-        'tcp_pose_actual': 'actual_TCP_pose',
-        'tcp_speed_actual': 'actual_TCP_speed',
-        'tcp_force': 'actual_TCP_force',
-        'tcp_pose_target': 'target_TCP_pose',
-        'tcp_speed_target': 'target_TCP_speed',
-        'digital_input_bits': 'actual_digital_input_bits',
-        'joint_temperatures': 'joint_temperatures',
-        'controller_timer': 'actual_execution_time',
-        'robot_mode': 'robot_mode',
-        'joint_modes': 'joint_mode',
-        'safety_mode': 'safety_mode',
-        'tool_accelerometer': 'actual_tool_accelerometer',
-        'speed_scaling': 'speed_scaling',
-        'momentum': 'actual_momentum',
-        'main_voltage': 'actual_main_voltage',
-        'robot_voltage': 'actual_robot_voltage',
-        'robot_current': 'actual_robot_current',
-        'joint_voltages': 'actual_joint_voltage',
-        'digital_output_bits': 'actual_digital_output_bits',
-        'program_state': 'runtime_state',
-        'elbow_position': 'elbow_position',
-        'elbow_velocity': 'elbow_velocity',
-        'safety_status': 'safety_status',
-        'payload_mass': 'payload',
-        'payload_cog': 'payload_cog',
-        'payload_inertia': 'payload_inertia',
-    }
-)
+OUTPUTS: Mapping[str, str] = {
+    'time': 'timestamp',
+    'q_target': 'target_q',
+    'qd_target': 'target_qd',
+    'qdd_target': 'target_qdd',
+    'current_target': 'target_current',
+    'moment_target': 'target_moment',
+    'q_actual': 'actual_q',
+    'qd_actual': 'actual_qd',
+    'current_actual': 'actual_current',
+    'current_control': 'joint_control_output',
+    'tcp_pose_actual': 'actual_TCP_pose',
+    'tcp_speed_actual': 'actual_TCP_speed',
+    'tcp_force': 'actual_TCP_force',
+    'tcp_pose_target': 'target_TCP_pose',
+    'tcp_speed_target': 'target_TCP_speed',
+    'digital_input_bits': 'actual_digital_input_bits',
+    'joint_temperatures': 'joint_temperatures',
+    'controller_timer': 'actual_execution_time',
+    'robot_mode': 'robot_mode',
+    'joint_modes': 'joint_mode',
+    'safety_mode': 'safety_mode',
+    'tool_accelerometer': 'actual_tool_accelerometer',
+    'speed_scaling': 'speed_scaling',
+    'momentum': 'actual_momentum',
+    'main_voltage': 'actual_main_voltage',
+    'robot_voltage': 'actual_robot_voltage',
+    'robot_current': 'actual_robot_current',
+    'joint_voltages': 'actual_joint_voltage',
+    'digital_output_bits': 'actual_digital_output_bits',
+    'program_state': 'runtime_state',
+    'elbow_position': 'elbow_position',
+    'elbow_velocity': 'elbow_velocity',
+    'safety_status': 'safety_status',
+    'payload_mass': 'payload',
+    'payload_cog': 'payload_cog',
+    'payload_inertia': 'payload_inertia',
+}
 
 
 class RealtimeStream:

@@ -11,17 +11,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from http import HTTPStatus
 from http.client import HTTPException, parse_headers
 from io import BytesIO
 import json
-from types import MappingProxyType
 from typing import Any
 from urllib.parse import unquote
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.interfaces.dashboard_session import RUNTIME_WORDS
 from ur_cartesian_driver.sim.interfaces.robot_api_fields import (
     Body,
     Fields,
@@ -49,14 +50,6 @@ _MAX_HEAD_SIZE, _MAX_REQUEST_SIZE = 65536, 1 << 22
 #: Time after which an unfinished action is answered with 504 [s].
 _ACTION_TIMEOUT = 10.0
 
-_PROGRAM_STATES = {
-    RuntimeState.STOPPING: 'STOPPED',
-    RuntimeState.STOPPED: 'STOPPED',
-    RuntimeState.PLAYING: 'PLAYING',
-    RuntimeState.RESUMING: 'PLAYING',
-    RuntimeState.PAUSING: 'PAUSED',
-    RuntimeState.PAUSED: 'PAUSED',
-}
 #: Safety modes with another name in the API, which has only five safety modes.
 _SAFETY_MODES = {
     SafetyMode.ROBOT_EMERGENCY_STOP: 'EMERGENCY_STOP',
@@ -79,6 +72,8 @@ class Waiting:
 
 
 Handler = Callable[[Controller, Body], 'Fields | Waiting']
+#: Action -> its effect, and whether the action is done and can be answered.
+Actions = Mapping[str, tuple[Callable[[Controller], object], Callable[[Controller], bool]]]
 
 
 def _refuse_if(refusal: str) -> None:
@@ -87,9 +82,8 @@ def _refuse_if(refusal: str) -> None:
 
 
 def _power_on(controller: Controller) -> None:
-    if controller.power.mode is not RobotMode.POWER_OFF:
-        raise Refused(HTTPStatus.CONFLICT, 'Conflict', details='The arm is powered already')
-    _refuse_if(controller.power_on())
+    is_powered = controller.power.mode is not RobotMode.POWER_OFF
+    _refuse_if('The arm is powered already' if is_powered else controller.power_on())
 
 
 def _restart_safety(controller: Controller) -> None:
@@ -97,35 +91,26 @@ def _restart_safety(controller: Controller) -> None:
     controller.power_off()
 
 
-#: Action on the arm -> its effect, and whether the action is done and can be answered.
-_STATE_ACTIONS: Mapping[
-    str, tuple[Callable[[Controller], object], Callable[[Controller], bool]]
-] = MappingProxyType(
-    {
-        'POWER_ON': (_power_on, lambda c: c.power.mode >= RobotMode.IDLE),
-        'POWER_OFF': (Controller.power_off, lambda c: c.power.mode is RobotMode.POWER_OFF),
-        'BRAKE_RELEASE': (
-            lambda c: _refuse_if(c.release_brakes()),
-            lambda c: c.power.mode is RobotMode.RUNNING,
-        ),
-        # No unlock delay: the tests of the manufacturer's client library unlock at once.
-        'UNLOCK_PROTECTIVE_STOP': (
-            lambda c: _refuse_if(c.safety_event(SafetyEvent.UNLOCK_BY_LINE)),
-            lambda c: c.safety.mode is not SafetyMode.PROTECTIVE_STOP,
-        ),
-        'RESTART_SAFETY': (_restart_safety, lambda c: c.safety.mode is SafetyMode.NORMAL),
-    }
-)
+_STATE_ACTIONS: Actions = {
+    'POWER_ON': (_power_on, lambda c: c.power.mode >= RobotMode.IDLE),
+    'POWER_OFF': (Controller.power_off, lambda c: c.power.mode is RobotMode.POWER_OFF),
+    'BRAKE_RELEASE': (
+        lambda c: _refuse_if(c.release_brakes()),
+        lambda c: c.power.mode is RobotMode.RUNNING,
+    ),
+    # No unlock delay: the tests of the manufacturer's client library unlock at once.
+    'UNLOCK_PROTECTIVE_STOP': (
+        lambda c: _refuse_if(c.safety_event(SafetyEvent.UNLOCK_BY_LINE)),
+        lambda c: c.safety.mode is not SafetyMode.PROTECTIVE_STOP,
+    ),
+    'RESTART_SAFETY': (_restart_safety, lambda c: c.safety.mode is SafetyMode.NORMAL),
+}
 
 
 def _play(controller: Controller, state: RuntimeState) -> None:
-    if controller.programs.state is not state:
-        raise Refused(
-            HTTPStatus.CONFLICT,
-            'Conflict',
-            details=f'The program is {_PROGRAM_STATES[controller.programs.state]}',
-        )
-    _refuse_if(controller.programs.play())
+    programs = controller.programs
+    other = f'The program is {RUNTIME_WORDS[programs.state]}'
+    _refuse_if(programs.play() if programs.state is state else other)
 
 
 def _has_started(controller: Controller) -> bool:
@@ -146,36 +131,24 @@ def _has_started(controller: Controller) -> bool:
     return True
 
 
-#: Action on the program -> its effect, and whether the action is done and can be answered.
-_PROGRAM_ACTIONS: Mapping[
-    str, tuple[Callable[[Controller], object], Callable[[Controller], bool]]
-] = MappingProxyType(
-    {
-        'play': (
-            lambda c: _play(c, RuntimeState.STOPPED),
-            _has_started,
-        ),
-        'resume': (
-            lambda c: _play(c, RuntimeState.PAUSED),
-            lambda c: c.programs.state is RuntimeState.PLAYING,
-        ),
-        'pause': (
-            lambda c: _refuse_if(c.programs.pause()),
-            lambda c: c.programs.state is RuntimeState.PAUSED,
-        ),
-        'stop': (
-            lambda c: c.programs.stop(),
-            lambda c: c.programs.state is RuntimeState.STOPPED,
-        ),
-    }
-)
+_PROGRAM_ACTIONS: Actions = {
+    'play': (lambda c: _play(c, RuntimeState.STOPPED), _has_started),
+    'resume': (
+        lambda c: _play(c, RuntimeState.PAUSED),
+        lambda c: c.programs.state is RuntimeState.PLAYING,
+    ),
+    'pause': (
+        lambda c: _refuse_if(c.programs.pause()),
+        lambda c: c.programs.state is RuntimeState.PAUSED,
+    ),
+    'stop': (
+        lambda c: c.programs.stop(),
+        lambda c: c.programs.state is RuntimeState.STOPPED,
+    ),
+}
 
 
-def _act(
-    actions: Mapping[str, tuple[Callable[[Controller], object], Callable[[Controller], bool]]],
-    controller: Controller,
-    body: Body,
-) -> Waiting:
+def _act(actions: Actions, controller: Controller, body: Body) -> Waiting:
     action = text_field(body, 'action')
     if action not in actions:
         raise ValueError(f'action is {action!r}')
@@ -185,7 +158,7 @@ def _act(
 
 
 def _program_state(controller: Controller, _: Body) -> Fields:
-    return {'state': _PROGRAM_STATES[controller.programs.state]}
+    return {'state': RUNTIME_WORDS[controller.programs.state]}
 
 
 def _safety_mode(controller: Controller, _: Body) -> Fields:
@@ -249,45 +222,37 @@ def _openapi(controller: Controller, _: Body) -> Fields:
 
 
 #: Method and path below BASE_PATH -> first software version with this request, and its handler.
-_ROUTES: Mapping[tuple[str, str], tuple[tuple[int, int], Handler]] = MappingProxyType(
-    {
-        ('GET', '/openapi.json'): (FIRST_VERSION, _openapi),
-        ('PUT', '/robotstate/v1/state'): (
-            FIRST_VERSION,
-            lambda controller, body: _act(_STATE_ACTIONS, controller, body),
-        ),
-        ('GET', '/robotstate/v1/robotmode'): (
-            (10, 12),
-            lambda controller, _: {'mode': controller.power.mode.name},
-        ),
-        ('GET', '/robotstate/v1/safetymode'): ((10, 12), _safety_mode),
-        ('PUT', '/program/v1/state'): (
-            FIRST_VERSION,
-            lambda controller, body: _act(_PROGRAM_ACTIONS, controller, body),
-        ),
-        ('GET', '/program/v1/state'): (FIRST_VERSION, _program_state),
-        ('PUT', '/program/v1/load'): (FIRST_VERSION, load_program('programName')),
-        ('PUT', '/program/v1/loaded'): ((10, 12), load_program('name')),
-        ('GET', '/program/v1/loaded'): ((10, 12), loaded_program),
-        ('GET', '/programs/v1'): ((10, 12), list_programs),
-        ('POST', '/programs/v1'): ((10, 12), upload_program),
-        ('PUT', '/programs/v1'): ((10, 12), update_program),
-        ('GET', '/programs/v1/{name}'): ((10, 12), download_program),
-        ('GET', '/system/v1/controlmode'): (
-            (10, 12),
-            lambda controller, _: {'mode': 'REMOTE' if controller.remote_control else 'LOCAL'},
-        ),
-        ('GET', '/system/v1/operationalmode'): ((10, 12), _operational_mode),
-        ('GET', '/system/v1/information'): ((10, 14), _information),
-        ('POST', '/system/v1/log'): ((10, 14), _log),
-        ('PUT', '/system/v1/shutdown'): ((10, 14), _shut_down),
-        ('POST', '/supportfiles/v1'): ((10, 14), _write_flight_report),
-        ('GET', '/versions/v1'): ((10, 14), _versions),
-        ('POST', '/popup/v1'): ((10, 14), _open_popup),
-        ('DELETE', '/popup/v1'): ((10, 14), _close_popup),
-        ('DELETE', '/popup/v1/safety'): ((10, 14), _close_safety_popup),
-    }
-)
+_ROUTES: Mapping[tuple[str, str], tuple[tuple[int, int], Handler]] = {
+    ('GET', '/openapi.json'): (FIRST_VERSION, _openapi),
+    ('PUT', '/robotstate/v1/state'): (FIRST_VERSION, partial(_act, _STATE_ACTIONS)),
+    ('GET', '/robotstate/v1/robotmode'): (
+        (10, 12),
+        lambda controller, _: {'mode': controller.power.mode.name},
+    ),
+    ('GET', '/robotstate/v1/safetymode'): ((10, 12), _safety_mode),
+    ('PUT', '/program/v1/state'): (FIRST_VERSION, partial(_act, _PROGRAM_ACTIONS)),
+    ('GET', '/program/v1/state'): (FIRST_VERSION, _program_state),
+    ('PUT', '/program/v1/load'): (FIRST_VERSION, load_program('programName')),
+    ('PUT', '/program/v1/loaded'): ((10, 12), load_program('name')),
+    ('GET', '/program/v1/loaded'): ((10, 12), loaded_program),
+    ('GET', '/programs/v1'): ((10, 12), list_programs),
+    ('POST', '/programs/v1'): ((10, 12), upload_program),
+    ('PUT', '/programs/v1'): ((10, 12), update_program),
+    ('GET', '/programs/v1/{name}'): ((10, 12), download_program),
+    ('GET', '/system/v1/controlmode'): (
+        (10, 12),
+        lambda controller, _: {'mode': 'REMOTE' if controller.remote_control else 'LOCAL'},
+    ),
+    ('GET', '/system/v1/operationalmode'): ((10, 12), _operational_mode),
+    ('GET', '/system/v1/information'): ((10, 14), _information),
+    ('POST', '/system/v1/log'): ((10, 14), _log),
+    ('PUT', '/system/v1/shutdown'): ((10, 14), _shut_down),
+    ('POST', '/supportfiles/v1'): ((10, 14), _write_flight_report),
+    ('GET', '/versions/v1'): ((10, 14), _versions),
+    ('POST', '/popup/v1'): ((10, 14), _open_popup),
+    ('DELETE', '/popup/v1'): ((10, 14), _close_popup),
+    ('DELETE', '/popup/v1/safety'): ((10, 14), _close_safety_popup),
+}
 
 
 class RobotApiSession(ClientSession):
@@ -364,7 +329,9 @@ class RobotApiSession(ClientSession):
             return None
         del self._buffer[: self._request_size]
         self._request_size = 0
-        self._last_request = version == 'HTTP/1.0' or headers.get('Connection') == 'close'
+        self._last_request = (
+            version == 'HTTP/1.0' or headers.get('Connection', '').lower() == 'close'
+        )
         return method, path, rest[:size], headers.get('Content-Type', '')
 
     def _answer(self, method: str, path: str, body: bytes, content_type: str) -> bytes:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 import asyncio
 from collections.abc import Callable, Iterator
+from errno import EACCES, EADDRINUSE
 import logging
 from typing import cast, Generic, TypeVar
 
@@ -225,10 +226,16 @@ class TcpServer(Generic[S]):
         self.closing = False
         try:
             self._server = await loop.create_server(lambda: _ClientConnection(self), host, port)
-        except OSError as error:
+        except (OSError, UnicodeError) as error:
+            is_taken = isinstance(error, OSError) and error.errno in (EADDRINUSE, EACCES)
+            remedy = (
+                'Choose another port, or 0 for any free one'
+                if is_taken
+                else 'Give an address of this computer as host'
+            )
+            reason = getattr(error, 'strerror', None) or error
             raise OSError(
-                f'Cannot open the {self.name} port {port} on {host}: '
-                f'{error.strerror or error}. Choose another port, or 0 for any free one.'
+                f'Cannot open the {self.name} port {port} on {host}: {reason}. {remedy}.'
             ) from error
 
     def broadcast(self, data: bytes) -> None:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 import re
-from types import MappingProxyType
 from typing import TypeAlias
 
 from ur_cartesian_driver.urscript.parsing.scanner import KEYWORDS
@@ -101,6 +100,4 @@ def function_name(program: str) -> str:
 
 
 #: The programs that every simulated robot has saved: file name -> tree.
-BUILT_IN_PROGRAMS = MappingProxyType(
-    {'external_control.urp': ProgramTree((ExternalControlNode(),))}
-)
+BUILT_IN_PROGRAMS = {'external_control.urp': ProgramTree((ExternalControlNode(),))}

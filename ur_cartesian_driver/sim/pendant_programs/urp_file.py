@@ -17,7 +17,6 @@ The format is not published; what is read here is what public files and tools ha
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from types import MappingProxyType
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 import zlib
@@ -112,14 +111,12 @@ def _popup(node: Element) -> str:
 
 
 #: Tag and type of a node -> function that returns its URScript, or None if it has none.
-_READERS: Mapping[tuple[str, str], Callable[[Element], str | None]] = MappingProxyType(
-    {
-        ('Script', 'Line'): _line,
-        ('Script', 'File'): _file,
-        ('Wait', 'Sleep'): _sleep,
-        ('Popup', 'Message'): _popup,
-    }
-)
+_READERS: Mapping[tuple[str, str], Callable[[Element], str | None]] = {
+    ('Script', 'Line'): _line,
+    ('Script', 'File'): _file,
+    ('Wait', 'Sleep'): _sleep,
+    ('Popup', 'Message'): _popup,
+}
 
 
 def _unknown_node(node: Element, name: str) -> ValueError:

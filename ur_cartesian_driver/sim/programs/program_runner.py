@@ -208,15 +208,22 @@ class ProgramRunner:
                 interpreter = self._compile(program)
         except CompileError as error:
             return error
+        except Exception as error:  # a defect of ours must not end the thread that compiles
+            _log.exception('A program cannot be compiled')
+            return CompileError(1, 1, 'internal_error', f'internal error: {error!r}')
         return CompiledProgram(program, interpreter)
 
     def _start_compiled(self, name: str, interpreter: ScriptInterpreter) -> None:
+        if not self._refuses(name):
+            self._queue_start(name, interpreter)
+
+    def _refuses(self, name: str) -> bool:
+        """Return whether no program can run now, and say why."""
         reason = self._arm.start_refusal()
         if reason:
             self._messages.text(f'Program {name} was not started: {reason}.')
             self.start_failure = reason
-            return
-        self._queue_start(name, interpreter)
+        return bool(reason)
 
     def load(self, name: str, text: str) -> str:
         """
@@ -295,9 +302,11 @@ class ProgramRunner:
         taken_over = self.state is RuntimeState.STOPPING and not self._arm.on_path
         if self._queued is None or not (taken_over or self.state is RuntimeState.STOPPED):
             return
-        self.name, self._interpreter = self._queued
-        self._queued = None
-        interpreter = self._interpreter
+        (name, interpreter), self._queued = self._queued, None
+        if self._refuses(name):  # a safety stop has come while it waited
+            return
+        self.name = name
+        self._interpreter = interpreter
         interpreter.on_thread_end = lambda number: self._arm.release((id(interpreter), number))
         self.state = RuntimeState.PLAYING
         if self.name == self.loaded:
@@ -305,6 +314,11 @@ class ProgramRunner:
         self._arm.begin_program()
         # A real controller writes XXX, too; the text of the message is the name of the program.
         self._messages.key('PROGRAM_XXX_STARTED', self.name)
+
+    def unpause(self) -> None:
+        """Resume a paused program; start none."""
+        if self.state in (RuntimeState.PAUSED, RuntimeState.PAUSING):
+            self.play()
 
     def play(self) -> str:
         """Resume the program or start the loaded one; return the reason of a refusal, or ''."""
@@ -414,3 +428,4 @@ class ProgramRunner:
             error = error or RuntimeException('Runtime is too much behind')
         if error is not None:
             self._messages.key('SECONDARY_PROGRAM_EXCEPTION_XXX', str(error))
+            self._messages.note(f'Secondary program: {error}')

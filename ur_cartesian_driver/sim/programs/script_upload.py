@@ -24,7 +24,11 @@ from ur_cartesian_driver.urscript.script_errors import CompileError
 #: such bound.
 MAX_UPLOAD_SIZE = 1024 * 1024
 
-_BLOCKS = frozenset({'def', 'sec', 'thread', 'if', 'while', 'switch'})
+_BLOCKS = frozenset({'def', 'thread', 'if', 'while', 'switch'})
+#: The first line of a program.
+_FIRST_LINE = re.compile(r'(?:def|sec)\s')
+#: A line that ends a program, unless an inner block is not indented.
+_LAST_LINE = re.compile(r'end\s*(?:#.*)?$')
 #: A word that opens or closes a block; most lines have none.
 _BLOCK_WORD = re.compile(rf'\b(?:end|{"|".join(sorted(_BLOCKS))})\b')
 
@@ -86,22 +90,24 @@ class UploadDecoder:
 
     def _line(self, data: bytes) -> UploadedItem | None:
         line = data.decode('latin-1').rstrip('\r')
+        is_last = _LAST_LINE.match(line) is not None
         if self._skipping:
-            self._skipping = line.rstrip() != 'end'
+            self._skipping = not _LAST_LINE.match(line)
             return None
         if not self._program:
-            if not line.startswith(('def ', 'sec ')):
+            if not _FIRST_LINE.match(line):
                 bare = line.strip()
                 return UploadedLine(bare) if bare and not bare.startswith('#') else None
-            self._size, self._open_blocks, self._indented = 0, 0, True
-        elif line[:1] not in ('', ' ', '\t', '#') and line.rstrip() != 'end':
+            # The word "sec" opens a block only here: elsewhere it is a name.
+            self._size, self._open_blocks, self._indented = 0, int(line.startswith('sec')), True
+        elif line[:1] not in ('', ' ', '\t', '#') and not is_last:
             self._indented = False
         self._program.append(line)
         self._size += len(data)
-        if self._size > MAX_UPLOAD_SIZE and line.rstrip() != 'end':
+        if self._size > MAX_UPLOAD_SIZE and not is_last:
             return self._skip()
         self._open_blocks += _block_balance(line)
-        if line.rstrip() != 'end' or not (self._indented or self._open_blocks <= 0):
+        if not is_last or not (self._indented or self._open_blocks <= 0):
             return None
         text = '\n'.join(self._program) + '\n'
         self._program, self._size = [], 0

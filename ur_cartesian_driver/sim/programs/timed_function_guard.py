@@ -15,8 +15,9 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 Builtins = Mapping[str, Any]
 
 
-#: Functions that act at once and then wait; a secondary program can call them, but does not wait.
-ACT_AT_ONCE = frozenset({'protective_stop'})
+#: Functions that act at once and then wait, if at all; a secondary program can call them, but does
+#: not wait.
+ACT_AT_ONCE = frozenset({'popup', 'protective_stop'})
 
 
 def refuse_timed_functions(builtins: Builtins) -> Builtins:
@@ -32,7 +33,7 @@ def _without_time(name: str, function: Any) -> Any:
     def act_or_refuse(*arguments: Any, **named: Any) -> None:
         if name not in ACT_AT_ONCE:
             raise RuntimeException(f'{name} takes time, which a secondary program does not have.')
-        next(function(*arguments, **named))
+        next(function(*arguments, **named), None)
 
     # Keep the function's signature, but not its mark as a generator.
     act_or_refuse.__signature__ = inspect.signature(  # type: ignore[attr-defined]  # all have it

@@ -22,6 +22,8 @@ from ur_cartesian_driver.sim.sockets.script_sockets import SocketState
 _MAX_BUFFERED = 65_536
 _IN_PROGRESS = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK, errno.EINTR)
 _CONNECTED = (0, errno.EISCONN)
+#: Raised for a name without an address; the last one for a name that is none.
+_NO_ADDRESS = (OSError, UnicodeError)
 
 #: Addresses of IPv4, of IPv6, and of a Python without IPv6; connecting to the last kind fails.
 _Address = tuple[str, int] | tuple[str, int, int, int] | tuple[int, bytes]
@@ -58,7 +60,7 @@ class _ScriptConnection:
             resolving, self.resolving = self.resolving, None
             try:
                 self.connect(resolving.result())
-            except OSError:
+            except _NO_ADDRESS:
                 self.close()
         elif self.state is SocketState.CONNECTING and self._socket is not None:
             self._continue_connecting()
@@ -144,7 +146,11 @@ class TcpScriptSockets:
         self._resolver: ThreadPoolExecutor | None = None
 
     def open(self, name: str, address: str, port: int) -> None:
-        """Begin to connect; a thread looks up host names, because that can take seconds."""
+        """
+        Begin to connect; a thread looks up host names, because that can take seconds.
+
+        :param port: a number from 0 to 65535.
+        """
         self.close(name)
         connection = _ScriptConnection(port, self.on_data, self._host)
         self._connections[name] = connection
@@ -153,12 +159,15 @@ class TcpScriptSockets:
             resolved = socket.getaddrinfo(
                 host, port, type=socket.SOCK_STREAM, flags=socket.AI_NUMERICHOST
             )
-        except (OSError, OverflowError):
+        except UnicodeError:  # no host name: a part of it is empty or too long
+            connection.close()
+            return
+        except OSError:
             connection.resolving = self._lookup(address, port)
             return
         try:
             connection.connect(resolved)
-        except (OSError, OverflowError):
+        except OSError:
             connection.close()
 
     def _lookup(self, address: str, port: int) -> Future[_Resolved]:

@@ -97,7 +97,7 @@ class ControllerMessages:
         The body is: u32 request, u8 type of the request, u8 each for warning, error and blocking,
         u8 length of the title, title, text.
         """
-        title = popup.title.encode()[:255]
+        title = popup.title.encode(errors='replace')[:255]
         flags = bytes([0, popup.warning, popup.error, popup.blocking])
         self.pending.append(
             RawMessage(
@@ -107,7 +107,7 @@ class ControllerMessages:
                 + flags
                 + bytes([len(title)])
                 + title
-                + popup.text.encode()[: _MAX_TEXT_LENGTH - 255],
+                + popup.text.encode(errors='replace')[: _MAX_TEXT_LENGTH - 255],
             )
         )
 
@@ -124,7 +124,7 @@ class ControllerMessages:
             RawMessage(
                 message_type=_REQUEST,
                 timestamp=self._stamp(),
-                content=bytes(4) + bytes([kind]) + _cut(text).encode(),
+                content=bytes(4) + bytes([kind]) + _cut(text).encode(errors='replace'),
             )
         )
 
@@ -137,5 +137,5 @@ def _cut(text: str) -> str:
     return (
         text
         if len(text) < _MAX_TEXT_LENGTH // 4
-        else text.encode()[:_MAX_TEXT_LENGTH].decode(errors='ignore')
+        else text.encode(errors='replace')[:_MAX_TEXT_LENGTH].decode(errors='ignore')
     )

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import Enum
-from types import MappingProxyType
 
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode, SafetyMode, SafetyStatus
 
@@ -50,42 +49,37 @@ _POWER_CUT_TRANSITIONS = {
 }
 
 #: Safety mode -> event -> next safety mode; an event that is not in the table is refused.
-SAFETY_TRANSITIONS: Mapping[SafetyMode, Mapping[SafetyEvent, SafetyMode]] = MappingProxyType(
-    {
-        SafetyMode.NORMAL: _STOP_TRANSITIONS,
-        SafetyMode.REDUCED: _STOP_TRANSITIONS,
-        SafetyMode.PROTECTIVE_STOP: {
-            **_POWER_CUT_TRANSITIONS,
-            SafetyEvent.UNLOCK: SafetyMode.NORMAL,
-            SafetyEvent.UNLOCK_BY_LINE: SafetyMode.NORMAL,
-        },
-        SafetyMode.SAFEGUARD_STOP: {
-            **_POWER_CUT_TRANSITIONS,
-            SafetyEvent.SAFEGUARD_RESET: SafetyMode.NORMAL,
-        },
-        SafetyMode.ROBOT_EMERGENCY_STOP: {SafetyEvent.RELEASE: SafetyMode.NORMAL},
-        SafetyMode.VIOLATION: {SafetyEvent.RESTART: SafetyMode.NORMAL},
-        SafetyMode.FAULT: {SafetyEvent.RESTART: SafetyMode.NORMAL},
-    }
-)
+SAFETY_TRANSITIONS: Mapping[SafetyMode, Mapping[SafetyEvent, SafetyMode]] = {
+    SafetyMode.NORMAL: _STOP_TRANSITIONS,
+    SafetyMode.REDUCED: _STOP_TRANSITIONS,
+    SafetyMode.PROTECTIVE_STOP: {
+        **_POWER_CUT_TRANSITIONS,
+        SafetyEvent.UNLOCK: SafetyMode.NORMAL,
+        SafetyEvent.UNLOCK_BY_LINE: SafetyMode.NORMAL,
+    },
+    SafetyMode.SAFEGUARD_STOP: {
+        **_POWER_CUT_TRANSITIONS,
+        SafetyEvent.SAFEGUARD_RESET: SafetyMode.NORMAL,
+    },
+    SafetyMode.ROBOT_EMERGENCY_STOP: {SafetyEvent.RELEASE: SafetyMode.NORMAL},
+    SafetyMode.VIOLATION: {SafetyEvent.RESTART: SafetyMode.NORMAL},
+    SafetyMode.FAULT: {SafetyEvent.RESTART: SafetyMode.NORMAL},
+}
 
 #: The bits that RTDE reports in addition to the mode.
-STATUS_BITS: Mapping[SafetyMode, SafetyStatus] = MappingProxyType(
-    {
-        SafetyMode.NORMAL: SafetyStatus.NORMAL_MODE,
-        SafetyMode.REDUCED: SafetyStatus.REDUCED_MODE,
-        SafetyMode.PROTECTIVE_STOP: SafetyStatus.PROTECTIVE_STOPPED
-        | SafetyStatus.STOPPED_DUE_TO_SAFETY,
-        SafetyMode.RECOVERY: SafetyStatus.RECOVERY_MODE,
-        SafetyMode.SAFEGUARD_STOP: SafetyStatus.SAFEGUARD_STOPPED
-        | SafetyStatus.STOPPED_DUE_TO_SAFETY,
-        SafetyMode.ROBOT_EMERGENCY_STOP: SafetyStatus.ROBOT_EMERGENCY_STOPPED
-        | SafetyStatus.EMERGENCY_STOPPED
-        | SafetyStatus.STOPPED_DUE_TO_SAFETY,
-        SafetyMode.VIOLATION: SafetyStatus.VIOLATION | SafetyStatus.STOPPED_DUE_TO_SAFETY,
-        SafetyMode.FAULT: SafetyStatus.FAULT | SafetyStatus.STOPPED_DUE_TO_SAFETY,
-    }
-)
+STATUS_BITS: Mapping[SafetyMode, SafetyStatus] = {
+    SafetyMode.NORMAL: SafetyStatus.NORMAL_MODE,
+    SafetyMode.REDUCED: SafetyStatus.REDUCED_MODE,
+    SafetyMode.PROTECTIVE_STOP: SafetyStatus.PROTECTIVE_STOPPED
+    | SafetyStatus.STOPPED_DUE_TO_SAFETY,
+    SafetyMode.RECOVERY: SafetyStatus.RECOVERY_MODE,
+    SafetyMode.SAFEGUARD_STOP: SafetyStatus.SAFEGUARD_STOPPED | SafetyStatus.STOPPED_DUE_TO_SAFETY,
+    SafetyMode.ROBOT_EMERGENCY_STOP: SafetyStatus.ROBOT_EMERGENCY_STOPPED
+    | SafetyStatus.EMERGENCY_STOPPED
+    | SafetyStatus.STOPPED_DUE_TO_SAFETY,
+    SafetyMode.VIOLATION: SafetyStatus.VIOLATION | SafetyStatus.STOPPED_DUE_TO_SAFETY,
+    SafetyMode.FAULT: SafetyStatus.FAULT | SafetyStatus.STOPPED_DUE_TO_SAFETY,
+}
 
 #: Modes in which the arm can be powered and can move.
 OPERATIONAL = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})

@@ -314,6 +314,8 @@ class Parser(ExpressionParser):
         """Read "$" NUMBER STRING { STRING }; the strings are on one line."""
         start = self._advance()
         number = self._expect_kind(TokenKind.NUMBER)
+        if not number.text.isdecimal():
+            raise self.error('the number of a label is a whole number', number)
         text = self._expect_kind(TokenKind.STRING).text
         while self._token.kind is TokenKind.STRING and self._same_line():
             self._advance()

@@ -33,6 +33,9 @@ class LineRuntime(Protocol):
     def forget(self, variables: Iterable[str]) -> None:
         """Forget global variables."""
 
+    def drop(self, constants: Iterable[str]) -> None:
+        """Drop constants that no code uses any more."""
+
 
 @dataclass(frozen=True, slots=True)
 class CompiledLine:
@@ -95,4 +98,18 @@ class LineCompiler:
             for node in program.body
             if isinstance(node, tree.CallStatement) and isinstance(node.call, tree.CallExpression)
         )
-        return CompiledLine(self._runtime.begin(code), calls)
+        return CompiledLine(self._steps(code), calls)
+
+    def _steps(self, code: GeneratedCode) -> ScriptSteps:
+        """Return the steps of a line, whose constants are dropped after them."""
+        steps, (statements, *_) = self._runtime.begin(code), code.code
+        if not statements.constants:
+            return steps
+
+        def all_steps() -> ScriptSteps:
+            try:
+                return (yield from steps)
+            finally:
+                self._runtime.drop(statements.constants)
+
+        return all_steps()

@@ -199,8 +199,12 @@ class ScriptInterpreter:
 
     def forget(self, variables: Iterable[str]) -> None:
         """Forget global variables."""
-        for name in variables:
-            self._names.pop(global_name(name), None)
+        self.drop(map(global_name, variables))
+
+    def drop(self, constants: Iterable[str]) -> None:
+        """Drop constants that no code uses any more."""
+        for name in constants:
+            self._names.pop(name, None)
 
     def step(self) -> None:
         """Run one frame: every live thread until it yields or ends."""

@@ -83,6 +83,20 @@ class PathClock:
         found = float((speeds[1:] + speeds[:-1]).sum()) * span / (2.0 * pieces)
         return length, speeds * (length / found if found > 0.0 else 0.0), turns
 
+    def max_speed(self, begin: float, end: float) -> float:
+        """Return the largest speed of the tool from one time to another [m/s]."""
+        (first, _), (last, _) = self._piece(begin), self._piece(end)
+        own, after = slice(first, last + 1), slice(first + 1, last + 2)
+        spans = self._times[after] - self._times[own]
+        u, v = self._speeds[own], self._speeds[after]
+        # Both are positive where the tool moves; elsewhere the result is 0.
+        means = (self._arc_lengths[after] - self._arc_lengths[own]) / np.maximum(spans, 1e-12)
+        factors = 2.0 * means / np.maximum(u + v, 1e-300)
+        parts = np.clip(
+            (np.array([[begin], [end]]) - self._times[own]) / np.maximum(spans, 1e-12), 0.0, 1.0
+        )
+        return float((factors * (u + (v - u) * parts)).max())
+
     def time_at(self, arc_length: float, *, leaving: bool) -> float:
         """
         Return when the tool has made some way from the start [s].

@@ -33,6 +33,7 @@ from ur_cartesian_driver.planning.request.point_events.presses import Presses
 from ur_cartesian_driver.planning.request.point_events.proportional_outputs import (
     ProportionalOutputs,
 )
+from ur_cartesian_driver.planning.request.point_events.pulses import Pulses
 from ur_cartesian_driver.planning.request.point_events.safe_outputs import check_safe_outputs
 from ur_cartesian_driver.planning.request.point_events.script_calls import ScriptCalls
 from ur_cartesian_driver.planning.request.point_events.switched_outputs import SwitchedOutputs
@@ -46,7 +47,11 @@ STOP_EVENTS: tuple[PointEvent[Any], ...] = (
     Presses(),
 )
 #: Events that happen while the arm moves.
-OUTPUT_EVENTS: tuple[OutputEvent[Any], ...] = (SwitchedOutputs(), ProportionalOutputs())
+OUTPUT_EVENTS: tuple[OutputEvent[Any], ...] = (
+    SwitchedOutputs(),
+    ProportionalOutputs(),
+    Pulses(),
+)
 POINT_EVENTS: tuple[PointEvent[Any], ...] = (*OUTPUT_EVENTS, *STOP_EVENTS)
 #: By dataclass: the kinds of events that have a dataclass of their own.
 EVENT_KINDS: Mapping[type, PointEvent[Any]] = {

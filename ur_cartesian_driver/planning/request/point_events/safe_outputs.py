@@ -36,7 +36,7 @@ def check_safe_outputs(goal: GoalTable) -> None:
 
 
 def add_safe_outputs(goal: GoalTable, options: PlanningOptions) -> GoalTable:
-    """Return the goal with the parameter's safe outputs, and one for each proportional output."""
+    """Return the goal with the parameter's safe outputs, and one for each output with a law."""
     outputs = {(output.output, output.pin): output for output in goal.safe_outputs}
     for output in parse_safe_outputs(options.safe_outputs):
         outputs.setdefault((output.output, output.pin), output)
@@ -51,5 +51,11 @@ def add_safe_outputs(goal: GoalTable, options: PlanningOptions) -> GoalTable:
                 domain=following.domain,
                 restore=True,
             ),
+        )
+    # The program is the one that ends a pulse, and it does not run in a pause.
+    for train in goal.pulses:
+        outputs.setdefault(
+            (train.output, train.pin),
+            SafeOutput(output=train.output, pin=train.pin, value=0.0, restore=True),
         )
     return replace(goal, safe_outputs=tuple(outputs.values()))

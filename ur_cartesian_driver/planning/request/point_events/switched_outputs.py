@@ -92,13 +92,14 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
     def place(self, command: IOCommand, field: str, path: TimedPath) -> list[PlacedOutput]:
         """Return the record that switches the output, with its time and place."""
         point, lead = self._passed(command, field, path), max(-command.offset, 0.0)
+        lead_field = f'{field}.lead' if command.lead_name else f'{field}.offset'
         time, last = point.time + max(command.offset, 0.0), len(path.ends) - 1
         late, delay, trigger_time, law = time - float(path.ends[last]), 0.0, None, None
         rest = path.rests.get(command.waypoint)
         has_place = bool(command.distance or command.fraction)
         if lead > 0.0:
             time = point.time if point.trigger_time is None else point.trigger_time
-            after, trigger_time, law = path.ahead(time, lead, f'{field}.offset')
+            after, trigger_time, law = path.ahead(time, lead, lead_field)
             where = f'{lead:.3f} s ahead, {point.where}'
         elif command.offset <= SAME_TIME:
             after, trigger_time, where = point.after, point.trigger_time, point.where
@@ -121,6 +122,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
         return [
             PlacedOutput(
                 lead=lead,
+                lead_field=lead_field,
                 time=time if trigger_time is None else trigger_time,
                 after_index=after,
                 report_index=point.row,

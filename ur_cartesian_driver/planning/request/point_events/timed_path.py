@@ -65,6 +65,8 @@ class PlacedOutput:
     text: str
     #: How much later the tool is at the place of the output, at full speed [s].
     lead: float = 0.0
+    #: The field that gives the lead, in a refusal.
+    lead_field: str = ''
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,6 +95,7 @@ class TimedPath:
         blend_halves: Floats | None,
         start_time: float,
         point_times: Floats | None = None,
+        control_cycle: float = 0.0,
     ) -> None:
         """
         Compute when each motion ends, and when it returns.
@@ -103,7 +106,9 @@ class TimedPath:
         :param start_time: when the first segment begins [s].
         :param point_times: when points are passed within a motion (n,) [s]; None = each point is
             at the end of a motion.
+        :param control_cycle: cycle of the controller [s], needed for pulses only.
         """
+        self.control_cycle = control_cycle
         self._point_times = point_times
         self._primitives, self._reference = segments.primitives, reference
         self.clock = PathClock(reference)
@@ -150,10 +155,10 @@ class TimedPath:
         :raises InvalidGoal: the path does not lead there, or the robot program would read the
             record too late.
         """
-        here, clock = self._arc_length_of(waypoint), self.clock
+        here, clock = self.arc_length_of(waypoint), self.clock
         name, value, where = 'distance', f'{distance:g} m', f'{1e3 * abs(distance):g} mm'
         if not distance:
-            length = self._arc_length_of(waypoint + (1 if fraction > 0.0 else -1)) - here
+            length = self.arc_length_of(waypoint + (1 if fraction > 0.0 else -1)) - here
             distance = abs(fraction) * length
             name, value = 'fraction', f'{fraction:g} ({1e3 * distance:.3g} mm)'
             where = f'{100.0 * abs(fraction):g} % of the segment'
@@ -198,7 +203,7 @@ class TimedPath:
             'the place exact)'
         )
 
-    def _arc_length_of(self, waypoint: int) -> float:
+    def arc_length_of(self, waypoint: int) -> float:
         """Return the length of the path to a point [m]; 0 before the first motion."""
         if waypoint < 0:
             return 0.0
@@ -263,9 +268,10 @@ class TimedPath:
                 if rests
                 else 'the robot program has not read the record by then'
             )
+            value = lead if field.endswith('.lead') else -lead
             raise InvalidGoal(
                 field,
-                f'is {-lead:g} s, but {why}: the longest lead here is '
+                f'is {value:g} s, but {why}: the longest lead here is '
                 f'{max(time - begin, 0.0):.3f} s',
                 'reduce the lead, or move the place',
             )

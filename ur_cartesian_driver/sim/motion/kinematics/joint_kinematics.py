@@ -50,9 +50,6 @@ NO_CHANGE = 1e-9
 _AT_LIMIT = 0.02
 _SAMPLES = 8
 
-#: A distance beyond the reach of any arm [m].
-_MAX_DISTANCE = 1e3
-
 
 class JointKinematics:
     """
@@ -70,8 +67,6 @@ class JointKinematics:
 
     def joints(self, T_base_flange: Pose, q_near: Vector6) -> Vector6 | None:
         """Return the solution within the limits nearest to ``q_near``; None = no solution."""
-        if not max(map(abs, T_base_flange.position)) < _MAX_DISTANCE:
-            return None  # absurd speeds lead to such positions, whose squares overflow
         return nearest(self._arm, T_base_flange, q_near)
 
     def changes_branch(self, q: Vector6, q_next: Vector6) -> bool:
