@@ -3,12 +3,12 @@
 """
 Start the driver node of one robot, with parameters from a file and the command line.
 
-The arguments have the names of the UR ROS 2 driver. Two robots need two namespaces, two
-tf_prefixes and, on one address, different ports (0: any free port).
+The arguments have the names of the UR ROS 2 driver; the file has what is not given. Two robots
+need two namespaces, two tf_prefixes and, on one address, different ports (0: any free port).
 """
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
@@ -43,13 +43,13 @@ ARGUMENTS = [
     DeclareLaunchArgument(
         'reverse_ip',
         default_value='',
-        description='Address at which the robot reaches this computer (NAT, containers). Empty: '
-        'the local address of the connection to the robot.',
+        description='Address at which the robot reaches this computer (NAT, containers). Unless '
+        'the file has one, the local address of the connection to the robot.',
     ),
     DeclareLaunchArgument(
         'headless_mode',
-        default_value='false',
-        choices=['true', 'false'],
+        default_value='',
+        choices=['', 'true', 'false'],
         description='Send the robot program directly, instead of serving it to the External '
         'Control URCap. Needs remote control on the pendant.',
     ),
@@ -60,22 +60,22 @@ ARGUMENTS = [
     ),
     DeclareLaunchArgument(
         'reverse_port',
-        default_value='50001',
+        default_value='',
         description='Port to which the robot program connects for control messages.',
     ),
     DeclareLaunchArgument(
         'script_sender_port',
-        default_value='50002',
+        default_value='',
         description='Port that serves the robot program to the External Control URCap.',
     ),
     DeclareLaunchArgument(
         'trajectory_port',
-        default_value='50003',
+        default_value='',
         description='Port to which the robot program connects for trajectory points.',
     ),
     DeclareLaunchArgument(
         'script_command_port',
-        default_value='50004',
+        default_value='',
         description='Port to which the robot program connects for single commands.',
     ),
     DeclareLaunchArgument('namespace', default_value='', description='Namespace of the node.'),
@@ -101,27 +101,33 @@ ARGUMENTS = [
 ]
 STRINGS = ['ur_type', 'robot_ip', 'reverse_ip', 'tf_prefix']
 PORTS = ['reverse_port', 'script_sender_port', 'trajectory_port', 'script_command_port']
+# Without a type, launch would read a value as YAML: robot_ip 10 would become a number.
+TYPES = {'headless_mode': bool, **dict.fromkeys(STRINGS, str), **dict.fromkeys(PORTS, int)}
+
+
+def driver(context):
+    """Return the node of the driver; only arguments that are given override the file."""
+    parameters = {
+        name: ParameterValue(LaunchConfiguration(name), value_type=type_)
+        for name, type_ in TYPES.items()
+        if LaunchConfiguration(name).perform(context)
+    }
+    if LaunchConfiguration('launch_rviz').perform(context) == 'true':
+        parameters['publish_link_frames'] = True
+    return [
+        Node(
+            package=PACKAGE,
+            executable='driver',
+            namespace=LaunchConfiguration('namespace'),
+            parameters=[LaunchConfiguration('config_file'), parameters],
+            output='screen',
+            emulate_tty=True,
+        )
+    ]
 
 
 def generate_launch_description():
-    """Return the arguments and the node."""
-    # Without a type, launch would read a value as YAML: robot_ip 10 would become a number.
-    types = {'headless_mode': bool, **dict.fromkeys(STRINGS, str), **dict.fromkeys(PORTS, int)}
-    parameters = {
-        name: ParameterValue(LaunchConfiguration(name), value_type=type_)
-        for name, type_ in types.items()
-    }
-    parameters['publish_link_frames'] = ParameterValue(
-        LaunchConfiguration('launch_rviz'), value_type=bool
-    )
-    driver = Node(
-        package=PACKAGE,
-        executable='driver',
-        namespace=LaunchConfiguration('namespace'),
-        parameters=[LaunchConfiguration('config_file'), parameters],
-        output='screen',
-        emulate_tty=True,
-    )
+    """Return the arguments and the nodes."""
     names = Node(
         package=PACKAGE,
         executable='ur_driver_names',
@@ -144,4 +150,4 @@ def generate_launch_description():
         ],
         condition=IfCondition(LaunchConfiguration('launch_rviz')),
     )
-    return LaunchDescription([*ARGUMENTS, driver, names, rviz])
+    return LaunchDescription([*ARGUMENTS, OpaqueFunction(function=driver), names, rviz])

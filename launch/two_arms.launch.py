@@ -8,10 +8,9 @@ frames, and its own ports on this computer. Copy this file for more arms or othe
 """
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
+from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
-from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 PACKAGE = 'ur_cartesian_driver'
@@ -23,8 +22,8 @@ ARGUMENTS = [
     DeclareLaunchArgument('right_ur_type', default_value='ur5e', description='Its model.'),
     DeclareLaunchArgument(
         'headless_mode',
-        default_value='false',
-        choices=['true', 'false'],
+        default_value='',
+        choices=['', 'true', 'false'],
         description='Send the robot programs directly, instead of serving them to the External '
         'Control URCap. Needs remote control on the pendants.',
     ),
@@ -40,29 +39,24 @@ FIRST_PORT = {'left': 50001, 'right': 50011}
 
 
 def driver(side):
-    """Return the node of one side."""
-
-    def text(name):
-        # Without a type, launch would read a value as YAML: robot_ip 10 would become a number.
-        return ParameterValue(LaunchConfiguration(f'{side}_{name}'), value_type=str)
-
-    parameters = {
-        'robot_ip': text('robot_ip'),
-        'ur_type': text('ur_type'),
-        'tf_prefix': f'{side}_',
-        'headless_mode': ParameterValue(LaunchConfiguration('headless_mode'), value_type=bool),
-        **{name: FIRST_PORT[side] + i for i, name in enumerate(PORTS)},
-    }
-    return Node(
-        package=PACKAGE,
-        executable='driver',
-        namespace=side,
-        parameters=[LaunchConfiguration('config_file'), parameters],
-        output='screen',
-        emulate_tty=True,
+    """Return the driver of one side."""
+    own = {name: LaunchConfiguration(f'{side}_{name}') for name in ('robot_ip', 'ur_type')}
+    shared = {name: LaunchConfiguration(name) for name in ('headless_mode', 'config_file')}
+    ports = {name: str(FIRST_PORT[side] + i) for i, name in enumerate(PORTS)}
+    return IncludeLaunchDescription(
+        PythonLaunchDescriptionSource(
+            PathJoinSubstitution([FindPackageShare(PACKAGE), 'launch', 'driver.launch.py'])
+        ),
+        launch_arguments={
+            **own,
+            **shared,
+            **ports,
+            'namespace': side,
+            'tf_prefix': f'{side}_',
+        }.items(),
     )
 
 
 def generate_launch_description():
-    """Return the arguments and the two nodes."""
+    """Return the arguments and the two drivers."""
     return LaunchDescription([*ARGUMENTS, driver('left'), driver('right')])

@@ -64,6 +64,11 @@ def test_a_line_whose_turn_may_lead_shows_no_speed_of_lines(laws, turn):
     assert low < laws.timed_linear_speed < high
 
 
+def noise(generator: np.random.Generator, t: Floats) -> Floats:
+    """Return the noise of a joint position [rad]."""
+    return np.asarray(5e-8 * generator.standard_normal(len(t)), np.float64)
+
+
 def test_begin_and_end_of_a_move_are_known_to_be_correlated():
     """A move that seems to begin late seems to end early, so gaps beside it err together."""
     generator, t = np.random.default_rng(1), 0.004 * np.arange(450)
@@ -71,10 +76,7 @@ def test_begin_and_end_of_a_move_are_known_to_be_correlated():
     travel: Floats = speed_steps(0.6, 2.0, 0.6).integral(times)
     follows = np.arange(len(t)) > 0
     found = [
-        find_profile(
-            t, travel + 5e-8 * generator.standard_normal(len(t)), follows, may_start=False
-        )
-        for _ in range(100)
+        find_profile(t, travel + noise(generator, t), follows, may_start=False) for _ in range(100)
     ]
     sample = np.cov([(each.begin.value, each.end.value) for each in found], rowvar=False)
     assert sample[0, 1] < 0.0

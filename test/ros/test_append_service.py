@@ -103,6 +103,28 @@ def test_nobody_waits_for_a_goal_whose_time_is_to_come(single_cell):
     assert result.error_code == ErrorCode.CANCELLED
 
 
+def test_points_go_to_the_goal_that_moves_not_to_the_oldest(single_cell):
+    cell = single_cell
+    append = Producer(cell)
+    waiting = cell.goal((1.0, 0.02, 0.0, 0.0))
+    waiting.trajectory.header.stamp = (
+        cell.client_node.get_clock().now() + Duration(seconds=60)
+    ).to_msg()
+    scheduled = cell.send(waiting)
+    nobody = append(None, 2**32 - 1, (2.0, 0.0, 0.0, 0.0), goal_id=UUID())
+    assert nobody.message.startswith('No goal runs to which points could be appended')
+    tail = cell.goal((2.0, 0.03, 0.03, 0.0), (3.0, 0.0, 0.03, 0.0))
+    handle = cell.send(cell.goal((1.0, 0.03, 0.0, 0.0), keep_open=True))
+    with cell.spun(), GoalClient() as client:
+        appended = client.append_to_running(tail, last=True)
+    assert appended.accepted, appended.message
+    assert (appended.first_index, appended.points_received) == (1, 3)
+    _, result = cell.result(handle)
+    assert result.error_code == ErrorCode.SUCCESSFUL, result.error_string
+    cell.await_(scheduled.cancel_goal_async())
+    cell.result(scheduled)
+
+
 def test_a_client_replaces_the_tail_of_its_goal_and_appends_to_it(single_cell):
     cell, answers = single_cell, []
     (x, y, z), start = cell.T_base_tcp.position, cell.T_base_tcp
@@ -164,6 +186,19 @@ def test_a_shell_appends_to_the_goal_of_another_client(single_cell, tmp_path, ca
     _, result = cell.result(handle)
     assert result.error_code == ErrorCode.SUCCESSFUL, result.error_string
     assert cell.T_base_tcp.position == pytest.approx((x, y + 0.01, z), abs=1e-4)
+
+
+def test_a_defect_is_logged_with_its_traceback(single_cell, capfd):
+    cell = single_cell
+    handle = cell.send(cell.goal((1.0, 0.02, 0.0, 0.0), keep_open=True))
+    run = cell.node.action_server.find_run(bytes(handle.goal_id.uuid))
+    run.motion = None
+    said = Producer(cell)(handle, 1, (2.0, 0.0, 0.0, 0.0))
+    assert said.message.startswith('The driver has a defect, TypeError: ')
+    assert 'Traceback' in capfd.readouterr().err
+    del run.motion
+    cell.await_(handle.cancel_goal_async())
+    cell.result(handle)
 
 
 def test_a_shell_is_asked_for_the_points(capsys):

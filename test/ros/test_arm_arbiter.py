@@ -117,6 +117,36 @@ def test_what_has_the_arm_for_now_makes_way_for_every_goal(arbiter):
     assert arbiter.acquire(session.arm_request, preemptible=True)
 
 
+def test_nobody_acquires_the_arm_while_a_goal_waits_for_it(arbiter):
+    (goal,) = enqueued(arbiter, 'goal 1')
+    late, refused = ArmRequest('a later session', lambda: None), []
+
+    def end():
+        arbiter.release(session)
+        refused.append((arbiter.acquire(late, preemptible=True), arbiter.holder))
+
+    session = ArmRequest('a session', end)
+    assert arbiter.acquire(session, preemptible=True)
+    arbiter.preempt(goal.arm_request)
+    assert refused == [(False, 'goal 1')]
+    arbiter.release(goal.arm_request)
+    assert arbiter.acquire(late, preemptible=True)
+
+
+def test_a_goal_whose_predecessor_fails_to_stop_holds_up_nobody(arbiter):
+    def fail():
+        raise OSError('does not stop')
+
+    (goal,) = enqueued(arbiter, 'goal 1')
+    session = ArmRequest('a session', fail)
+    assert arbiter.acquire(session, preemptible=True)
+    with pytest.raises(OSError, match='does not stop'):
+        arbiter.preempt(goal.arm_request)
+    for ended in (goal.arm_request, session):
+        arbiter.release(ended)
+    assert arbiter.acquire(ArmRequest('another session', lambda: None))
+
+
 @pytest.mark.parametrize('seed', range(5))
 def test_one_goal_at_a_time_has_the_arm_and_the_newest_the_last(arbiter, seed):
     random, goals, moved = Random(seed), [], []

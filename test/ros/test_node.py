@@ -5,17 +5,21 @@ import subprocess
 import sys
 import threading
 from time import monotonic
+from typing import Any
 
 from action_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 import pytest
 import rclpy
+from rclpy.action.server import RCLError
 from rclpy.context import Context
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, String
 from std_srvs.srv import Trigger
+from waiting import wait_for
 
+from ur_cartesian_driver.driver.callbacks import LOG
 from ur_cartesian_driver.kinematics.robot_description import robot_description
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -28,6 +32,7 @@ from ur_cartesian_driver.msg import (
 )
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros import CartesianDriverNode
+from ur_cartesian_driver.ros import node as node_module
 from ur_cartesian_driver.ros.client import GoalClient, load_goal
 from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS, STATE_QOS
 from ur_cartesian_driver.ros.parameters.parameter_table import ParameterError
@@ -89,12 +94,29 @@ def test_the_state_of_the_robot_is_published(single_cell):
     )
 
 
-def test_a_value_that_cannot_be_published_does_not_silence_the_topics(single_cell):
+def test_a_value_that_cannot_be_published_does_not_silence_the_topics(single_cell, capfd):
     cell = single_cell
     newest = subscribe(cell, ['joint_states'])
     cell.spin_until(lambda: newest)
     cell.node.driver._robot.signals = 'nonsense'
     cell.spin_until(lambda: cell.node._publisher._io_topics._last == 'nonsense')
+    newest.clear()
+    cell.spin_until(lambda: newest)
+    assert 'Traceback' in capfd.readouterr().err
+
+
+def test_a_topic_that_fails_while_ros_is_up_does_not_silence_the_others(single_cell, capfd):
+    cell = single_cell
+    newest = subscribe(cell, ['joint_states'])
+    cell.spin_until(lambda: newest)
+
+    def fail(*_):
+        raise RCLError('no memory')
+
+    topic = cell.node._publisher._diagnostics_topic
+    publish, topic.publish = topic.publish, fail
+    cell.spin_until(lambda: 'no memory' in capfd.readouterr().err)
+    topic.publish = publish
     newest.clear()
     cell.spin_until(lambda: newest)
 
@@ -132,6 +154,85 @@ def test_destroying_the_node_stops_a_running_goal(no_thread_left, sim, executor,
         thread.name.startswith(('goal', 'driver', 'state publisher', 'robot loop'))
         for thread in threading.enumerate()
     )
+
+
+class RosLogger:
+    """Keeps what it is told."""
+
+    def __init__(self, name):
+        self.name, self.records = name, []
+
+    def __getattr__(self, severity):
+        return lambda text: self.records.append((severity, text))
+
+
+def test_each_node_logs_the_records_of_its_own_driver_with_their_tracebacks():
+    loggers: Any = RosLogger('left'), RosLogger('right')
+    left, right = map(node_module._LogBridge, loggers)
+    left.source.info('of the left arm')
+    right.source.info('of the right arm')
+    LOG.warning('of no arm')
+    left.close()
+    right.source.info('alone')
+    try:
+        raise OSError('no memory')
+    except OSError:
+        LOG.exception('of no arm')
+    right.close()
+    assert loggers[0].records == [('info', 'of the left arm'), ('warning', 'of no arm')]
+    right_arm, alone, (severity, text) = loggers[1].records
+    assert (right_arm, alone) == (('info', 'of the right arm'), ('info', 'alone'))
+    assert severity == 'error'
+    assert text.startswith('of no arm\nTraceback ')
+    assert text.endswith('OSError: no memory')
+
+
+def test_the_arm_stops_before_anything_else_ends(single_cell):
+    cell, node = single_cell, single_cell.node
+    cell.send(cell.goal((5.0, 0.2, 0.2, 0.0)))
+    cell.spin_until(lambda: node.action_server.running_motion)
+    close, stopped = node.contact_action.close, []
+
+    def close_late():
+        wait_for(lambda: node.action_server.running_motion is None, 3.0)
+        stopped.append(True)
+        close()
+
+    node.contact_action.close = close_late
+    node.destroy_node()
+    assert stopped
+
+
+def test_the_command_ends_the_node_before_the_names(sim, parameters_for, monkeypatch):
+    events = []
+
+    class RecordedNode(CartesianDriverNode):
+        def destroy_node(self):
+            super().destroy_node()
+            events.append('node')
+
+    class RecordedNames:
+        def __init__(self, *_):
+            signal.raise_signal(signal.SIGINT)
+
+        def close(self):
+            events.append('names')
+
+    monkeypatch.setattr(node_module, 'CartesianDriverNode', RecordedNode)
+    monkeypatch.setattr(node_module, 'NamesProcess', RecordedNames)
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        node_module.main(['driver', '--ur-driver-names', *arguments_of(parameters_for(sim))])
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    assert events == ['node', 'names']
+
+
+def arguments_of(parameters):
+    """Return parameters as ROS arguments."""
+    words = [f'{name}:={str(value).lower()}' for name, value in parameters.items()]
+    return ['--ros-args', *(each for word in words for each in ('-p', word))]
 
 
 def test_a_node_can_be_made_and_destroyed_again(no_thread_left, sim, make_cell):
@@ -189,13 +290,12 @@ def command(*arguments):
 def test_a_signal_ends_the_goal_with_a_result_and_the_command_with_0(
     sim, parameters_for, tmp_path
 ):
-    arguments = [
-        word
-        for name, value in parameters_for(sim, robot_loop='process').items()
-        for word in ('-p', f'{name}:={str(value).lower()}')
-    ]
+    arguments = arguments_of(parameters_for(sim, robot_loop='process'))
     errors = tmp_path / 'stderr'
-    with errors.open('w') as stderr, subprocess.Popen(command(*arguments), stderr=stderr) as node:
+    with (
+        errors.open('w') as stderr,
+        subprocess.Popen(command(*arguments[1:]), stderr=stderr) as node,
+    ):
         try:
             with GoalClient() as client:
                 goal = load_goal(share_path() / 'config' / 'examples' / 'square.yaml')
@@ -233,6 +333,11 @@ def run_when_ready(client, goal, on_feedback):
             "Parameter max_tool_speed is 'fast', but must be a number.",
         ),
         (['-p', 'max_tool_sped:=0.5'], 'There is no parameter max_tool_sped; did you mean'),
+        (
+            ['-p', 'unlock_protective_stop:=true'],
+            'unlock_protective_stop is a parameter of the node ur_driver_names; write -p '
+            'ur_driver_names:unlock_protective_stop:=VALUE.',
+        ),
         (['-p', 'ur_type'], "failed to initialize rcl: Couldn't parse parameter override rule"),
         (['--params-file', '/nowhere'], "failed to initialize rcl: Couldn't parse params file"),
     ],

@@ -29,7 +29,7 @@ def test_offsets_of_a_client_move_the_tool_and_wrong_ones_say_why(single_cell):
             subscriber.give(message)
         return str(refused.value)
 
-    assert refusal(Vector3()) == 'No goal moves the arm.'
+    subscriber.give(Vector3Stamped())  # no fault: a sensor publishes between goals, too
     goal = cell.goal((5.0, 0.05, 0.0, 0.0), execution=SERVO)  # time enough on a busy computer
     goal.path_offset.limits.z = 0.004
     goal.path_offset.timeout = 5.0

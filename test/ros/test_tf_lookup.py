@@ -139,6 +139,14 @@ def test_without_tf2_nothing_is_listened_to(monkeypatch):
     assert tf_lookup.listen_to_tf(None, 1.0) is None
 
 
+def test_a_broken_tf2_is_not_taken_for_a_missing_one(monkeypatch, tmp_path):
+    (tmp_path / 'tf2_ros.py').write_text('import tf2_py_that_is_not_there')
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, 'tf2_ros', raising=False)
+    with pytest.raises(ModuleNotFoundError, match='tf2_py_that_is_not_there'):
+        tf_lookup.listen_to_tf(None, 1.0)
+
+
 def test_where_tf2_is_installed_it_is_listened_to(monkeypatch):
     class Tf2Ros:
         Buffer = StandInBuffer

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 import contextlib
 from dataclasses import replace
+import logging
 
 from ur_cartesian_driver.driver.appender import Appender, encode_part
 from ur_cartesian_driver.driver.callbacks import LOG
@@ -116,6 +117,7 @@ class Driver(RobotServices, InteractiveMotions):
         *,
         frames: Frames | None = None,
         auto_heartbeat: bool = True,
+        logger: logging.Logger = LOG,
     ) -> None:
         """
         Keep the settings; nothing is connected before :meth:`open`.
@@ -123,18 +125,21 @@ class Driver(RobotServices, InteractiveMotions):
         :param frames: the frames that paths can name; None = the standard frames.
         :param auto_heartbeat: whether a thread of the driver sends the heartbeats. An owner that
             can hang (a ROS executor) sets False and calls :meth:`heartbeat` itself.
+        :param logger: takes what the driver logs; of several drivers, each may have one.
         :raises ValueError: ``ur_type`` is unknown.
         """
         self.config = config
         self.options = options if options is not None else PlanningOptions()
         self.frames = frames if frames is not None else Frames(self.options.tf_prefix)
-        self._robot = ReportedRobot(config, self.options)
+        self._log = logger
+        self._robot = ReportedRobot(config, self.options, logger)
         self._loop = LoopConnection(
             config,
             auto_heartbeat=auto_heartbeat,
             on_notification=self._handle,
             on_lost=self._on_loop_lost,
             reconfigure=self._reconfigure,
+            logger=logger,
         )
         self._send = self._loop.send
         self._running = RunningMotions(self._loop)
@@ -155,9 +160,9 @@ class Driver(RobotServices, InteractiveMotions):
     def open(self) -> None:
         """Start the robot loop and return; it connects and reconnects by itself."""
         if remark := self_collision_remark(self.config.ur_type, self.options):
-            LOG.warning('%s', remark)
+            self._log.warning('%s', remark)
         if functions := self.config.prelude.functions:
-            LOG.info(
+            self._log.info(
                 'The robot program has functions of %s, which the driver does not check: %s.',
                 self.config.prelude.file,
                 ', '.join(function.name for function in functions),

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 import contextlib
+import logging
 import socket
 import threading
 
@@ -37,6 +38,7 @@ class LoopConnection:
         on_notification: Callable[[Notification | Request], None],
         on_lost: Callable[[], None],
         reconfigure: Callable[[], Configure],
+        logger: logging.Logger = LOG,
     ) -> None:
         """
         Keep the callbacks; :meth:`open` starts the loop.
@@ -46,7 +48,7 @@ class LoopConnection:
         """
         self._config, self._auto_heartbeat = config, auto_heartbeat
         self._on_notification, self._on_lost = on_notification, on_lost
-        self._reconfigure = reconfigure
+        self._reconfigure, self._log = reconfigure, logger
         #: Guards the pipe, opening and closing, and the data of callers that changes with them.
         self.lock = threading.RLock()
         self.host: host.LoopHost | None = None
@@ -146,7 +148,9 @@ class LoopConnection:
         try:
             self._on_notification(notification)
         except Exception:
-            LOG.exception('handling a %s of the robot loop failed', type(notification).__name__)
+            self._log.exception(
+                'handling a %s of the robot loop failed', type(notification).__name__
+            )
 
     def _restart(self) -> None:
         """
@@ -154,7 +158,7 @@ class LoopConnection:
 
         The robot program stops the arm, because its sockets were closed or silent for too long.
         """
-        LOG.error('the robot loop ended unexpectedly or hangs; it is restarted')
+        self._log.error('the robot loop ended unexpectedly or hangs; it is restarted')
         self._on_lost()
         while not self._closed.wait(RESTART_PAUSE):
             with self.lock:
@@ -165,7 +169,7 @@ class LoopConnection:
                 try:
                     self.host = host.start(self._config.robot_loop)
                 except OSError as error:  # no process, memory or file descriptor is left
-                    LOG.error('the robot loop cannot be restarted: %s; trying again', error)
+                    self._log.error('the robot loop cannot be restarted: %s; trying again', error)
                     continue
                 self.send(configure)
                 return

@@ -5,9 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import logging
 import threading
 
-from ur_cartesian_driver.driver.callbacks import LOG, run_callback
+from ur_cartesian_driver.driver.callbacks import run_callback
 from ur_cartesian_driver.driver.ipc.channel import (
     GeometryReceived,
     LimitsReceived,
@@ -47,9 +48,11 @@ class ReportedRobot:
     :raises ValueError: ``ur_type`` is unknown.
     """
 
-    def __init__(self, config: DriverConfig, options: PlanningOptions) -> None:
+    def __init__(
+        self, config: DriverConfig, options: PlanningOptions, logger: logging.Logger
+    ) -> None:
         """Begin disconnected, with the nominal arm."""
-        self._config, self._options = config, options
+        self._config, self._options, self._log = config, options, logger
         #: The arm's kinematics, nominal until the robot has reported its calibration.
         self.arm = Arm(robot_model(config.ur_type))
         self.status = ConnectionStatus()
@@ -89,7 +92,7 @@ class ReportedRobot:
             case TemporaryTcpRestored():
                 self.temporary_tcp = None
             case LogMessage(level=level, text=text):
-                LOG.log(level, text)
+                self._log.log(level, text)
 
     def set_status(self, status: ConnectionStatus) -> None:
         """Change the status and tell the listeners."""
@@ -109,10 +112,10 @@ class ReportedRobot:
         model = robot_model(self._config.ur_type).limited_to(limits)
         self.arm = Arm(model, self.arm.geometry)
         for k in sorted(model.reported_ranges):
-            LOG.info('range of %s: %s', JOINT_NAMES[k], model.range_text(k))
+            self._log.info('range of %s: %s', JOINT_NAMES[k], model.range_text(k))
         for k in sorted(model.reported_speeds):
             speed, source = model.max_joint_speed[k], model.speed_source(k)
-            LOG.info('maximum speed of %s: %.3f rad/s%s', JOINT_NAMES[k], speed, source)
+            self._log.info('maximum speed of %s: %.3f rad/s%s', JOINT_NAMES[k], speed, source)
 
     def _update_geometry(self, geometry: DhTable) -> None:
         """Plan with the calibrated arm from now on; warn if it is far from the nominal one."""
@@ -121,7 +124,7 @@ class ReportedRobot:
         deviation = self.arm.max_flange_distance(Arm(model))
         limit = self._config.max_calibration_difference
         if 0.0 < limit < deviation:
-            LOG.warning(
+            self._log.warning(
                 "the robot's calibration displaces the flange by up to %.1f mm from the nominal "
                 '%s; max_calibration_difference is %.1f mm. Check ur_type, and whether the arm '
                 'was repaired or calibrated again.',
@@ -141,4 +144,4 @@ class ReportedRobot:
         if self._options.tool_radius == 0.0:
             unchecked.append('tool_radius is 0, so the tool is not checked')
         if unchecked:
-            LOG.warning('%s: goals may cause collisions', ', and '.join(unchecked))
+            self._log.warning('%s: goals may cause collisions', ', and '.join(unchecked))

@@ -16,9 +16,9 @@ import signal
 import threading
 from time import monotonic
 from types import FrameType
-from typing import Any, TypeAlias
+from typing import Any
 
-from action_msgs.msg import GoalStatus, GoalStatusArray
+from action_msgs.msg import GoalStatus
 from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import Vector3, Vector3Stamped
 import rclpy
@@ -26,13 +26,9 @@ from rclpy.action.client import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import (
-    DurabilityPolicy,
-    qos_profile_action_status_default,
-    QoSProfile,
-)
 from rclpy.task import Future
 from std_msgs.msg import Float64, Header
+from unique_identifier_msgs.msg import UUID
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.goal_files.goal_file import read_goal_file
@@ -44,11 +40,11 @@ from ur_cartesian_driver.motion.goal.leads import Lead, with_lead_times
 from ur_cartesian_driver.msg import DriverStatus
 from ur_cartesian_driver.path import Path, resume, ResumedGoal
 from ur_cartesian_driver.ros.goal_appender import GoalAppender
+from ur_cartesian_driver.ros.message_fields import AT_END
 from ur_cartesian_driver.ros.messages.action_messages import outcome_of
 from ur_cartesian_driver.ros.messages.packed_points import packed_if_long
+from ur_cartesian_driver.ros.node_endpoints import Endpoints, feedback_publishers, LATCHED_QOS
 from ur_cartesian_driver.srv import AppendPoints, Recover
-
-Message: TypeAlias = Any
 
 #: Names of the final states of a goal.
 STATUS_NAMES = {
@@ -58,8 +54,8 @@ STATUS_NAMES = {
 }
 #: Time without a server after which the driver is considered gone [s].
 SERVER_TIMEOUT = 3.0
-#: How long to wait for the list of goals [s]; a driver that has had no goal publishes no list.
-_GOALS_TIMEOUT = 2.0
+#: The states of a driver that accepts goals.
+_READY_STATES = (DriverStatus.READY, DriverStatus.EXECUTING)
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -107,6 +103,12 @@ def apply_leads(
         message.lead = command.lead
         message.offset = Duration(**duration_fields(command.offset))
     return goal
+
+
+def _message(
+    path: Path | FollowCartesianTrajectory.Goal | None,
+) -> FollowCartesianTrajectory.Goal | None:
+    return path.to_message() if isinstance(path, Path) else path
 
 
 def _prefixed(tf_prefix: str, name: str) -> str:
@@ -201,6 +203,9 @@ class GoalClient:
             self._node.remove_waitable(self._client)
         if self._append_service is not None:
             self._node.destroy_client(self._append_service)
+        for publisher in (self._offsets, self._feeds):
+            if publisher is not None:
+                self._node.destroy_publisher(publisher)
         if self._own_context is not None:
             self._node.destroy_node()
             rclpy.shutdown(context=self._own_context)
@@ -228,12 +233,12 @@ class GoalClient:
         :param cancel: whether a signal or a failed ``on_feedback`` cancels the goal; if not, the
             goal goes on.
         :raises TimeoutError: no driver answers.
-        :raises ConnectionError: the goal was not accepted, or the driver is gone; in the latter
-            case the end of the goal is not known.
+        :raises ConnectionError: the goal was not accepted, or the driver is gone or was started
+            again; in the latter cases the end of the goal is not known.
         """
-        self._find_server(timeout)
-        if goal.keep_open:
-            self._find_append_service(timeout)
+        driver = self._find_driver(timeout)
+        if goal.keep_open and self._append_service is None:
+            self._append_service = self._find_service(AppendPoints, 'append_points', timeout)
         self.signal_number = 0
         points = len(goal.trajectory.points) or len(goal.packed.times)
         goal = packed_if_long(goal)
@@ -247,8 +252,9 @@ class GoalClient:
             except BaseException as failure:  # raised again below
                 failures.append(failure)
 
+        unknown = 'how the goal ended is not known'
         with self._signals() if cancel else contextlib.nullcontext():
-            handle = self._spin_until(self._client.send_goal_async(goal, take), lambda: None)
+            handle = self._spin_until(self._client.send_goal_async(goal, take), driver, unknown)
             if not handle.accepted:
                 raise ConnectionError(
                     f'{self.action} did not accept the goal; this driver accepts all goals, so '
@@ -267,7 +273,7 @@ class GoalClient:
                     handle.cancel_goal_async()
 
             try:
-                response = self._spin_until(handle.get_result_async(), check_end)
+                response = self._spin_until(handle.get_result_async(), driver, unknown, check_end)
             finally:
                 self._appender = None
         if failures:
@@ -350,13 +356,14 @@ class GoalClient:
         :raises RuntimeError: no goal of this client runs.
         :raises ValueError: both ``replace_from_point`` and ``replace_from_time`` are given.
         """
-        if self._appender is None:
+        appender = self._appender  # another thread may see the goal end
+        if appender is None:
             raise RuntimeError(
                 'No goal runs to which points could be appended: send one with keep_open, and '
                 'append while send or execute waits for its end.'
             )
-        return self._appender.append(
-            path.to_message() if isinstance(path, Path) else path,
+        return appender.append(
+            _message(path),
             last=last,
             replace_from_point=replace_from_point,
             replace_from_time=replace_from_time,
@@ -379,43 +386,18 @@ class GoalClient:
             :meth:`append`.
         :param timeout: how long to look for the driver [s].
         :raises TimeoutError: no driver answers.
-        :raises ConnectionError: the driver is gone.
+        :raises ConnectionError: the driver is gone, or was started again.
         """
-        self._find_server(timeout)
-        self._find_append_service(timeout)
-        goal_id = self._running_goal()
-        if goal_id is None:
-            return AppendPoints.Response(
-                message='No goal runs to which points could be appended: send one with keep_open.'
+        driver = self._find_driver(timeout)
+        service = self._find_service(AppendPoints, 'append_points', timeout)
+        try:
+            appender = GoalAppender(service, UUID(), AT_END)
+            answer = appender.append(_message(path), **where)
+            return self._spin_until(
+                answer, driver, 'whether the points were appended is not known'
             )
-        self._appender = GoalAppender(self._append_service, goal_id)
-        try:
-            return self._spin_until(self.append(path, **where), lambda: None)
         finally:
-            self._appender = None
-
-    def _running_goal(self) -> Any:
-        """Return the id of the goal that moves the arm (the oldest goal); None if no goal runs."""
-        latest: list[GoalStatusArray] = []
-        subscription = self._node.create_subscription(
-            GoalStatusArray,
-            f'{self.action}/_action/status',
-            latest.append,
-            qos_profile_action_status_default,
-        )
-        try:
-            deadline = monotonic() + _GOALS_TIMEOUT
-            while not latest and monotonic() < deadline:
-                self._spin_or_wait()
-        finally:
-            self._node.destroy_subscription(subscription)
-        running = [
-            status.goal_info
-            for status in (latest[-1].status_list if latest else ())
-            if status.status == GoalStatus.STATUS_EXECUTING
-        ]
-        running.sort(key=lambda goal: (goal.stamp.sec, goal.stamp.nanosec))
-        return running[0].goal_id if running else None
+            self._node.destroy_client(service)
 
     def recover(self, *, unlock_protective_stop: bool = False, timeout: float = 10.0) -> Any:
         """
@@ -425,32 +407,32 @@ class GoalClient:
             protective stop; if not, unlocking the stop is left to a person.
         :param timeout: how long to look for the driver [s].
         :raises TimeoutError: no driver answers.
-        :raises ConnectionError: the driver is gone.
+        :raises ConnectionError: the driver is gone, or was started again.
         """
-        self._find_server(timeout)
-        service = self._node.create_client(Recover, f'{self._driver}/recover')
+        driver = self._find_driver(timeout)
+        service = self._find_service(Recover, 'recover', timeout)
         try:
-            service.wait_for_service(timeout_sec=timeout)
             request = Recover.Request(unlock_protective_stop=unlock_protective_stop)
-            return self._spin_until(service.call_async(request), lambda: None)
+            return self._spin_until(
+                service.call_async(request), driver, 'what the robot has done is not known'
+            )
         finally:
             self._node.destroy_client(service)
 
     def wait_ready(self, timeout: float) -> None:
         """
-        Wait until the status of the driver is READY.
+        Wait until the status of the driver is READY or EXECUTING.
 
-        :raises TimeoutError: the driver is not READY within ``timeout`` [s]; the text names the
+        :raises TimeoutError: the driver is neither within ``timeout`` [s]; the text names the
             next step.
         """
         latest: list[DriverStatus] = []
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         subscription = self._node.create_subscription(
-            DriverStatus, f'{self._driver}/status', latest.append, latched
+            DriverStatus, f'{self._driver}/status', latest.append, LATCHED_QOS
         )
         try:
             deadline = monotonic() + timeout
-            while not latest or latest[-1].state < DriverStatus.READY:
+            while not latest or latest[-1].state not in _READY_STATES:
                 if monotonic() > deadline:
                     needed = latest[-1].message if latest else self._how_to_find()
                     raise TimeoutError(
@@ -460,31 +442,53 @@ class GoalClient:
         finally:
             self._node.destroy_subscription(subscription)
 
-    def _find_append_service(self, timeout: float) -> None:
-        if self._append_service is None:
-            self._append_service = self._node.create_client(
-                AppendPoints, f'{self._driver}/append_points'
-            )
-        self._append_service.wait_for_service(timeout_sec=timeout)
+    def _find_driver(self, timeout: float) -> Endpoints:
+        """
+        Wait for the driver, and return what tells it from one that is started later.
 
-    def _find_server(self, timeout: float) -> None:
+        :raises TimeoutError: no driver answers.
+        """
         if not self._client.wait_for_server(timeout_sec=timeout):
             raise TimeoutError(
                 f'No driver serves {self.action} (searched for {timeout:g} s): '
                 f'{self._how_to_find()}'
             )
+        return feedback_publishers(self._node, self.action)
+
+    def _find_service(self, kind: Any, name: str, timeout: float) -> Any:
+        """
+        Return a client of a service of the driver.
+
+        :raises TimeoutError: the driver does not serve it.
+        """
+        service = self._node.create_client(kind, f'{self._driver}/{name}')
+        if not service.wait_for_service(timeout_sec=timeout):
+            self._node.destroy_client(service)
+            raise TimeoutError(
+                f'{self._driver} does not serve {self._driver}/{name} (searched for {timeout:g} '
+                's): it is another release of the driver, or another node.'
+            )
+        return service
 
     @staticmethod
     def _how_to_find() -> str:
         domain = os.environ.get('ROS_DOMAIN_ID', '0')
         return f'start it, with the same ROS_DOMAIN_ID as here, which is {domain}.'
 
-    def _spin_until(self, future: Any, between: Callable[[], None]) -> Any:
+    def _spin_until(
+        self,
+        future: Any,
+        driver: Endpoints,
+        unknown: str,
+        between: Callable[[], None] = lambda: None,
+    ) -> Any:
         """
         Spin until a future is done, and return its result.
 
+        :param driver: the driver that was asked, as :meth:`_find_driver` returned it.
+        :param unknown: what is not known if the driver is gone, as a clause.
         :param between: called after each spin, at least every 0.1 s.
-        :raises ConnectionError: the driver is gone.
+        :raises ConnectionError: the driver is gone, or was started again.
         """
         last_seen = monotonic()
         done = threading.Event()
@@ -492,12 +496,17 @@ class GoalClient:
         while not future.done():
             self._spin_or_wait(done)
             between()
+            if future.done():
+                break
             if self._client.server_is_ready():
                 last_seen = monotonic()
+                present = feedback_publishers(self._node, self.action)
+                if present and not present & driver:
+                    raise ConnectionError(
+                        f'The driver of {self.action} was started again; {unknown}.'
+                    )
             elif monotonic() - last_seen > SERVER_TIMEOUT:
-                raise ConnectionError(
-                    f'The driver of {self.action} is gone; how the goal ended is not known.'
-                )
+                raise ConnectionError(f'The driver of {self.action} is gone; {unknown}.')
         return future.result()
 
     def _spin_or_wait(self, done: threading.Event | None = None) -> None:

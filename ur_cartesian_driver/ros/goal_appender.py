@@ -12,18 +12,16 @@ from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.ros.messages.packed_points import packed_if_long
 from ur_cartesian_driver.srv import AppendPoints
 
-#: An index that no point has: a request with this index is refused with the number of points.
-UNKNOWN_POINT = 2**32 - 1
-
 
 class GoalAppender:
     """Appends points to a goal, or replaces its tail; sends one request after the other."""
 
-    def __init__(self, client: Any, goal_id: Any, points: int | None = None) -> None:
+    def __init__(self, client: Any, goal_id: Any, points: int) -> None:
         """
-        Take the client of the service and the id of a goal that was accepted.
+        Take the client of the service, the id of a goal and the number of its points.
 
-        :param points: the number of the goal's points; None = not known (another client's goal).
+        :param goal_id: zeros = the goal that moves the arm.
+        :param points: AT_END = not known.
         """
         self._client = client
         self._goal_id = goal_id
@@ -34,9 +32,9 @@ class GoalAppender:
         self,
         goal: FollowCartesianTrajectory.Goal | None,
         *,
-        last: bool,
-        replace_from_point: int | None,
-        replace_from_time: float | None,
+        last: bool = False,
+        replace_from_point: int | None = None,
+        replace_from_time: float | None = None,
     ) -> Future:
         """
         Send a request once all earlier ones are answered; return a future of the response.
@@ -66,18 +64,14 @@ class GoalAppender:
         return answer
 
     def _ask(self, request: AppendPoints.Request, answer: Future) -> None:
-        is_appended = request.replace == request.APPEND
-        is_known = self._points is not None
-        if is_appended:  # the index is known once the earlier requests are answered
-            request.first_index = self._points if is_known else UNKNOWN_POINT
+        if request.replace == request.APPEND:
+            # The index is known once the earlier requests are answered.
+            request.first_index = self._points
 
         def take(done: Future) -> None:
             response = done.result()
-            if response.accepted or not is_known:
-                self._points = response.points_received
-            if is_appended and not is_known:
-                self._ask(request, answer)  # the refusal said how many points there are
-            else:
-                answer.set_result(response)
+            # Refused, too: another client may have appended. 0 = the goal is not there.
+            self._points = response.points_received or self._points
+            answer.set_result(response)
 
         self._client.call_async(request).add_done_callback(take)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import importlib
 from typing import Any
 
-from builtin_interfaces.msg import Duration
+from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from geometry_msgs.msg import Pose as PoseMessage
 
@@ -18,8 +18,10 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import Pose
 
 __all__ = [
+    'AT_END',
     'Message',
     'age_of',
+    'checked_age',
     'class_of',
     'duration_message',
     'nanoseconds',
@@ -28,32 +30,45 @@ __all__ = [
     'quaternion_message',
     'seconds',
     'vector_message',
-    'wrong_stamp',
 ]
 
 _MAX_SECONDS = 2**31 - 1
+#: ``first_index`` of an append request: the number of points that the goal has, whatever it is.
+AT_END = 2**32 - 1
+
+
+def age_of(stamp: Time, now: int) -> float | None:
+    """Return the age of a stamp [s] at a time [ns]; None if it is zero, and so not given."""
+    sent = nanoseconds(stamp)
+    return None if sent == 0 else (now - sent) / 1_000_000_000
+
+
+def checked_age(stamp: Time, now: int, max_age: float, bound: str, *, ahead: float) -> float:
+    """
+    Return the age of a message [s]: 0 for the stamp 0, and not below 0.
+
+    :param now: time of the node's clock [ns].
+    :param max_age: largest age [s].
+    :param bound: the name of ``max_age``, for the refusal.
+    :param ahead: how far the stamp may lie in the future [s], because clocks differ.
+    :raises InvalidGoal: the stamp is too old, or too far in the future.
+    """
+    age = age_of(stamp, now) or 0.0
+    if not -ahead <= age <= max_age:
+        raise InvalidGoal(
+            'header.stamp',
+            f'is {abs(age):.3f} s {"old" if age > 0.0 else "in the future"}, '
+            f'{bound} is {max_age:g} s',
+            'compare the clocks of both computers, or leave the stamp 0: then the age counts '
+            'from the receipt',
+        )
+    return max(0.0, age)
 
 
 def duration_message(time: float) -> Duration:
     """Return seconds as a duration, rounded to 1 ns; infinity becomes the largest duration."""
     sec, nanosec = divmod(round(min(time, _MAX_SECONDS) * 1_000_000_000), 1_000_000_000)
     return Duration(sec=sec, nanosec=nanosec)
-
-
-def age_of(stamp: Message, now: int) -> float | None:
-    """Return the age of a stamp [s] at a time [ns]; None if it is zero, and so not given."""
-    sent = nanoseconds(stamp)
-    return None if sent == 0 else (now - sent) / 1_000_000_000
-
-
-def wrong_stamp(age: float, bound: str) -> InvalidGoal:
-    """Return the refusal of a message whose stamp is too old, or in the future."""
-    return InvalidGoal(
-        'header.stamp',
-        f'is {abs(age):.3f} s {"old" if age > 0.0 else "in the future"}, {bound}',
-        'compare the clocks of both computers, or leave the stamp 0: then the age counts '
-        'from the receipt',
-    )
 
 
 def pose_message(pose: Pose) -> PoseMessage:

@@ -6,13 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 import ctypes
+from dataclasses import fields
 import logging
 import re
 import signal
 import sys
 from time import monotonic
 from types import FrameType
-from typing import Any
+from typing import Any, ClassVar
 
 import rclpy
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -23,6 +24,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
 from ur_cartesian_driver.driver import Driver
+from ur_cartesian_driver.driver.callbacks import LOG
 from ur_cartesian_driver.ros.goals.action_server import GoalServer
 from ur_cartesian_driver.ros.goals.feed_override_subscriber import FeedOverrideSubscriber
 from ur_cartesian_driver.ros.goals.path_offset_subscriber import PathOffsetSubscriber
@@ -30,7 +32,11 @@ from ur_cartesian_driver.ros.live.freedrive_service import FreedriveService
 from ur_cartesian_driver.ros.live.live_target_subscriber import LiveTargetSubscriber
 from ur_cartesian_driver.ros.live.servo_state_publisher import ServoStatePublisher
 from ur_cartesian_driver.ros.node_endpoints import steady_timer
-from ur_cartesian_driver.ros.parameters.node_parameters import as_overrides, declare_parameters
+from ur_cartesian_driver.ros.parameters.node_parameters import (
+    as_overrides,
+    declare_parameters,
+    explained_overrides,
+)
 from ur_cartesian_driver.ros.parameters.parameter_table import ParameterError, ParameterValue
 from ur_cartesian_driver.ros.services.append_service import AppendService
 from ur_cartesian_driver.ros.services.command_services import CommandServices
@@ -39,6 +45,7 @@ from ur_cartesian_driver.ros.state.joint_states_check import JointStatesCheck
 from ur_cartesian_driver.ros.state.pulse_publisher import PulsePublisher
 from ur_cartesian_driver.ros.state.state_publisher import StatePublisher
 from ur_cartesian_driver.ros.ur_driver_names.names_process import NamesProcess
+from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 
 #: Longest period of the heartbeat, which reports that the node's executor is alive [s].
 HEARTBEAT_PERIOD = 0.5
@@ -77,7 +84,7 @@ class CartesianDriverNode(Node):
         :param node_kwargs: for ``rclpy.node.Node``.
         :raises ParameterError: a parameter is unknown or invalid; the text says why.
         """
-        try:
+        with explained_overrides():
             super().__init__(
                 node_name,
                 namespace=namespace,
@@ -85,12 +92,6 @@ class CartesianDriverNode(Node):
                 automatically_declare_parameters_from_overrides=True,
                 **node_kwargs,
             )
-        except ValueError as error:
-            if 'PARAMETER_NOT_SET' not in str(error):
-                raise
-            raise ParameterError(
-                "A parameter has no value; write '' for an empty text and [''] for an empty list."
-            ) from None
         self._components: list[Any] = []  # destroy_node() closes them, the last one first
         try:
             self._start()
@@ -99,11 +100,14 @@ class CartesianDriverNode(Node):
             raise
 
     def _start(self) -> None:
-        settings = declare_parameters(self)
+        settings = declare_parameters(self, [each.name for each in fields(NamesSettings)])
         self._joint_names = settings.joint_names
         logger = self.get_logger()  # type: ignore[no-untyped-call]  # rclpy's
-        self._components.append(_LogBridge(logger))
-        self.driver = Driver(settings.driver, settings.planning, auto_heartbeat=False)
+        log_bridge = _LogBridge(logger)
+        self._components.append(log_bridge)
+        self.driver = Driver(
+            settings.driver, settings.planning, auto_heartbeat=False, logger=log_bridge.source
+        )
         self._components.append(self.driver)
         self.driver.open()
         self._publisher = StatePublisher(self, self.driver, settings)
@@ -162,6 +166,8 @@ class CartesianDriverNode(Node):
 
     def destroy_node(self) -> None:
         """Stop the arm, end all goals, threads and connections, and destroy the node."""
+        if hasattr(self, 'action_server'):
+            self.action_server.stop()  # first, as the end of other components may take seconds
         components, self._components = self._components, []
         for component in reversed(components):
             component.close()
@@ -169,20 +175,32 @@ class CartesianDriverNode(Node):
 
 
 class _LogBridge(logging.Handler):
-    """Passes the log records of the package to the logger of the node."""
+    """
+    Passes the log records of one driver to the logger of its node.
 
+    Records of no driver, as of a callback that failed, go to the oldest node of the process.
+    """
+
+    _bridges: ClassVar[list[_LogBridge]] = []
     _SEVERITIES = ((logging.ERROR, 'error'), (logging.WARNING, 'warning'), (logging.INFO, 'info'))
 
     def __init__(self, logger: RcutilsLogger) -> None:
         super().__init__()
         self._ros_logger = logger
-        self._source = logging.getLogger('ur_cartesian_driver')
-        self._level_before = self._source.level
-        self._source.addHandler(self)
-        self._source.setLevel(logging.DEBUG)
+        #: The logger of the driver.
+        self.source = LOG.getChild(logger.name)
+        self.source.setLevel(logging.DEBUG)
+        self._bridges.append(self)
+        LOG.addHandler(self)
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        if record.name == self.source.name:
+            return True
+        others = (bridge.source.name for bridge in self._bridges)
+        return self._bridges[0] is self and record.name not in others
 
     def emit(self, record: logging.LogRecord) -> None:
-        text = record.getMessage()
+        text = self.format(record)  # with the traceback, if there is one
         for level, severity in self._SEVERITIES:
             if record.levelno >= level:
                 # rclpy insists on one call site for each severity.
@@ -200,8 +218,8 @@ class _LogBridge(logging.Handler):
         self._ros_logger.info(text)
 
     def close(self) -> None:
-        self._source.removeHandler(self)
-        self._source.setLevel(self._level_before)
+        LOG.removeHandler(self)
+        self._bridges.remove(self)
         super().close()
 
 
@@ -246,9 +264,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             was_idle = idle
         _end_goals(node, executor, signals)
     finally:
+        node.destroy_node()  # first: it stops live targets and freedrive, too
         if names is not None:
             names.close()
-        node.destroy_node()
         rclpy.shutdown()
 
 

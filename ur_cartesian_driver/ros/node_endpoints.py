@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias
 
 from rclpy.action.server import RCLError
 from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
@@ -23,6 +23,10 @@ STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED_QOS = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
+#: The QoS that tf2 requires.
+TF_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+#: Ids of endpoints in the ROS graph; none is ever used twice.
+Endpoints: TypeAlias = frozenset[tuple[int, ...]]
 #: Raised in our threads while the node, or all of ROS, is being shut down.
 SHUT_DOWN_ERRORS = (InvalidHandle, RCLError)
 
@@ -50,3 +54,13 @@ def newest_subscription(
         QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
         callback_group=MutuallyExclusiveCallbackGroup(),
     )
+
+
+def feedback_publishers(node: Node, action: str) -> Endpoints:
+    """
+    Return who publishes the feedback of an action.
+
+    A server that was started again serves under the same names, but with other endpoints.
+    """
+    found = node.get_publishers_info_by_topic(f'{action}/_action/feedback')
+    return frozenset(tuple(each.endpoint_gid) for each in found)

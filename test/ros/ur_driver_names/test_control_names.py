@@ -97,3 +97,12 @@ def test_freedrive_ends_when_nobody_asks_for_it(make_ur):
     publisher.publish(Bool(data=False))
     ur.cell.spin_until(lambda: not is_guided(ur))
     assert ur.cell.sim.state().runtime_state is RuntimeState.PLAYING
+
+
+def test_freedrive_ends_with_the_node_that_has_asked_for_it(make_ur):
+    ur = make_ur(allow_freedrive=True)
+    ur.cell.wait_ready()
+    name = '/freedrive_mode_controller/enable_freedrive_mode'
+    publish(ur, name, Bool(data=True), lambda: is_guided(ur))
+    ur.cell.names.destroy_node()
+    ur.cell.spin_until(lambda: not is_guided(ur))

@@ -97,7 +97,7 @@ def test_a_protective_stop_is_left_to_a_person(helper):
     helper.wait_for_safety(SafetyMode.PROTECTIVE_STOP)
     status, message = helper.set(RobotMode.RUNNING, stop=True)
     assert status == ABORTED
-    assert 'unlock_protective_stop takes the responsibility' in message
+    assert 'only if unlock_protective_stop is true' in message
     assert helper.ur.cell.sim.state().safety_mode is SafetyMode.PROTECTIVE_STOP
 
 

@@ -60,16 +60,29 @@ def test_the_names_come_and_go_with_the_driver(
             driver.kill()
 
 
-def test_a_wrong_parameter_is_a_sentence(private_ros_graph):
+@pytest.mark.parametrize(
+    ('given', 'sentence'),
+    [
+        (
+            'release:=foxy',
+            "Parameter release is 'foxy', but must be one of jazzy, lyrical.",
+        ),
+        (
+            'io_publish_rat:=1.0',
+            'There is no parameter io_publish_rat; did you mean io_publish_rate?',
+        ),
+        ('x:=1', 'There is no parameter x; doc/coming_from/ur_driver.md lists all.'),
+    ],
+)
+def test_a_wrong_parameter_is_a_sentence(private_ros_graph, given, sentence):
     module = 'ur_cartesian_driver.ros.ur_driver_names.names_node'
     done = subprocess.run(
-        [sys.executable, '-m', module, '--ros-args', '-p', 'release:=foxy'],
+        # As the driver's process passes its own parameters on.
+        [sys.executable, '-m', module, '--ros-args', '-p', 'ur_type:=ur5e', '-p', given],
         capture_output=True,
         text=True,
         timeout=60.0,
         check=False,
     )
     assert done.returncode == 1
-    assert done.stderr.splitlines()[-1] == (
-        "ur_driver_names: Parameter release is 'foxy', but must be one of jazzy, lyrical."
-    )
+    assert done.stderr.splitlines()[-1] == f'ur_driver_names: {sentence}'

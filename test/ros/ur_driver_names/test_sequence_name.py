@@ -257,4 +257,4 @@ def test_without_the_driver_a_goal_is_rejected(make_ur, capfd):
     client = sequence(ur)
     line = primitive('LINEAR_CARTESIAN', Pose((0.4, 0.2, 0.3), (1.0, 0.0, 0.0, 0.0)))
     assert not ur.send(client, goal(client, line)).accepted
-    assert 'nobody/follow_cartesian_trajectory: does it run' in capfd.readouterr().err
+    assert 'nobody/follow_cartesian_trajectory; start the driver' in capfd.readouterr().err

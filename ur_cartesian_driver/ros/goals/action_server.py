@@ -14,6 +14,7 @@ coroutine ends. With a busy topic, a motion of ten minutes would slow down the w
 from __future__ import annotations
 
 from functools import partial
+from itertools import chain
 import threading
 from typing import Any
 
@@ -27,10 +28,14 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.goal.known_frames import Frames
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter
-from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer, end_goal
+from ur_cartesian_driver.ros.goals.deferred_action_server import (
+    DeferredActionServer,
+    end_goal,
+    GoalHandle,
+)
 from ur_cartesian_driver.ros.goals.goal_actions import GoalAction, installed_actions
 from ur_cartesian_driver.ros.goals.goal_context import GoalContext
-from ur_cartesian_driver.ros.goals.goal_run import goal_key, GoalHandle, GoalRun
+from ur_cartesian_driver.ros.goals.goal_run import goal_key, GoalRun
 from ur_cartesian_driver.ros.goals.plan_marker_publisher import PlanMarkerPublisher
 from ur_cartesian_driver.ros.message_fields import Message
 from ur_cartesian_driver.ros.parameters.node_parameters import Settings
@@ -103,10 +108,17 @@ class GoalServer:
     @property
     def running_motion(self) -> MotionHandle | None:
         """The running motion; None if no goal moves the arm."""
+        run = self.running_goal
+        return run.motion(timeout=0.0) if run is not None and run.is_moving else None
+
+    @property
+    def running_goal(self) -> GoalRun | None:
+        """The goal that moves the arm, or else the newest one that is about to; None: no such."""
         with self._lock:
             runs = list(self._runs.values())
-        motions = (run.motion(timeout=0.0) for run in runs)
-        return next((motion for motion in motions if motion and not motion.done()), None)
+        moving = (run for run in runs if run.is_moving)
+        starting = (run for run in reversed(runs) if run.is_starting)
+        return next(chain(moving, starting), None)
 
     def find_run(self, goal_id: bytes) -> GoalRun | None:
         """Return the run of a goal; None if the goal has ended."""

@@ -7,7 +7,8 @@ A goal enters the queue when it arrives (if it has a start time, at that time), 
 When it has passed its checks, it preempts all older goals in the queue (the running one, and those
 still being planned or waiting) and acquires the arm as soon as the arm is free. An older goal that
 passes its checks after that is too late. So the newest goal that passes always wins, however long
-each goal's planning takes, and a refused goal never disturbs another one.
+each goal's planning takes, and a refused goal never disturbs another one. While a goal waits for
+the arm, nobody else can acquire it, although the arm is free for a moment before the goal has it.
 """
 
 from __future__ import annotations
@@ -46,6 +47,7 @@ class ArmArbiter:
         self._numbers = count(1)
         self._queue: list[ArmRequest] = []
         self._holder: ArmRequest | None = None
+        self._waiting: list[ArmRequest] = []
         self._release_count = 0
 
     @property
@@ -55,9 +57,10 @@ class ArmArbiter:
 
     @property
     def holder(self) -> str:
-        """The name of the request that has the arm; empty: none."""
-        holder = self._holder
-        return '' if holder is None else holder.name
+        """The name of the request that has the arm, or waits for it; empty: none."""
+        with self._condition:
+            first = next((each for each in (self._holder, *self._waiting) if each), None)
+        return '' if first is None else first.name
 
     def enqueue(self, arm_request: ArmRequest) -> None:
         """Append a request to the queue as the newest."""
@@ -67,13 +70,13 @@ class ArmArbiter:
 
     def acquire(self, arm_request: ArmRequest, *, preemptible: bool = False) -> bool:
         """
-        Acquire the arm if it is free; return whether it was free.
+        Acquire the arm if it is free and nobody waits for it; return whether this was so.
 
         :param preemptible: whether any other request can preempt this one, which is therefore
             queued as the oldest.
         """
         with self._condition:
-            if self._holder is not None:
+            if self._holder is not None or self._waiting:
                 return False
             self._holder = arm_request
             if preemptible:
@@ -100,6 +103,7 @@ class ArmArbiter:
                 other.preempted_by = arm_request.name
             if self._holder is not None:
                 arm_request.preempted = self._holder.name
+            self._waiting.append(arm_request)
             self._condition.notify_all()
         for other in older:  # without our lock, because callbacks may take other locks
             other.on_preempt()
@@ -107,6 +111,7 @@ class ArmArbiter:
             self._condition.wait_for(
                 lambda: self._holder is None or arm_request.preempted_by or arm_request._withdrawn
             )
+            self._waiting.remove(arm_request)
             if not (arm_request.preempted_by or arm_request._withdrawn):
                 self._holder = arm_request
 
@@ -119,8 +124,9 @@ class ArmArbiter:
     def release(self, arm_request: ArmRequest) -> None:
         """Remove a request from the queue, and release the arm if the request has it."""
         with self._condition:
-            if arm_request in self._queue:
-                self._queue.remove(arm_request)
+            for requests in (self._queue, self._waiting):
+                if arm_request in requests:
+                    requests.remove(arm_request)
             if self._holder is arm_request:
                 self._holder = None
                 self._release_count += 1

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import contextlib
 from dataclasses import replace
 import threading
-from typing import Any, TypeAlias
+from typing import Any
 
 from ur_cartesian_driver.driver import MotionHandle
 from ur_cartesian_driver.motion.errors import (
@@ -30,12 +30,11 @@ from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.planning.request.joint_goal_rules import check_joint_goal
 from ur_cartesian_driver.planning.request.validate import check
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmRequest
+from ur_cartesian_driver.ros.goals.deferred_action_server import GoalHandle
 from ur_cartesian_driver.ros.goals.goal_actions import AnyGoal, GoalAction
 from ur_cartesian_driver.ros.goals.goal_context import GoalContext
 from ur_cartesian_driver.ros.message_fields import nanoseconds
 from ur_cartesian_driver.ros.node_endpoints import SHUT_DOWN_ERRORS
-
-GoalHandle: TypeAlias = Any
 
 #: Period in which a waiting goal reads the node's clock, which may be a simulated one [s].
 CLOCK_PERIOD = 0.05
@@ -71,7 +70,7 @@ class GoalRun:
         self.thread = threading.Thread(target=self._run, name=self.arm_request.name, daemon=True)
         #: Whether the goal waits for its start time.
         self.is_waiting = self.is_scheduled
-        #: A key of the last append request that was granted, and the response to it.
+        #: Key and response of the last accepted append request, to answer a repeat of it.
         self.last_append: tuple[object, Any] | None = None
         self._lock = threading.Lock()
         self._motion: MotionHandle | None = None
@@ -84,6 +83,21 @@ class GoalRun:
     def is_scheduled(self) -> bool:
         """Whether the start time was in the future when the goal was received."""
         return self._start_time > self._received
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the goal moves the arm."""
+        motion = self._motion
+        return motion is not None and not motion.done()
+
+    @property
+    def is_starting(self) -> bool:
+        """Whether the goal moves the arm as soon as it is planned and the arm is free."""
+        return not (
+            self._begun.is_set()
+            or self.is_waiting
+            or self.action.is_validation(self.handle.request)
+        )
 
     @property
     def points(self) -> int:
@@ -125,6 +139,7 @@ class GoalRun:
             outcome = Outcome(code=error.code, text=self._refusal_text(error))
         except Exception as error:
             # A goal always ends with a result; the thread prints the traceback.
+            self._end_motion()
             text = f'The driver has a defect, {type(error).__name__}: {error}; its log says more.'
             self._on_end(self, Outcome(code=ErrorCode.EXECUTION_FAILED, text=text))
             raise
@@ -133,6 +148,12 @@ class GoalRun:
         if outcome.code is ErrorCode.CANCELLED and self._cancel_requested:
             self._wait_for_canceling_state()
         self._on_end(self, outcome)
+
+    def _end_motion(self) -> None:
+        """Stop the arm and wait for its rest, before another goal can get it."""
+        if self._motion is not None:
+            self._motion.cancel()
+            self._motion.result()
 
     def _process(self) -> Outcome:
         context, request = self._context, self.handle.request

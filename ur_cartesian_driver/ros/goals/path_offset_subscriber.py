@@ -4,7 +4,8 @@
 ``~/path_offset``: offsets for the running goal, if its ``path_offset`` allows them.
 
 An offset that cannot be followed is ignored with a warning that says why; the offset before it
-stays in effect until it is stale.
+stays in effect until it is stale. A sensor publishes all the time, so its values between goals are
+no fault.
 """
 
 from __future__ import annotations
@@ -12,9 +13,9 @@ from __future__ import annotations
 from geometry_msgs.msg import Vector3Stamped
 from rclpy.node import Node
 
-from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal
 from ur_cartesian_driver.ros.goals.action_server import GoalServer
-from ur_cartesian_driver.ros.message_fields import age_of, wrong_stamp
+from ur_cartesian_driver.ros.message_fields import checked_age
 from ur_cartesian_driver.ros.node_endpoints import newest_subscription
 
 #: The values of ``frame_id`` that mean the frame of the path.
@@ -44,9 +45,9 @@ class PathOffsetSubscriber:
 
     def give(self, message: Vector3Stamped) -> None:
         """
-        Pass an offset to the running motion.
+        Pass an offset to the running motion, if there is one.
 
-        :raises DriverError: the offset cannot be followed, or no goal runs.
+        :raises DriverError: the offset cannot be followed.
         """
         header, vector = message.header, message.vector
         if header.frame_id not in FRAMES:
@@ -55,11 +56,13 @@ class PathOffsetSubscriber:
                 f"is '{header.frame_id}', but offsets are in the frame of the path",
                 "leave it empty, or set it to 'path'",
             )
-        age = age_of(header.stamp, self._clock.now().nanoseconds) or 0.0
+        now = self._clock.now().nanoseconds
         motion = self._server.running_motion
         if motion is None:
-            raise RobotNotReady('No goal moves the arm.')
-        timeout = motion.offset_timeout
-        if timeout is not None and not -MAX_STAMP_AHEAD <= age <= timeout:
-            raise wrong_stamp(age, f'path_offset.timeout is {timeout:g} s')
-        motion.set_path_offset(along=vector.x, across=vector.y, normal=vector.z, age=max(0.0, age))
+            return
+        timeout, age = motion.offset_timeout, 0.0
+        if timeout is not None:  # a goal without offsets refuses this one below
+            age = checked_age(
+                header.stamp, now, timeout, 'path_offset.timeout', ahead=MAX_STAMP_AHEAD
+            )
+        motion.set_path_offset(along=vector.x, across=vector.y, normal=vector.z, age=age)

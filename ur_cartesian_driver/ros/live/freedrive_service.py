@@ -30,6 +30,8 @@ class FreedriveService:
         """Start to serve."""
         self._driver, self._arbiter = driver, arbiter
         self._motion: MotionHandle | None = None
+        #: The answer to who has started freedrive, and whether it is ending.
+        self._started, self._is_ending = _FirstAnswer(), False
         self._lock = threading.Lock()
         self._service = DeferredService(node, SetBool, '~/freedrive_mode', self._handle)
 
@@ -48,7 +50,10 @@ class FreedriveService:
             if request.data:
                 if motion is None:
                     return self._start()
-                return completed_answer('The arm can be guided by hand already.', ok=True)
+                if self._is_ending:
+                    return completed_answer('Freedrive is ending; try again when it has ended.')
+                return self._started.future
+            self._is_ending = motion is not None
         if motion is None:
             return completed_answer('The arm is not guided by hand.', ok=True)
         return self._end(motion)
@@ -60,7 +65,7 @@ class FreedriveService:
                 'A goal or a session of live targets has the arm; wait for its end or '
                 'cancel it, then try again.'
             )
-        answer = _FirstAnswer()
+        answer = self._started = _FirstAnswer()
         try:
             motion = self._driver.start_freedrive(
                 lambda: answer.set(True, 'The arm can be guided by hand.')
@@ -68,7 +73,7 @@ class FreedriveService:
         except DriverError as error:
             self._arbiter.release(arm_request)
             return completed_answer(str(error))
-        self._motion = motion
+        self._motion, self._is_ending = motion, False
 
         def on_end(outcome: Outcome) -> None:
             self._motion = None

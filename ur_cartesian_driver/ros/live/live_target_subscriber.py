@@ -22,6 +22,7 @@ import contextlib
 from math import inf
 import threading
 from time import monotonic
+import traceback
 
 from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
@@ -35,11 +36,10 @@ from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.state.rtde_state import SafetyStatus
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter, ArmRequest
 from ur_cartesian_driver.ros.message_fields import (
-    age_of,
+    checked_age,
     Message,
     nanoseconds,
     pose_from_message,
-    wrong_stamp,
 )
 from ur_cartesian_driver.ros.node_endpoints import newest_subscription
 
@@ -73,15 +73,13 @@ def target_from_message(
     """
     pose = pose_from_message(message.pose)
     check_pose(pose)
-    age = age_of(message.header.stamp, now) or 0.0
-    if abs(age) > max_age:
-        raise wrong_stamp(age, f'live_target_max_age is {max_age:g} s')
-    return frames.T_base_frame(message.header.frame_id, snapshot) @ pose, max(0.0, age)
+    age = checked_age(message.header.stamp, now, max_age, 'live_target_max_age', ahead=max_age)
+    return frames.T_base_frame(message.header.frame_id, snapshot) @ pose, age
 
 
 class TargetInhibitor:
     """
-    Blocks targets after a stop, until there is a pause between two targets.
+    Blocks targets after a stop, until there is a pause between two targets; thread-safe.
 
     :param pause: the shortest pause that ends the blocking [s].
     """
@@ -89,12 +87,14 @@ class TargetInhibitor:
     def __init__(self, pause: float) -> None:
         """Start without blocking."""
         self._pause = pause
+        self._lock = threading.Lock()
         self._is_active = False
         self._last = -inf
 
     def activate(self) -> None:
         """Start to block."""
-        self._is_active = True
+        with self._lock:
+            self._is_active = True
 
     def blocks(self, now: float) -> bool:
         """
@@ -102,9 +102,10 @@ class TargetInhibitor:
 
         :param now: time of a steady clock [s].
         """
-        self._is_active = self._is_active and now - self._last < self._pause
-        self._last = now
-        return self._is_active
+        with self._lock:
+            self._is_active = self._is_active and now - self._last < self._pause
+            self._last = now
+            return self._is_active
 
 
 class LiveTargetSubscriber:
@@ -183,7 +184,7 @@ class LiveTargetSubscriber:
             except Exception as error:  # the next message may be processed without error
                 self._logger.error(
                     'A message on ~/live_target is ignored, because of a defect of the driver, '
-                    f'{type(error).__name__}: {error}.',
+                    f'{type(error).__name__}: {error}.\n{traceback.format_exc()}',
                     throttle_duration_sec=WARNING_PERIOD,
                 )
 

@@ -8,7 +8,8 @@ All parameters are read-only: robot and limits must not change while a goal runs
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+import contextlib
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
@@ -55,15 +56,40 @@ def defaults() -> dict[str, ParameterValue]:
     return {declaration.name: declaration.default for declaration in DECLARATIONS}
 
 
-def declare_parameters(node: Node) -> Settings:
+@contextlib.contextmanager
+def explained_overrides() -> Iterator[None]:
+    """
+    Explain a fault of the given parameters while a node is made.
+
+    :raises ParameterError: a parameter has no value.
+    """
+    try:
+        yield
+    except ValueError as error:
+        if 'PARAMETER_NOT_SET' not in str(error):
+            raise
+        raise ParameterError(
+            "A parameter has no value; write '' for an empty text and [''] for an empty list."
+        ) from None
+
+
+def declare_parameters(node: Node, others: Iterable[str] = ()) -> Settings:
     """
     Declare all parameters of a node and return their values.
 
     :param node: created with ``automatically_declare_parameters_from_overrides``, which makes
         unknown names visible, for example mistyped ones.
+    :param others: the names of the parameters of the node ur_driver_names.
     :raises ParameterError: a name is unknown or a value invalid.
     """
-    _refuse_unknown(node.list_parameters([], 0).names, defaults())
+    names = node.list_parameters([], 0).names
+    for name in names:
+        if name in others:
+            raise ParameterError(
+                f'{name} is a parameter of the node ur_driver_names; write -p '
+                f'ur_driver_names:{name}:=VALUE.'
+            )
+    refuse_unknown(names, defaults(), 'config/driver.yaml')
     return settings(declared_values(node, DECLARATIONS))
 
 
@@ -98,7 +124,7 @@ def settings_from(given: Mapping[str, ParameterValue]) -> Settings:
     :raises ParameterError: a name is unknown or a value invalid.
     """
     values = defaults()
-    _refuse_unknown(given, values)
+    refuse_unknown(given, values, 'config/driver.yaml')
     for declaration in DECLARATIONS:
         if declaration.name in given:
             declaration.check(given[declaration.name])
@@ -137,12 +163,18 @@ def as_overrides(
     return list(values or ())
 
 
-def _refuse_unknown(names: Iterable[str], known: Iterable[str]) -> None:
+def refuse_unknown(names: Iterable[str], known: Iterable[str], page: str) -> None:
+    """
+    Refuse names that no parameter has.
+
+    :param page: the file that lists all parameters.
+    :raises ParameterError: a name is unknown.
+    """
     for name in names:
         if name in known or name.startswith(_RCLPY_PARAMETERS):
             continue
         near = get_close_matches(name, list(known), n=1)
-        hint = f'did you mean {near[0]}?' if near else 'config/driver.yaml lists all.'
+        hint = f'did you mean {near[0]}?' if near else f'{page} lists all.'
         raise ParameterError(f'There is no parameter {name}; {hint}')
 
 

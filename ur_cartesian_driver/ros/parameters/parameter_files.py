@@ -8,8 +8,9 @@ With these parameters, ``ur-cartesian validate`` plans as the driver does.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+import re
 
 import yaml
 
@@ -35,17 +36,45 @@ def read_settings(files: Iterable[Path] = (), words: Iterable[str] = ()) -> Sett
         name, sign, value = word.partition(':=')
         if not sign:
             raise ParameterError(f'"{word}" sets no parameter; write NAME:=VALUE.')
-        given[name] = _yaml(value, word)
+        given[name] = yaml_value(value, word)
     return settings_from(given)
+
+
+def yaml_value(text: str, name: str) -> ParameterValue:
+    """
+    Return the value of a YAML text, with the types that ROS 2 gives to its scalars.
+
+    :param name: of the text, for the message.
+    :raises ParameterError: the text is not YAML.
+    """
+    try:
+        value: ParameterValue = yaml.load(text, _Loader)
+    except yaml.YAMLError as error:
+        raise ParameterError(f'{name} is not YAML: {" ".join(str(error).split())}.') from None
+    return value
 
 
 def _of_file(file: Path) -> dict[str, ParameterValue]:
     """Return the parameters that a file gives for the driver's node, in any namespace."""
-    content: object = _yaml(file.read_text(encoding='utf-8'), str(file))
     found: dict[str, ParameterValue] = {}
-    for node, values in content.items() if isinstance(content, dict) else ():
-        if str(node).split('/')[-1] in ('**', '*', _NODE) and isinstance(values, dict):
-            found |= values.get('ros__parameters') or {}
+    namespaces: set[str] = set()
+    for name, values in _sections(yaml_value(file.read_text(encoding='utf-8'), str(file))):
+        namespace, _, node = name.rpartition('/')
+        if node not in ('**', '*', _NODE):
+            continue
+        if not isinstance(values, dict):
+            raise ParameterError(
+                f'{file}: ros__parameters of {name} must be a mapping; write "NAME: VALUE" '
+                'below it.'
+            )
+        found |= values
+        if '*' not in namespace and (namespace or node == _NODE):
+            namespaces.add(namespace or '/')
+    if len(namespaces) > 1:
+        raise ParameterError(
+            f'{file} has parameters for drivers in several namespaces, '
+            f'{", ".join(sorted(namespaces))}; give a file for one of them.'
+        )
     if not found:
         raise ParameterError(
             f'{file} has no parameters for a node {_NODE}; put them below "/**:" and '
@@ -54,9 +83,36 @@ def _of_file(file: Path) -> dict[str, ParameterValue]:
     return found
 
 
-def _yaml(text: str, name: str) -> ParameterValue:
-    try:
-        value: ParameterValue = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise ParameterError(f'{name} is not YAML: {" ".join(str(error).split())}.') from None
-    return value
+def _sections(content: object, path: str = '') -> Iterator[tuple[str, object]]:
+    """Yield the full names of nodes and their parameters; namespaces can be nested."""
+    for key, value in content.items() if isinstance(content, dict) else ():
+        if key == 'ros__parameters':
+            if value is not None:
+                yield path, value
+        else:
+            yield from _sections(value, f'{path}/{str(key).strip("/")}')
+
+
+class _Loader(yaml.SafeLoader):
+    """Reads plain scalars as rcl does (rcl_yaml_param_parser, parse.c); PyYAML needs 1.0e-1."""
+
+
+def _truth(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> bool:
+    return str(node.value).lower() in ('y', 'yes', 'true', 'on')
+
+
+_Loader.yaml_implicit_resolvers = {}
+_Loader.add_constructor('tag:yaml.org,2002:bool', _truth)
+for _type, _pattern, _first in (
+    ('bool', r'(?i:y|yes|true|on|n|no|false|off)', 'yYtToOnNfF'),
+    ('int', r'[-+]?(0[xX][0-9a-fA-F]+|[0-9]+)', '-+0123456789'),
+    (
+        'float',
+        r'[-+]?(([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?|\.(?i:inf|nan))',
+        '-+.0123456789',
+    ),
+    ('null', r'~|null|', ['~', 'n', '']),
+):
+    _Loader.add_implicit_resolver(
+        f'tag:yaml.org,2002:{_type}', re.compile(f'(?:{_pattern})$'), list(_first)
+    )

@@ -13,6 +13,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from hashlib import sha256
 import pickle
 import threading
+import traceback
 from typing import Any
 
 from rclpy.node import Node
@@ -26,6 +27,7 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.ros.goals.action_server import GoalServer
 from ur_cartesian_driver.ros.goals.goal_run import GoalRun
+from ur_cartesian_driver.ros.message_fields import AT_END
 from ur_cartesian_driver.ros.messages.goal_conversion import appended_points_from_message
 from ur_cartesian_driver.ros.services.deferred_service import DeferredService
 from ur_cartesian_driver.srv import AppendPoints
@@ -47,7 +49,7 @@ class AppendService:
 
     def __init__(self, node: Node, server: GoalServer) -> None:
         """Start to serve."""
-        self._server = server
+        self._logger, self._server = node.get_logger(), server
         self._thread = ThreadPoolExecutor(1, thread_name_prefix='append points')
         self._slots = threading.Semaphore(MAX_WAITING_REQUESTS)
         self._service = DeferredService(node, AppendPoints, '~/append_points', self._handle)
@@ -74,10 +76,13 @@ class AppendService:
 
     def _append(self, request: Any) -> Any:
         """Return the response to a request."""
-        run = self._server.find_run(bytes(request.goal_id.uuid))
+        goal_id = bytes(request.goal_id.uuid)
+        run = self._server.find_run(goal_id) if any(goal_id) else self._server.running_goal
         if run is None:
             return _refusal(
                 'No goal with this goal_id is running: it has ended, or was never sent.'
+                if any(goal_id)
+                else 'No goal runs to which points could be appended: send one with keep_open.'
             )
         try:
             return self._append_to_run(run, request)
@@ -91,8 +96,10 @@ class AppendService:
         except DriverError as error:
             return _refusal(str(error), run.points)
         except Exception as error:
+            self._logger.error(traceback.format_exc())
             return _refusal(
-                f'The driver has a defect, {type(error).__name__}: {error}.', run.points
+                f'The driver has a defect, {type(error).__name__}: {error}; its log says more.',
+                run.points,
             )
 
     def _append_to_run(self, run: GoalRun, request: Any) -> Any:
@@ -114,7 +121,7 @@ class AppendService:
         if run.last_append is not None and run.last_append[0] == request_key:
             return run.last_append[1]  # the same request again
         points = motion.appender.points
-        if not new_points.replaces and request.first_index != points:
+        if not new_points.replaces and request.first_index not in (points, AT_END):
             raise InvalidGoal(
                 'first_index',
                 f'is {request.first_index}, but the goal has {points} points',

@@ -182,7 +182,7 @@ class CommandServices:
         # A goal that is being planned depends on the settings that it found.
         if isinstance(call, calls.SettingCall) and not self._is_idle():
             return completed_answer(
-                'A goal that is being planned or executed depends on the present value; wait for '
-                'its end or cancel it, then try again.'
+                'A goal, live session or freedrive is using the present value; end it, then try '
+                'again.'
             )
         return self._driver.call(call)

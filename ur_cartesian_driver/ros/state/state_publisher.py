@@ -11,17 +11,16 @@ Names, types, units and rates are in ``doc/ros_interface.md``.
 
 from __future__ import annotations
 
-import importlib
 import threading
 from time import monotonic
-from types import ModuleType
+import traceback
 from typing import Any
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, WrenchStamped
+from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, String
 
@@ -32,6 +31,7 @@ from ur_cartesian_driver.kinematics.robot_description import robot_description
 from ur_cartesian_driver.motion.state.io_signals import Signals
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.msg import DriverStatus, IOStates, RobotMode, SafetyMode, ToolData
+from ur_cartesian_driver.ros.message_fields import class_of
 from ur_cartesian_driver.ros.messages.state_messages import (
     io_states_message,
     joint_state_message,
@@ -45,12 +45,10 @@ from ur_cartesian_driver.ros.messages.state_messages import (
     tool_data_message,
     wrench_message,
 )
-from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS, SHUT_DOWN_ERRORS, STATE_QOS
+from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS, STATE_QOS, TF_QOS
 from ur_cartesian_driver.ros.parameters.node_parameters import Settings
 from ur_cartesian_driver.ros.state.diagnostics import diagnostics_message
 
-#: The QoS that tf2 requires.
-TF_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 #: Enough for all messages that a subscriber may not have received yet.
 KEPT_STAMPS = 1000
 #: Period in which an unchanged status is published again [s].
@@ -59,20 +57,12 @@ STATUS_PERIOD = 1.0
 WARNING_PERIOD = 10.0
 
 
-def tf_messages() -> ModuleType | None:
-    """Return ``tf2_msgs.msg``; None if tf2_msgs, which is not on PyPI, is not installed."""
-    try:
-        return importlib.import_module('tf2_msgs.msg')
-    except ImportError:
-        return None
-
-
 class StatePublisher:
     """Publishes the state of a driver from :meth:`start` to :meth:`close`."""
 
     def __init__(self, node: Node, driver: Driver, settings: Settings) -> None:
         """Create the publishers."""
-        self._clock = node.get_clock()
+        self._clock, self._context = node.get_clock(), node.context
         self._logger = node.get_logger()
         self._driver = driver
         self._period = 1.0 / settings.node.state_publish_rate
@@ -104,13 +94,15 @@ class StatePublisher:
         while not self._closed.wait(max(0.0, due - monotonic())):
             try:
                 self._publish(monotonic())
-            except SHUT_DOWN_ERRORS:
-                return  # ROS was shut down under the node
+            except InvalidHandle:
+                return  # the node was destroyed
             except Exception as error:
+                if not self._context.ok():
+                    return  # ROS was shut down under the node
                 # One bad value must not silence all topics for good.
                 self._logger.error(
                     'The state of the robot is not published, because of a defect of the driver, '
-                    f'{type(error).__name__}: {error}.',
+                    f'{type(error).__name__}: {error}.\n{traceback.format_exc()}',
                     throttle_duration_sec=WARNING_PERIOD,
                 )
             due += self._period * max(1.0, (monotonic() - due) // self._period)
@@ -149,9 +141,11 @@ class _StateTopics:
         self._tcp_pose = node.create_publisher(PoseStamped, '~/tcp_pose', STATE_QOS)
         self._wrench = node.create_publisher(WrenchStamped, '~/wrench', STATE_QOS)
         self._speed_scaling = node.create_publisher(Float64, '~/speed_scaling', STATE_QOS)
-        tf = tf_messages()
-        self._tf_message_type: Any = None if tf is None else tf.TFMessage
-        self._tf = None if tf is None else node.create_publisher(tf.TFMessage, '/tf', TF_QOS)
+        # tf2_msgs is not on PyPI.
+        self._tf_message_type: Any = class_of('tf2_msgs/msg/TFMessage')
+        self._tf = self._tf_message_type and node.create_publisher(
+            self._tf_message_type, '/tf', TF_QOS
+        )
         self._last: RobotState | None = None
         self._publishes_links = settings.node.publish_link_frames
         self._tf_prefix = settings.planning.tf_prefix

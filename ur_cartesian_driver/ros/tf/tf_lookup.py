@@ -124,7 +124,9 @@ def listen_to_tf(node: Node, max_age: float) -> TransformLookup | None:
     """
     try:
         tf2_ros = importlib.import_module('tf2_ros')
-    except ImportError:
+    except ModuleNotFoundError as error:
+        if error.name != 'tf2_ros':
+            raise
         return None
     buffer = tf2_ros.Buffer()
     listener = tf2_ros.TransformListener(buffer, node)

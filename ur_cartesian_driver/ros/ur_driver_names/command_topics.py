@@ -50,6 +50,7 @@ class _FreedriveSwitch:
         self._confirmed: bool | None = False
         self._watchdog = steady_timer(driver.node, settings.freedrive_timeout, self._late)
         self._watchdog.cancel()
+        driver.on_close(self._end)
         driver.client(SetBool, row.source)  # its discovery takes time
         self._subscription = driver.node.create_subscription(kind, row.name, self._take, STATE_QOS)
 
@@ -62,6 +63,11 @@ class _FreedriveSwitch:
         self._is_wanted = message.data
         self._follow()
 
+    def _end(self) -> None:
+        """Switch freedrive off, because nobody is left who could."""
+        if self._is_wanted or self._confirmed is not False:
+            self._driver.call(SetBool, self._row.source, SetBool.Request(data=False))
+
     def _late(self) -> None:
         self._watchdog.cancel()
         if self._is_wanted:
@@ -70,7 +76,7 @@ class _FreedriveSwitch:
         self._follow()
 
     def _follow(self) -> None:
-        """Make the driver do what is wanted, unless it is being told something already."""
+        """Make the driver do what is wanted, unless a request is pending."""
         on = self._is_wanted
         if self._is_calling or on == self._confirmed:
             return

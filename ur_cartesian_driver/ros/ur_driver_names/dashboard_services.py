@@ -195,9 +195,9 @@ def _row(
     """
     Return the row of a service that the driver has too.
 
-    :param command: of the dashboard, whose reply is the text of the response; empty = the text of
-        the driver's answer is.
-    :param kind: the type, without its package; empty = it is called like the driver's.
+    :param command: dashboard command whose reply becomes the response text; empty = use the
+        driver's text.
+    :param kind: the type, without its package; empty = same name as the driver's type.
     :param fields: further ones of the row.
     """
     same_kind = _NO_FIELDS if source_type is Trigger else source_type.__name__

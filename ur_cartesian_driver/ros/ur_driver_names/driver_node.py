@@ -24,7 +24,7 @@ from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS, steady_timer
 ANSWER_TIMEOUT = 60.0
 #: How long a call waits for the discovery of the driver's service [s].
 DISCOVERY_TIMEOUT = 5.0
-#: Age from which on a status says nothing more; the driver publishes it once a second [s].
+#: Older statuses are ignored; the driver publishes one every second [s].
 STATUS_TIMEOUT = 5.0
 #: Period in which waiting calls are looked at [s].
 CHECK_PERIOD = 0.2
@@ -67,6 +67,7 @@ class DriverNode:
         self._status_time = 0.0
         self.io_states: IOStates | None = None
         self._on_status: list[Callable[[DriverStatus], None]] = []
+        self._on_close: list[Callable[[], None]] = []
         self.subscribe(DriverStatus, 'status', self._keep_status, LATCHED_QOS)
         self.subscribe(IOStates, 'io_states', self._keep_io_states, LATCHED_QOS)
         self._group = ReentrantCallbackGroup()
@@ -101,6 +102,10 @@ class DriverNode:
         """Call a function with each message of the status, once a second and on change."""
         self._on_status.append(callback)
 
+    def on_close(self, callback: Callable[[], None]) -> None:
+        """Call a function before all calls are given up."""
+        self._on_close.append(callback)
+
     def client(self, kind: Any, name: str) -> Any:
         """Return the client of a service of the driver's node; each has one."""
         with self._lock:
@@ -128,7 +133,9 @@ class DriverNode:
         return call.future
 
     def close(self) -> None:
-        """Give up all calls, also those that are made later."""
+        """Fail all pending and later calls."""
+        for callback in self._on_close:
+            callback()
         self._is_closed = True
         self._look_at_calls()
 
@@ -180,8 +187,8 @@ class DriverNode:
             text = f'The service {call.service} did not answer within {call.timeout:g} s.'
             if not call.is_sent:
                 text = (
-                    f'The service {call.service} is not there: does the driver run, and is its '
-                    'node called so?'
+                    f'The service {call.service} does not exist; start the driver, or set the '
+                    'parameter driver to the name of its node.'
                 )
             _finish(call.future, DriverSilent(text))
 

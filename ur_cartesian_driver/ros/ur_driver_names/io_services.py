@@ -182,7 +182,7 @@ IO_SERVICES = (
     _row('set_analog_output', SetIO, _set_analog_output, kind='SetAnalogOutput', source='set_io'),
     _row('set_payload', SetPayload, _set_payload),
     _row('set_gravity', SetGravity, _set_gravity),
-    # Its newest release has a controller of its own for it.
+    # The UR driver's newest release serves gravity from a separate controller.
     _row('set_gravity', SetGravity, _set_gravity, controller='gravity_update_controller'),
     _row('set_speed_slider', SetSpeedSliderFraction, _set_speed_slider),
     _row(

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 import threading
+import traceback
 from typing import Any
 
 from rcl_interfaces.srv import GetParameters
@@ -75,7 +76,7 @@ class _ModeServer:
 
     def _judge(self, goal: Message) -> GoalResponse:
         if not self._driver.is_reporting:
-            reason = 'the mode of the robot is not known: is the driver connected to it'
+            reason = 'the mode of the robot is not known; connect the driver to the robot'
         elif self._run is not None:
             reason = 'another goal changes the mode'
         else:
@@ -150,6 +151,7 @@ class ModeRun:
         except (_Ended, DriverSilent) as error:
             self._finish(False, str(error))
         except Exception as error:  # a goal without a result would refuse all later ones
+            self._driver.warn(traceback.format_exc())
             self._finish(False, f'A defect of set_mode: {type(error).__name__}: {error}.')
 
     def _go(self) -> str:
@@ -200,7 +202,7 @@ class ModeRun:
             raise _Ended(
                 'The robot is in a protective stop, which a person has to look at. Unlock it on '
                 'the pendant or by dashboard_client/unlock_protective_stop; set_mode does so only '
-                'where the parameter unlock_protective_stop takes the responsibility.'
+                'if unlock_protective_stop is true.'
             )
         else:
             self._do('dashboard/unlock_protective_stop')
@@ -213,7 +215,7 @@ class ModeRun:
         commands = COMMANDS.get((mode, target))
         if commands is None:
             raise _Ended(
-                f'The robot is in mode {mode.name}, out of which set_mode does not bring it; '
+                f'The robot is in mode {mode.name}, which set_mode cannot leave; '
                 'wait, or look at the pendant.'
             )
         for command in commands:

@@ -16,7 +16,13 @@ from rclpy.node import Node
 from rclpy.utilities import try_shutdown
 
 from ur_cartesian_driver.ros.message_fields import class_of
-from ur_cartesian_driver.ros.parameters.node_parameters import as_overrides, declared_values
+from ur_cartesian_driver.ros.parameters.node_parameters import (
+    as_overrides,
+    declared_values,
+    defaults,
+    explained_overrides,
+    refuse_unknown,
+)
 from ur_cartesian_driver.ros.parameters.parameter_table import (
     declarations_of,
     ParameterError,
@@ -36,8 +42,8 @@ class UrDriverNames(Node):
     """
     Serves the topics, services and actions of the UR ROS 2 driver, in its own namespace.
 
-    It calls the driver's node over ROS and may be in another process. Without the driver it
-    answers each call with that.
+    It calls the driver's node over ROS and may be in another process. Without a driver, every call
+    fails and says so.
     """
 
     def __init__(
@@ -50,11 +56,15 @@ class UrDriverNames(Node):
         Start to serve.
 
         :param node_kwargs: for ``rclpy.node.Node``.
-        :raises ParameterError: a parameter is invalid; the text says why.
+        :raises ParameterError: a parameter is unknown or invalid; the text says why.
         """
-        super().__init__(
-            NODE_NAME, parameter_overrides=as_overrides(parameter_overrides), **node_kwargs
-        )
+        with explained_overrides():
+            super().__init__(
+                NODE_NAME,
+                parameter_overrides=as_overrides(parameter_overrides),
+                automatically_declare_parameters_from_overrides=True,
+                **node_kwargs,
+            )
         self._offered: list[Any] = []
         try:
             settings = _settings(self)
@@ -95,9 +105,16 @@ def _settings(node: Node) -> NamesSettings:
     """
     Declare the parameters of a node, and return their values.
 
-    :raises ParameterError: one is invalid.
+    :raises ParameterError: a name is unknown or a value invalid.
     """
-    values = declared_values(node, declarations_of(NamesSettings))
+    declarations = tuple(declarations_of(NamesSettings))
+    # Those of the driver come, too, if they are given to all nodes.
+    for name in defaults():
+        if node.has_parameter(name):
+            node.undeclare_parameter(name)
+    known = [declaration.name for declaration in declarations]
+    refuse_unknown(node.list_parameters([], 0).names, known, 'doc/coming_from/ur_driver.md')
+    values = declared_values(node, declarations)
     try:
         return NamesSettings(**values)  # type: ignore[arg-type]  # the next line catches these
     except ValueError as error:

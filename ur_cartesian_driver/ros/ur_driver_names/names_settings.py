@@ -17,14 +17,14 @@ class NamesSettings:
 
     #: The driver's node; without a leading / it is relative to the namespace of this node.
     driver: str = 'ur_cartesian_driver'
-    #: The release of the UR driver whose meaning counts where releases differ. jazzy: the wrench
+    #: The UR driver release to follow where releases differ. jazzy: the wrench
     #: is in tool0. lyrical, and what came after it: in tool0_controller, and there is no
     #: scaled_joint_trajectory_controller.
     release: Literal['jazzy', 'lyrical'] = 'jazzy'
     #: Rate of io_states and tool_data [Hz], which also come with each change.
     io_publish_rate: Annotated[float, Range(0.1, 100.0)] = 10.0
     #: true: set_mode unlocks a protective stop. Whoever sets this sees to it that somebody has
-    #: looked for the cause of each stop: the manufacturer forbids to reset them automatically.
+    #: looked for the cause of each stop: the manufacturer forbids resetting them automatically.
     unlock_protective_stop: bool = False
     #: Folder of this computer whose files upload_program and update_program may read, and
     #: download_program may write; empty: none.

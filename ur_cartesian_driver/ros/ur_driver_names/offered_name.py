@@ -47,7 +47,7 @@ class UrName:
 
     @property
     def served_by(self) -> str:
-        """What of the driver serves it; empty = nothing does."""
+        """The driver's interface behind the name, or ''."""
         return ', '.join(f'`~/{name}`' for name in self.source.split(', ') if name)
 
     def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:

@@ -3,10 +3,10 @@
 """
 A sequence of motion primitives as a goal: primitive i becomes point i and segment i.
 
-What the fields mean is what motion_primitives_controllers and the UR driver's hardware interface
-make of them: an arc has its goal first and its via second, joint positions are in the order of the
-arm, and a move_time of more than 0 replaces velocity and acceleration, except on an arc. Where
-these ignore what they cannot do, the sequence is refused.
+The fields mean what they mean to motion_primitives_controllers and the UR driver's hardware
+interface: an arc has its goal first and its via second, joint positions are in the order of the
+arm, and a move_time of more than 0 replaces velocity and acceleration, except on an arc. What
+those silently ignore is refused here.
 """
 
 from __future__ import annotations

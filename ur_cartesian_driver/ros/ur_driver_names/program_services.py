@@ -3,8 +3,8 @@
 """
 The dashboard client's services for program files, which robots with PolyScope X have.
 
-The driver takes and returns programs as text; these services name files. Whoever may call them
-could read and write any file of this computer, so only those in ``program_directory`` count.
+The driver takes and returns programs as text; these services name files. Otherwise any caller
+could read and write any file, so only files in ``program_directory`` are allowed.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class _FileService(UrName):
     #:
     #: :raises _Refused: the file may not be used.
     #: :raises OSError: the file cannot be read.
-    #: :raises ValueError: it is no text, or its name is none.
+    #: :raises ValueError: the file is not UTF-8, or its name is invalid.
     start: Callable[[DriverNode, str, Message, str], Future[ServiceAnswer]]
 
     def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:

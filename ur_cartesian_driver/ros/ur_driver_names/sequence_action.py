@@ -27,8 +27,6 @@ from ur_cartesian_driver.ros.ur_driver_names.primitive_sequence import (
 )
 from ur_cartesian_driver.ros.ur_driver_names.trajectory_actions import ForwardedGoal, GoalForwarder
 
-#: Codes of failures that a sequence has, too; all others become INVALID_GOAL.
-_SAME_CODES = (ErrorCode.OLD_HEADER_TIMESTAMP,)
 #: The index of the feedback is a byte.
 _MAX_INDEX = 255
 
@@ -72,7 +70,7 @@ class _SequenceForwarder(GoalForwarder):
         if code is ErrorCode.SUCCESSFUL:
             return self.action.Result(error_string=result.error_string)
         return self.action.Result(
-            error_code=int(code if code in _SAME_CODES else ErrorCode.INVALID_GOAL),
+            error_code=self.action.Result.INVALID_GOAL,
             error_string=f'{code.name}: {result.error_string}',
         )
 

@@ -25,7 +25,11 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer, end_goal
 from ur_cartesian_driver.ros.message_fields import class_of, duration_message, Message, nanoseconds
-from ur_cartesian_driver.ros.node_endpoints import steady_timer
+from ur_cartesian_driver.ros.node_endpoints import (
+    Endpoints,
+    feedback_publishers,
+    steady_timer,
+)
 from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import Served, UrName
@@ -125,7 +129,7 @@ class ForwardedGoal:
         self.forwarded: Any = None
         self.seconds_lost = 0.0
         #: Who published feedback when the goal was sent; a driver that is started again differs.
-        self.publishers: frozenset[tuple[int, ...]] = frozenset()
+        self.publishers: Endpoints = frozenset()
 
 
 class GoalForwarder(ABC):
@@ -158,7 +162,7 @@ class GoalForwarder(ABC):
         )
         steady_timer(node, LOOK_PERIOD, self._look_for_driver, group)
 
-    # -- how the two actions differ; by default they do not --------------------------------------
+    # -- what subclasses convert ------------------------------------------------------------------
 
     def rejection(self, goal: Message) -> str:
         """Return why a goal is rejected; empty = it is not."""
@@ -169,7 +173,7 @@ class GoalForwarder(ABC):
         self.send(run, run.handle.request)
 
     def feedback(self, feedback: Message) -> Message:
-        """Return the feedback of the goal for that of the driver's goal."""
+        """Convert the driver's feedback."""
         return feedback
 
     def result(self, result: Message) -> Message:
@@ -204,7 +208,7 @@ class GoalForwarder(ABC):
     def _judge(self, goal: Message) -> GoalResponse:
         reason = self.rejection(goal)
         if not reason and not self._client.server_is_ready():
-            reason = f'the driver does not serve {self._target}: does it run'
+            reason = f'the driver does not serve {self._target}; start the driver'
         if not reason and not self.preempts and self._runs:
             reason = 'a goal is being executed; cancel it first'
         if not reason:
@@ -237,7 +241,7 @@ class GoalForwarder(ABC):
         return CancelResponse.ACCEPT
 
     def _end(self, run: ForwardedGoal, status: int, result: Message) -> None:
-        """Give a goal the end of the driver's goal; only the first end counts."""
+        """End a goal as the driver's goal ended; ignore later ends."""
         with self._lock:
             if self._runs.pop(_key(run.handle), None) is None:
                 return
@@ -265,10 +269,8 @@ class GoalForwarder(ABC):
             elif run.publishers and publishers and not publishers & run.publishers:
                 self.refuse(run, 'The driver was started again, and knows nothing of this goal.')
 
-    def _publishers(self) -> frozenset[tuple[int, ...]]:
-        """Return who publishes feedback of the driver's action, as numbers that nobody repeats."""
-        found = self.driver.node.get_publishers_info_by_topic(f'{self._target}/_action/feedback')
-        return frozenset(tuple(each.endpoint_gid) for each in found)
+    def _publishers(self) -> Endpoints:
+        return feedback_publishers(self.driver.node, self._target)
 
 
 def _key(handle: Any) -> bytes:
