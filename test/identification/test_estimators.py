@@ -71,9 +71,9 @@ def noise(generator: np.random.Generator, t: Floats) -> Floats:
 
 def test_begin_and_end_of_a_move_are_known_to_be_correlated():
     """A move that seems to begin late seems to end early, so gaps beside it err together."""
-    generator, t = np.random.default_rng(1), 0.004 * np.arange(450)
-    times: Floats = np.maximum(t - 0.2013, 0.0)
-    travel: Floats = speed_steps(0.6, 2.0, 0.6).integral(times)
+    generator = np.random.default_rng(1)
+    t: Floats = np.arange(450) / 250.0
+    travel: Floats = speed_steps(0.6, 2.0, 0.6).integral(t - 0.2013)
     follows = np.arange(len(t)) > 0
     found = [
         find_profile(t, travel + noise(generator, t), follows, may_start=False) for _ in range(100)
