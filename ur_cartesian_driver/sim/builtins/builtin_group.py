@@ -25,7 +25,7 @@ def without_effect(function: F) -> F:
 
 
 def has_effect(function: Callable[..., Any]) -> bool:
-    """Return whether a script function does more than to check its arguments."""
+    """Return whether a script function does more than check its arguments."""
     return getattr(function, '__func__', function) not in _WITHOUT_EFFECT
 
 
