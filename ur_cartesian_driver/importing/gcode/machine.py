@@ -36,6 +36,10 @@ _OF_MOTION = frozenset('XYZIJKRP')
 _AXIS_WORDS = frozenset('XYZABCE')
 #: Codes that move to a machine position: along the named axes, or along all if none is named.
 _WITH_AXES = ('G28', 'G30', 'G53')
+_COMMENT = re.compile(r'\([^()]*\)|;.*')
+#: The codes by which a lathe is known, and those that end a feed per turn.
+_LATHE_CODE = re.compile(r'G\s*0*(50|92|94|96|98|99)(?![.\d])', re.I)
+_S_WORD, _F_WORD = (re.compile(rf'{letter}\s*[-+.\d]', re.I) for letter in 'SF')
 _CONDITION_END = re.compile(r'\s*M623\b', re.I)
 _UNITS = {'G20': LENGTH_UNITS['in'], 'G21': LENGTH_UNITS['mm']}
 #: The codes of the work offsets; G10 numbers them from 1.
@@ -58,7 +62,7 @@ class GcodeMachine:
         self._line = 0
         self._has_begun = self._seen_percent = False
         self._frame = _FRAMES[0]
-        self._feed_per_turn = self._surface_speed = self._is_lathe = False
+        self._feed_per_turn = self._surface_speed = False
         #: The line of an M622 whose M623 is still to come; 0 = none.
         self._condition = 0
         #: The lines of the G0 motions during which the output of S stays on.
@@ -154,6 +158,7 @@ class GcodeMachine:
         return row
 
     def _check_codes(self, codes: Sequence[str], rows: Sequence[Code], words: _Words) -> None:
+        self._check_cycles(codes, words)
         groups: dict[str, str] = {}
         for code, row in zip(codes, rows, strict=True):
             if row.group and groups.setdefault(row.group, code) != code:
@@ -165,6 +170,18 @@ class GcodeMachine:
             ):
                 raise self._fail(
                     f'F beside {code} is of one unit or the other; give it in a line after'
+                )
+
+    def _check_cycles(self, codes: Sequence[str], words: _Words) -> None:
+        """Refuse the cycles of Fanuc's lathes whose codes are modes or offsets elsewhere."""
+        if words.keys().isdisjoint('XZ') or not _MOTIONS.isdisjoint(codes):
+            return
+        for code in codes:
+            if (code == 'G92' and 'F' in words) or (code in ('G90', 'G94') and self._is_lathe):
+                what = 'threading' if code == 'G92' else 'turning'
+                raise self._fail(
+                    f"{code} with X or Z is a {what} cycle on Fanuc's lathes; let the CAM write "
+                    'single moves'
                 )
 
     def _check_words(
@@ -241,6 +258,11 @@ class GcodeMachine:
                 self._omit('word S', CODES['G96'].reason)
             elif letter == 'W' or (letter == 'U' and not self._has_v):
                 raise self._fail(f'{letter} is not read: {CODES["W"].reason}')
+            elif letter in 'AC' and self._is_lathe:
+                raise self._fail(
+                    f'{letter} is not read: on a lathe it is an angle, a chamfer or a turn of the '
+                    'spindle; let the CAM write single moves'
+                )
             elif not row or not row.reason or (letter in 'HD' and words.keys() & _OF_MOTION):
                 raise self._fail(f'{letter}{value:g} belongs to no code of its line')
             else:
@@ -308,7 +330,6 @@ class GcodeMachine:
     def _set_spindle_mode(self, code: str, _: _Words) -> None:
         self._surface_speed = code == 'G96'
         if code != 'G97':
-            self._is_lathe = True
             self._omit(code, CODES['G96'].reason)
 
     def _set_motion(self, code: str, _: _Words) -> None:
@@ -378,6 +399,20 @@ class GcodeMachine:
 
     def _number(self, _: str, own: _Words) -> None:
         self._sequence.meet_number(self._line, int(own['O']), is_first=not self._has_begun)
+
+    @cached_property
+    def _is_lathe(self) -> bool:
+        """Return whether the program has a surface speed, or limits it, or feeds per turn."""
+        per_turn = False
+        for line in self._lines:
+            text = _COMMENT.sub('', line)
+            for match in _LATHE_CODE.finditer(text):
+                per_turn = match[1] == '99' or (per_turn and match[1] not in ('94', '98'))
+                if match[1] == '96' or (match[1] in ('50', '92') and _S_WORD.search(text)):
+                    return True
+            if per_turn and _F_WORD.search(text):
+                return True
+        return False
 
     @cached_property
     def _has_v(self) -> bool:
