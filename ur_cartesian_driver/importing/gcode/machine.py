@@ -53,8 +53,20 @@ _Words = dict[str, float]
 class GcodeMachine:
     """Executes a program and collects its points."""
 
-    def __init__(self, lines: Sequence[str], options: ImportOptions, into: PathCollector) -> None:
-        """Begin at the first line."""
+    def __init__(
+        self,
+        lines: Sequence[str],
+        options: ImportOptions,
+        into: PathCollector,
+        *,
+        is_sinumerik: bool = False,
+    ) -> None:
+        """
+        Begin at the first line.
+
+        :param is_sinumerik: names call subprograms, and M17 ends one.
+        """
+        self._is_sinumerik = is_sinumerik
         self._lines, self._options, self._into = lines, options, into
         self._sequence = LineSequence(lines)
         self._outputs = CodeOutputs(options.outputs, into)
@@ -65,6 +77,8 @@ class GcodeMachine:
         self._feed_per_turn = self._surface_speed = False
         #: The line of an M622 whose M623 is still to come; 0 = none.
         self._condition = 0
+        #: For each M120 whose M121 is still to come: whether increments were in effect (G91).
+        self._saved: list[bool] = []
         #: The lines of the G0 motions during which the output of S stays on.
         self._powered_travels: list[int] = []
 
@@ -155,6 +169,8 @@ class GcodeMachine:
             raise self._fail(f'{code} is not known; remove it, or write it as moves')
         if row.treatment is Treatment.REFUSED:
             raise self._fail(f'{row.name} is not read: {row.reason}')
+        if self._is_sinumerik and (code == 'M17' or _is_name(code)):
+            raise self._fail(f'{code} is not read: it calls or ends a subprogram of a Sinumerik')
         return row
 
     def _check_codes(self, codes: Sequence[str], rows: Sequence[Code], words: _Words) -> None:
@@ -233,15 +249,19 @@ class GcodeMachine:
         if row.name in _DO:
             _DO[row.name](self, code, own)
         elif row.treatment is Treatment.LEFT_OUT:
-            if code[0] == 'M' and (row.reason == NO_OUTPUT or code in self._outputs):
-                self._outputs.switch(self._line, code, own)
-            else:
-                self._omit(code, row.reason)
+            self._leave_out(code, row, own)
         if row.moves_away:
             named = {*own, *bare} & _AXIS_WORDS if row.name in _WITH_AXES else set()
             self._path.coordinates.lose(
                 ''.join(named.intersection(AXES)) if named else AXES, self._line
             )
+
+    def _leave_out(self, code: str, row: Code, own: _Words) -> None:
+        """Switch the output of an M-code, or else say that the code is left out."""
+        if code[0] == 'M' and (row.reason == NO_OUTPUT or code in self._outputs):
+            self._outputs.switch(self._line, code, own)
+        else:
+            self._omit(code, row.reason)
 
     def _take_words(self, words: _Words, *, beside_spindle: bool = False) -> None:
         """Carry out and remove the words that belong neither to a code nor to a motion."""
@@ -388,6 +408,18 @@ class GcodeMachine:
         if not self._sequence.back(self._line, own):
             self._omit(f'{code} in the main program', 'it is executed once')
 
+    def _save_modes(self, code: str, own: _Words) -> None:
+        self._saved.append(self._path.relative)
+        self._leave_out(code, CODES[code], own)
+
+    def _restore_modes(self, code: str, own: _Words) -> None:
+        if self._saved and self._saved.pop() != self._path.relative:
+            raise self._fail(
+                'M121 restores G90 or G91 of M120 in RepRapFirmware, not in Marlin; write G90 or '
+                'G91 before it, as at M120'
+            )
+        self._leave_out(code, CODES[code], own)
+
     def _begin_condition(self, code: str, _: _Words) -> None:
         self._condition = self._line
         self._omit(code, CODES['M622'].reason)
@@ -439,6 +471,8 @@ _DO: Mapping[str, _Action] = {
         ('M2 M30', GcodeMachine._end),
         ('M98', GcodeMachine._call),
         ('M99', GcodeMachine._return),
+        ('M120', GcodeMachine._save_modes),
+        ('M121', GcodeMachine._restore_modes),
         ('M622', GcodeMachine._begin_condition),
         ('%', GcodeMachine._percent),
         ('O', GcodeMachine._number),
@@ -450,3 +484,8 @@ _DO: Mapping[str, _Action] = {
     'G64 P': GcodeMachine._set_path_control,
     'G64 Q': GcodeMachine._set_path_control,
 }
+
+
+def _is_name(code: str) -> bool:
+    """Return whether a code is a name, such as PARK or _HOME, and no letter with a number."""
+    return len(code) > 1 and code[:2].replace('_', 'A').isalpha()
