@@ -558,3 +558,10 @@ def test_an_entity_between_blocks_is_refused(tmp_path, stray):
 def test_a_vertex_without_a_polyline_is_said(tmp_path):
     found = imported(tmp_path, drawing(LINE, 'VERTEX 5 4F 10 0 20 0'))
     assert 'VERTEX (handle 4F): it follows no POLYLINE' in remarks(found)
+
+
+def test_a_whole_ellipse_can_have_four_decimals(tmp_path):
+    entity = 'ELLIPSE 10 0 20 0 11 10 21 0 40 0.5 41 0 42 6.2832'
+    x, y, _ = millimetres(imported(tmp_path, drawing(entity))).T
+    assert (x[0], y[0], x[-1], y[-1]) == pytest.approx((10.0, 0.0, 10.0, 0.0), abs=1e-9)
+    assert (x.min(), y.min(), y.max()) == pytest.approx((-10.0, -5.0, 5.0), abs=0.2)

@@ -29,8 +29,8 @@ from ur_cartesian_driver.motion.geometry.vectors import (
 
 #: Largest angle [rad] of one arc of the robot; longer arcs are halved.
 _LONGEST_ARC = 0.95 * pi
-#: Rounding error [turns] of whole turns in files.
-_WHOLE_TURN = 1e-6
+#: Rounding error [turns] of whole turns in files, some of which write 6.2832.
+_WHOLE_TURN = 1e-5
 #: Arcs with a smaller bulge are drawn as lines: their height is below a billionth of the chord.
 _FLAT = 1e-9
 _CLOSED, _FITTED, _IN_SPACE, _MESH, _FACES, _FRAME = 1, 4, 8, 16, 64, 16

@@ -151,7 +151,9 @@ class Toolpath:
                 )
             centre = self._centre(line, plane, start, words)
             arc = arc_between(plane, start, end, centre, direction, int(turns))
-            lines = arc.lines(self._options.tolerance) if arc.rises else []
+            # The scale is applied later, and the tolerance is meant for the scaled path.
+            tolerance = self._options.tolerance / abs(self._options.scale)
+            lines = arc.lines(tolerance) if arc.rises else []
         except ValueError as error:
             raise BrokenFile(line, str(error)) from None
         if lines:
