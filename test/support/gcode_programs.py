@@ -79,6 +79,7 @@ EXAMPLES = {
     'SET_': 'SET_VELOCITY_LIMIT ACCEL=3000',
     'TIMELAPSE_': 'TIMELAPSE_TAKE_FRAME',
     'TURN_OFF_': 'TURN_OFF_HEATERS',
+    'G15 H': 'G15 H2',
     'o-word': 'o100 sub',
     'IF': 'IF [#1 LT 5] GOTO 10',
     'WHILE': 'WHILE [#1 LT 5] DO1',

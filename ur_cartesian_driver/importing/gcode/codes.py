@@ -181,6 +181,9 @@ _OFFSETS = (
     _left_out('offsets', _IN_TCP, 'G43.1', 'G43.2', words=_AXES + 'HIK'),
     _refused('offsets', 'rotary axes would turn the tool', 'G43.4', 'G43.5'),
     _refused('offsets', 'on a lathe it sets coordinates; write G92', 'G50 X', 'G50 Z'),
+    _refused(
+        'offsets', 'on an Okuma it is the work offset; leave it out, with one in the file', 'G15 H'
+    ),
 )
 _OUTPUTS = (
     _honoured(
