@@ -693,3 +693,15 @@ def test_a_program_cannot_take_all_time_or_memory(tmp_path, monkeypatch, text):
     line, sentence = refusal(tmp_path, text)
     assert line > 0
     assert len(sentence) < 300
+
+
+@pytest.mark.parametrize(
+    'option', [{'scale': 2.0}, {'frame': 'part'}, {'origin': Pose((1, 0, 0))}]
+)
+def test_joint_positions_of_a_program_cannot_be_moved(tmp_path, option):
+    line, sentence = refusal(tmp_path, f'movel({A})\nmovej({Q})\n', **option)
+    assert line == 2
+    assert 'joint positions have no frame; give no frame, origin or scale' in sentence
+    assert len(places(imported(tmp_path, f'movel({A})\nmovel({B})\n', **option))) == 2
+    solved = imported(tmp_path, f'movej(get_inverse_kin({A}, qnear={Q}))\n', **option)
+    assert len(places(solved)) == 1
