@@ -156,6 +156,10 @@ class Toolpath:
             lines = arc.lines(tolerance) if arc.rises else []
         except ValueError as error:
             raise BrokenFile(line, str(error)) from None
+        if 'P' in words:
+            self._into.remarks.add(
+                line, 'P of an arc', 'turns in all, as in LinuxCNC; Marlin adds them to the arc'
+            )
         if lines:
             self._into.remarks.add(
                 line, f'{self.motion} with a rise', f'a helix, made of {len(lines)} lines'
