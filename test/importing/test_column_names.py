@@ -231,7 +231,7 @@ def test_units_of_angles(tmp_path, unit):
         (['roll', 'pitch', 'yaw'], "the column 'roll' has no unit; write roll \\[deg\\]"),
         (['speed'], "the column 'speed' has no unit; write speed \\[mm/s\\]"),
         (['speed [kn]'], "the unit 'kn' of 'speed \\[kn\\]' is none of"),
-        (['X [mm]'], "columns 'x \\[m\\]', 'X \\[mm\\]' are the same"),
+        (['X [mm]'], "columns 'x \\[m\\]', 'X \\[mm\\]' have the same name; rename one"),
     ],
 )
 def test_a_column_that_cannot_be_meant_is_refused(tmp_path, extra, sentence):

@@ -134,7 +134,7 @@ def test_points_on_one_place_are_said(tmp_path):
         ('x,y,z\n1,2,3\n', 1, 'has no unit'),
         ('x [yd],y [mm],z [mm]\n', 1, "unit 'yd'"),
         ('x [m],y [m],z [m],qx,qy\n', 1, "'qz' is missing"),
-        ('x [m],y [m],z [m],X [mm]\n', 1, 'are the same'),
+        ('x [m],y [m],z [m],X [mm]\n', 1, 'have the same name; rename one'),
         ('x [m],y [m],z [m]\n0,0,0\n0,zero,0\n', 3, "'zero' is no number"),
         ('x [m],y [m],z [m]\n0,0,0\n\n0,0\n', 4, '2 columns'),
         ('x [m],y [m],z [m]\n0,0,nan\n', 2, "'nan' is no number"),

@@ -60,7 +60,7 @@ def test_a_number_is_read_as_the_grammar_says(tmp_path, line, x):
         ('M', 'M has no number'),
         ('G1 X1.2.3', 'two points'),
         ('G1 X1..2', 'two points'),
-        ('G1 X' + '9' * 400, 'more digits than a number that is meant'),
+        ('G1 X' + '9' * 400, 'has a number of more than 15 digits'),
         ('G1 X1 X2', 'X is there twice'),
         ('G1 X1 F10 F20', 'F is there twice'),
         ('G1 X1,5', 'is no G-code'),

@@ -516,7 +516,7 @@ def test_a_frame_that_changes_is_refused(tmp_path):
         (lambda text: text.replace('x: 0.2', 'x: nan'), "line 29: x is 'nan', but must be a"),
         (lambda text: text.replace('x: 0.2', 'x:'), "line 29: x is '', but must be a finite"),
         (lambda text: text.replace('x: 0.2', "x: '0.2'"), "line 29: x is '0.2', but must be"),
-        (lambda text: text.replace('x: 0.2', 'y: 0.2'), "line 30: the field 'y' stands twice."),
+        (lambda text: text.replace('x: 0.2', 'y: 0.2'), "line 30: the field 'y' occurs twice."),
         (lambda text: text.replace('x: 0.2', 'x: *x'), 'line 29: a message has no references (*)'),
         (
             lambda text: text.replace('x: 0.2', 'x: &a 0.2\n      k: *a'),

@@ -92,7 +92,7 @@ def find_columns(
         for column in columns:
             if names.count(column) > 1:
                 same = [title for title in titles if title.name == column]
-                raise BrokenFile(line, f'{_listed(same)} are the same')
+                raise BrokenFile(line, f'{_listed(same)} have the same name; rename one')
         group = [titles[names.index(column)] for column in columns]
         reasons |= {kind: f'the {kind} comes from {_names(group)}' for kind in kinds}
         topic = TERMS[term].topic
