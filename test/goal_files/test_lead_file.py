@@ -75,6 +75,8 @@ def test_options_have_the_leads_of_the_file_that_they_name(file, tmp_path):
         ('- {date: 2026-02-31}', 'is not YAML: '),
         ('- valve_1', "lead 1: 'valve_1' is no lead; give name, output, open, close"),
         (f'- {{{ONE}}}', 'lead 1: close is missing'),
+        (f'- {{{ONE}, close: 0.03,\n   close: 0.04}}', 'line 2: close occurs twice; remove one'),
+        (f'- {{{ONE}, close: 1:30}}', 'line 1: 1:30 is octal or sexagesimal in YAML; write it'),
         (f'- {{{ONE}, close: 0.03, shut: 0.03}}', 'lead 1: shut is not a field'),
         (f'- {{{ONE}, close: 35 ms}}', "lead 1: close is '35 ms', but must be a number of sec"),
         (f'- {{{ONE}, close: true}}', 'lead 1: close is True, but must be a number of seconds'),
@@ -108,3 +110,9 @@ def test_a_missing_file_is_refused(file):
     with pytest.raises(LeadFileError, match='cannot be read: No such file') as refusal:
         read_leads(file)
     assert '"ur-cartesian valve" writes one.' in str(refusal.value)
+
+
+def test_a_file_of_leads_in_another_encoding_is_refused(file):
+    file.write_bytes('- {name: Düse}'.encode('latin-1'))
+    with pytest.raises(LeadFileError, match=r'leads.yaml is not UTF-8; save it as UTF-8\.$'):
+        read_leads(file)

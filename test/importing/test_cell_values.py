@@ -140,3 +140,25 @@ def test_a_number_that_cannot_be_meant_is_refused(tmp_path, header, row, sentenc
     with pytest.raises(BrokenFile) as caught:
         imported(tmp_path, f'x [m],y [m],z [m],{header}\n0,0,0,{row}\n')
     assert str(caught.value).startswith(f'line 2: {sentence}')
+
+
+@pytest.mark.parametrize(
+    ('first', 'second', 'sentence'),
+    [
+        ('08:00:00', '12', "'12' is no time such as 08:00:00 before it"),
+        ('08:00:00', '2026-03-04T10:00:00', "'2026-03-04T10:00:00' is no time such as 08:00:00"),
+        ('2026-03-04 10:00:00', '2026-03-05', "'2026-03-05' is no time such as 2026-03-04 10:00"),
+        ('12', '08:00:00', "'08:00:00' is no number (time)"),
+    ],
+)
+def test_the_times_of_a_column_have_one_notation(tmp_path, first, second, sentence):
+    with pytest.raises(BrokenFile) as caught:
+        imported(tmp_path, f'time;x [m];y [m];z [m]\n{first};0;0;0\n{second};1;0;0\n')
+    assert str(caught.value).startswith(f'line 3: {sentence}')
+
+
+def test_the_largest_time_tells_the_unit_of_a_column(tmp_path):
+    rows = '0;0;0;0\n1700000000123;0.1;0;0\n1700000001623;0.2;0;0\n'
+    found = imported(tmp_path, 't;x [m];y [m];z [m]\n' + rows)
+    times = found.goal.waypoints.times
+    assert times[2] - times[1] == pytest.approx(1.5)

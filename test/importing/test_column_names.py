@@ -210,6 +210,18 @@ def test_units_of_angles(tmp_path, unit):
         (['qx', 'qy'], "columns 'qx', 'qy': the column 'qz' is missing; name them"),
         (['Quat 1', 'Quat 2'], "columns 'Quat 1', 'Quat 2': the name is not known; name them"),
         (['HeadingDeg'], "column 'HeadingDeg': the name is not known; name them"),
+        *(
+            (titles, 'columns .*: the name is not known')
+            for titles in (
+                ['orn_x', 'orn_y', 'orn_z', 'orn_w'],
+                ['tool_ori_x', 'tool_ori_y', 'tool_ori_z', 'tool_ori_w'],
+                ['angle_axis_x', 'angle_axis_y', 'angle_axis_z'],
+                ['tool_rx', 'tool_ry', 'tool_rz'],
+                ['tcp_pose_3', 'tcp_pose_4', 'tcp_pose_5'],
+                ['theta [deg]', 'tilt [deg]'],
+                ['lead_deg', 'tilt_deg'],
+            )
+        ),
         (['nx', 'ny'], "columns 'nx', 'ny': the column 'nz' is missing"),
         (['yaw'], "column 'yaw': the column 'roll' is missing"),
         (
@@ -219,7 +231,7 @@ def test_units_of_angles(tmp_path, unit):
         (['roll', 'pitch', 'yaw'], "the column 'roll' has no unit; write roll \\[deg\\]"),
         (['speed'], "the column 'speed' has no unit; write speed \\[mm/s\\]"),
         (['speed [kn]'], "the unit 'kn' of 'speed \\[kn\\]' is none of"),
-        (['X [mm]'], "columns 'x \\[m\\]', 'X \\[mm\\]' are the same"),
+        (['X [mm]'], "columns 'x \\[m\\]', 'X \\[mm\\]' have the same name; rename one"),
     ],
 )
 def test_a_column_that_cannot_be_meant_is_refused(tmp_path, extra, sentence):
@@ -236,6 +248,7 @@ def test_a_column_that_cannot_be_meant_is_refused(tmp_path, extra, sentence):
         (['qx', 'qy', 'qz', 'qw', 'yaw'], "column 'yaw': the orientation comes from 'qx', 'qy'"),
         (['rx', 'ry', 'rz'], "columns 'rx', 'ry', 'rz': no unit: read as a rotation vector [rad]"),
         (['q0', 'q1', 'q3', 'q4', 'q5'], "columns 'q0', 'q1', 'q3' to 'q5': a path has no such"),
+        (['joint_1 [deg]', 'J2 [deg]'], "columns 'joint_1 [deg]', 'J2 [deg]': a path has no such"),
         (['', 'note'], "column 'note': a path has no such quantity"),
         (['', 'note'], 'column 4 without a name: a path has no such quantity'),
     ],
@@ -264,3 +277,41 @@ def test_paths_of_names_count_by_their_ends(tmp_path):
     )
     assert found.goal.waypoints.times.tolist() == [0.0, 1.5]
     assert any("'/robot/wrench/force/x'" in text for text in remarks(found))
+
+
+def test_x_y_z_w_that_can_be_a_quaternion_are_refused(tmp_path):
+    text = r"^line 1: columns 'x', 'y', 'z', 'w' can be a quaternion; name them qx, qy, qz, qw"
+    for header in (['px', 'py', 'pz', *'xyzw'], [*'xyzw'], ['px', 'py', 'pz', *'xyzw', *'abc']):
+        with pytest.raises(BrokenFile, match=text):
+            imported(tmp_path, header, ['0' * len(header)], unit='m')
+    two = ['px', 'py', 'pz', *'xyzw']
+    with pytest.raises(BrokenFile, match=text):
+        imported(tmp_path, two, ['0' * 7], unit='m', orientation=ToolOrientation.DOWN)
+    found = imported(
+        tmp_path, [*'xyzw', 'rx', 'ry', 'rz'], [['1', '2', '3', '9', '0', '0', '0']], unit='mm'
+    )
+    assert np.array(found.goal.waypoints.poses)[0, :3] == pytest.approx([0.001, 0.002, 0.003])
+
+
+def test_position_and_orientation_of_two_bodies_are_not_joined(tmp_path):
+    def header(position, orientation):
+        names = [f'{position}/{axis} [m]' for axis in 'xyz']
+        return [*names, *(f'{orientation}/{axis}' for axis in 'xyzw')]
+
+    row = ['0.1', '0.2', '0.3', '0', '0.6', '0', '0.8']
+    two = header('/ee/position', '/imu/orientation')
+    with pytest.raises(
+        BrokenFile,
+        match=r"^line 1: columns '/ee/position/z \[m\]', '/imu/orientation/w' are of different",
+    ):
+        imported(tmp_path, two, [row])
+    found = imported(tmp_path, two, [row], orientation=ToolOrientation.DOWN)
+    assert any('the tool is to point down' in text for text in remarks(found))
+    for one in (
+        header('/ee/position', '/ee/orientation'),
+        header('/ee/pose/position', '/ee/orientation'),
+        header('/tf/translation', '/tf/rotation'),
+        header('position', 'orientation'),
+    ):
+        found = imported(tmp_path, one, [row])
+        assert np.array(found.goal.waypoints.poses)[0] == pytest.approx([float(n) for n in row])

@@ -32,6 +32,8 @@ SPREADSHEET = '\ufeffX (mm);Y (mm);Z (mm);Speed (mm/min)\r\n1,5;0;0;600\r\n2,5;0
 #: As a log in SI units, with quaternions and times.
 LOG = 'time,x_m,y_m,z_m,qx,qy,qz,qw\n0.5,0,0,0,0,0,0,1\n1.5,0.1,0,0,0,0,0.6,0.8\n'
 
+TIMES_LEFT_OUT = 'the times of the points: left out, because the option speed replaces them'
+
 
 def imported(tmp_path, text, **options):
     file = tmp_path / 'points.csv'
@@ -90,7 +92,7 @@ def test_a_log_with_times(tmp_path):
     slower = imported(tmp_path, LOG, speed=0.05)
     assert slower.goal.segments.velocities.tolist() == [0.05, 0.05]
     assert not slower.goal.waypoints.times.any()
-    assert slower.remarks[0].text() == 'the times of the points: a speed is given'
+    assert slower.remarks[0].text() == TIMES_LEFT_OUT
 
 
 def test_angles_about_three_axes(tmp_path):
@@ -132,7 +134,7 @@ def test_points_on_one_place_are_said(tmp_path):
         ('x,y,z\n1,2,3\n', 1, 'has no unit'),
         ('x [yd],y [mm],z [mm]\n', 1, "unit 'yd'"),
         ('x [m],y [m],z [m],qx,qy\n', 1, "'qz' is missing"),
-        ('x [m],y [m],z [m],X [mm]\n', 1, 'are the same'),
+        ('x [m],y [m],z [m],X [mm]\n', 1, 'have the same name; rename one'),
         ('x [m],y [m],z [m]\n0,0,0\n0,zero,0\n', 3, "'zero' is no number"),
         ('x [m],y [m],z [m]\n0,0,0\n\n0,0\n', 4, '2 columns'),
         ('x [m],y [m],z [m]\n0,0,nan\n', 2, "'nan' is no number"),

@@ -324,7 +324,7 @@ def test_the_tolerance_holds_after_the_scale(tmp_path):
         ('LINE 5 2F 10 0 20 0 11 nan 21 0', "LINE 2F: 'nan' is no number (group code 11)."),
         ('LINE 5 2F 10 0 20 0 11 1_0 21 0', "LINE 2F: '1_0' is no number (group code 11)."),
         ('LINE 5 2F 10 0 20 0 11 1e99 21 0', "LINE 2F: '1e99' is too large (group code 11)."),
-        ('LINE 10 0 20 0 11 5 21 5 11 6', 'LINE: group code 11 stands twice.'),
+        ('LINE 10 0 20 0 11 5 21 5 11 6', 'LINE: group code 11 occurs twice.'),
         ('CIRCLE 5 2F 10 0 20 0 40 -1', 'CIRCLE 2F: its radius is -1.'),
         ('CIRCLE 10 0 20 0 40 1 210 0 220 0 230 0', 'its extrusion has no direction'),
         ('LWPOLYLINE 38 -5 210 0 220 0 10 0 20 0 10 1 20 1', 'its extrusion has no direction'),
@@ -344,7 +344,7 @@ def test_the_tolerance_holds_after_the_scale(tmp_path):
         ),
         (
             'POLYLINE 10 0 20 0 30 0 10 9 20 0 30 0 0 VERTEX 10 0 20 0 0 SEQEND',
-            'POLYLINE: group code 10 stands twice.',
+            'POLYLINE: group code 10 occurs twice.',
         ),
         (
             'POLYLINE 70 8 0 VERTEX 10 0 20 0 42 1 0 VERTEX 10 9 20 0 0 SEQEND',
@@ -352,12 +352,12 @@ def test_the_tolerance_holds_after_the_scale(tmp_path):
         ),
         (
             'POLYLINE 70 1 0 VERTEX 10 0 20 0 0 VERTEX 10 9 20 0 70 16 0 SEQEND',
-            'VERTEX: it is of a frame (group code 70), and its POLYLINE is not fitted.',
+            'VERTEX: it is a control point (group code 70), but its POLYLINE is no fitted spline.',
         ),
         ('LWPOLYLINE 90 3 10 0 20 0 10 1 20 1', 'it has 2 vertices in place of 3'),
         ('LWPOLYLINE 90 2 10 0 10 1 20 1', 'a vertex has no y (group code 20).'),
         ('LWPOLYLINE 20 0 10 1 20 1', 'group code 20 stands before the first 10.'),
-        ('LWPOLYLINE 10 0 20 0 20 1', 'group code 20 stands twice for a vertex.'),
+        ('LWPOLYLINE 10 0 20 0 20 1', 'group code 20 occurs twice for a vertex.'),
         ('LWPOLYLINE 70 1.5 10 0 20 0', '1.5 is no integer (group code 70).'),
         ('SPLINE 71 1 40 0 40 0 40 1 10 0 20 0 10 1 20 1', 'need 4 knots'),
         ('SPLINE 71 1 72 3 40 0 40 0 40 1 40 1 10 0 20 0 10 1 20 1', '4 knots in place of 3'),
@@ -490,7 +490,7 @@ def test_a_record_of_another_section_is_refused(tmp_path, text, sentence):
 def test_two_units_are_refused(tmp_path):
     twice = drawing(LINE, header='9 $INSUNITS 70 {}')
     assert len(millimetres(imported(tmp_path, twice.format(4)))) == 2
-    with pytest.raises(BrokenFile, match=r'^line \d+: \$INSUNITS: it stands twice\.$'):
+    with pytest.raises(BrokenFile, match=r'^line \d+: \$INSUNITS: it occurs twice\.$'):
         imported(tmp_path, twice.format(5))
 
 
@@ -558,3 +558,10 @@ def test_an_entity_between_blocks_is_refused(tmp_path, stray):
 def test_a_vertex_without_a_polyline_is_said(tmp_path):
     found = imported(tmp_path, drawing(LINE, 'VERTEX 5 4F 10 0 20 0'))
     assert 'VERTEX (handle 4F): it follows no POLYLINE' in remarks(found)
+
+
+def test_a_whole_ellipse_can_have_four_decimals(tmp_path):
+    entity = 'ELLIPSE 10 0 20 0 11 10 21 0 40 0.5 41 0 42 6.2832'
+    x, y, _ = millimetres(imported(tmp_path, drawing(entity))).T
+    assert (x[0], y[0], x[-1], y[-1]) == pytest.approx((10.0, 0.0, 10.0, 0.0), abs=1e-9)
+    assert (x.min(), y.min(), y.max()) == pytest.approx((-10.0, -5.0, 5.0), abs=0.2)

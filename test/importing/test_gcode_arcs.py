@@ -70,15 +70,16 @@ def test_the_points_of_an_arc_divide_its_turns_evenly(tmp_path, arc, degrees):
         assert point == pytest.approx(expected, abs=1e-6)
 
 
-def test_a_helix_keeps_radius_pitch_and_tolerance(tmp_path):
-    found = imported(tmp_path, 'G21\nG0 X10 Y0 Z0\nG3 X10 Y0 Z4 I-10 P2 F60\n')
-    points = positions(found)[1:]
+@pytest.mark.parametrize('scale', [1.0, -10.0, 0.1])
+def test_a_helix_keeps_radius_pitch_and_tolerance(tmp_path, scale):
+    found = imported(tmp_path, 'G21\nG0 X10 Y0 Z0\nG3 X10 Y0 Z4 I-10 P2 F60\n', scale=scale)
+    points = positions(found)[1:] / scale
     assert np.hypot(*points[:, :2].T) == pytest.approx(10.0)
     angles = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
     assert angles[-1] == pytest.approx(4.0 * pi - (angles[0] < 0.0) * 2.0 * pi, abs=1e-6)
     assert points[:, 2] == pytest.approx(4.0 * angles / (4.0 * pi))
     middles = np.hypot(*(0.5 * (points[1:] + points[:-1]))[:, :2].T)
-    assert 0.02 < 10.0 - middles.min() <= 0.05
+    assert 0.01 < abs(scale) * (10.0 - middles.min()) <= 0.05
     assert f'line 3: G3 with a rise: a helix, made of {len(points)} lines' in remarks(found)
 
 

@@ -6,6 +6,8 @@ Positions of a program: its start, offsets, and places of the machine.
 They are worked out by hand from the documents of LinuxCNC, GRBL and Marlin.
 """
 
+import re
+
 from gcode_programs import imported, positions, refusal, remarks
 import numpy as np
 import pytest
@@ -193,8 +195,43 @@ def test_the_diameter_mode_halves_x(tmp_path):
 def test_the_radii_of_a_lathe_are_said(tmp_path):
     found = imported(tmp_path, 'G21 G18\nG50 S2000\nG96 S200 M3\nG0 X10 Z5\nG1 Z0 F100\n')
     assert 'X of a lathe: a radius, because there is no G7' in remarks(found)
+    for mark in ('G50 S2000', 'G92 S2000', 'G99\nG1 X9 F0.2', 'G1 X9 F100\nG97 G99\nX8 F.2'):
+        found = imported(tmp_path, f'G21 G18\n{mark}\nG0 X10 Z5\nG1 Z0\n')
+        assert 'X of a lathe: a radius, because there is no G7' in remarks(found)
+    for other in ('G50', '(G96)', 'G99\nG98\nG1 X9 F100', 'G92 X0', 'G1 X9 F100\nG99'):
+        found = imported(tmp_path, f'G21 G18\n{other}\nG0 X10 Z5\nG1 Z0\n')
+        assert not any('X of a lathe' in text for text in remarks(found))
     found = imported(tmp_path, 'G21 G18 G8\nG96 S200 M3\nG0 X10 Z5\nG1 Z0 F100\n')
     assert not any('X of a lathe' in text for text in remarks(found))
+
+
+@pytest.mark.parametrize(
+    ('text', 'sentence'),
+    [
+        ('G21 G99\nG0 X52. Z2.\nG92 X48. Z-30. F1.5\nX47.4\nG0 X60. Z5.\n', 'G92 .*a threading'),
+        ('G21 G98\nG0 X52. Z2.\nG92 X48. Z-30. F1.5\n', 'G92 with X or Z is a threading'),
+        ('G21 G99\nG0 X52. Z2.\nG90 X48. Z-30. F0.2\nX44.\n', 'G90 with X or Z is a turning'),
+        ('G21 G98\nG0 X52. Z2.\nG94 X48. Z-30. F100.\nG96 S200\n', 'G94 with X or Z is a turn'),
+    ],
+)
+def test_the_cycles_of_a_lathe_are_refused(tmp_path, text, sentence):
+    said = refusal(tmp_path, text)
+    assert re.match(f'line 3: {sentence}.* cycle.*; let the CAM write single moves', said)
+
+
+def test_modes_beside_the_moves_of_a_lathe_are_no_cycles(tmp_path):
+    text = 'G21 G96 S200\nG90 G0 X2 Z3\nG94 G1 X4 Z5 F100\nG90 F90\nG92 X4\nG92 E0 F90\n'
+    found = imported(tmp_path, text)
+    assert positions(found) == pytest.approx(np.array([[2, 0, 3], [4, 0, 5]]))
+    mill = imported(tmp_path, 'G21 G94\nG0 X1 Z1\nG90 X2 Z3\n')
+    assert positions(mill) == pytest.approx(np.array([[1, 0, 1], [2, 0, 3]]))
+
+
+@pytest.mark.parametrize('line', ['G1 X50. A45.', 'Z-20. C2.'])
+def test_angles_and_chamfers_of_a_lathe_are_refused(tmp_path, line):
+    said = refusal(tmp_path, f'G21 G18 G1 X40. Z0. F100\n{line}\nG96 S200\n')
+    assert said.startswith(f'line 2: {line[-4 if "A" in line else -3]} is not read: on a lathe')
+    assert len(positions(imported(tmp_path, f'G21 G18 G1 X40. Z0. F100\n{line}\n'))) == 2
 
 
 def test_a_feed_per_turn_is_no_speed(tmp_path):

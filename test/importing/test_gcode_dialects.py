@@ -204,7 +204,7 @@ SAID = {
     ),
     'slic3r_klipper.gcode': (
         'line 2: EXCLUDE_OBJECT_DEFINE: a command of a printer',
-        'line 23: PAUSE: a command of a printer',
+        'line 23: PAUSE: a command or a macro whose moves are not in the file',
     ),
     'simplify3d.gcode': ('line 14: word T: tools are not changed',),
     'fusion_fanuc.nc': (

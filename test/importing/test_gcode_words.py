@@ -6,6 +6,8 @@ from gcode_programs import imported, positions, refusal, remarks
 import numpy as np
 import pytest
 
+from ur_cartesian_driver.importing import BrokenFile, import_file
+
 HERE = 'G21 G90\nG1 X1 Y1 Z1 F600\n'
 
 
@@ -58,7 +60,7 @@ def test_a_number_is_read_as_the_grammar_says(tmp_path, line, x):
         ('M', 'M has no number'),
         ('G1 X1.2.3', 'two points'),
         ('G1 X1..2', 'two points'),
-        ('G1 X' + '9' * 400, 'more digits than a number that is meant'),
+        ('G1 X' + '9' * 400, 'has a number of more than 15 digits'),
         ('G1 X1 X2', 'X is there twice'),
         ('G1 X1 F10 F20', 'F is there twice'),
         ('G1 X1,5', 'is no G-code'),
@@ -166,8 +168,8 @@ def test_what_cannot_be_meant_is_one_sentence_with_its_line(tmp_path, line, said
         'M620 S0A',
         'EXCLUDE_OBJECT_DEFINE NAME=x POLYGON=[[1,2],[3,4]]',
         'SET_VELOCITY_LIMIT ACCEL=3000',
-        'start_print bed=60',
-        'PAUSE',
+        'SAVE_GCODE_STATE NAME=a',
+        'BEEP',
     ],
 )
 def test_commands_of_printers_own_their_words(tmp_path, line):
@@ -216,3 +218,40 @@ def test_messages_are_said_beside_words(tmp_path):
     found = imported(tmp_path, f'{HERE}G1 X2 (MSG, turn the part)\n(debug, #5)\n(plain)\n')
     assert positions(found)[-1, 0] == pytest.approx(2.0)
     assert remarks(found) == ['line 3: (MSG,: a message', 'line 4: (DEBUG,: a message']
+
+
+@pytest.mark.parametrize(
+    'line',
+    [
+        *('start_print bed=60', 'PAUSE', 'PARK', 'RESUME', 'QUAD_GANTRY_LEVEL', '_CLEAR_VARS'),
+        *('BED_MESH_CALIBRATE', 'SET_KINEMATIC_POSITION X=0', 'SET_GCODE_OFFSET Z=1'),
+    ],
+)
+def test_the_tool_is_elsewhere_after_a_macro(tmp_path, line):
+    found = imported(tmp_path, f'{HERE}{line}\nG1 Y5\nG1 X7\nG1 Z8\n')
+    assert positions(found) == pytest.approx(np.array([[1, 1, 1], [7, 5, 8]]))
+    name = line.split()[0].upper()
+    assert f'line 3: {name}: a command or a macro whose moves are not in the file' in (
+        remarks(found)
+    )
+
+
+def test_names_of_a_sinumerik_are_calls(tmp_path):
+    for line in ('MY_PART', 'M17', 'SET_UP', 'PARK'):
+        file = tmp_path / 'part.mpf'
+        file.write_text(f'{HERE}{line}\nG1 X2\n')
+        with pytest.raises(BrokenFile, match=f'^line 3: {line} is not read: it calls or ends'):
+            import_file(file)
+
+
+def test_saved_modes_are_not_guessed(tmp_path):
+    state = '{0}_GCODE_STATE NAME=a\n'
+    text = f'{HERE}{state.format("SAVE")}G91\nG1 Z5\n{state.format("RESTORE")}G1 X10 Y10 Z0\n'
+    assert refusal(tmp_path, text).startswith(
+        'line 6: RESTORE_GCODE_STATE is not read: it restores modes'
+    )
+    text = f'{HERE}M120\nG91\nG1 Z5\n%sM121\nG1 X10 Y10 Z0\n'
+    assert refusal(tmp_path, text % '').startswith('line 6: M121 restores G90 or G91 of M120')
+    assert positions(imported(tmp_path, text % 'G90\n'))[-1] == pytest.approx([10, 10, 0])
+    # Marlin: the switches of the ends of axes.
+    assert positions(imported(tmp_path, f'{HERE}M121\nG1 X2\nM120\nG1 X3\n'))[-1, 0] == 3.0

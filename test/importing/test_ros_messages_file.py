@@ -516,7 +516,7 @@ def test_a_frame_that_changes_is_refused(tmp_path):
         (lambda text: text.replace('x: 0.2', 'x: nan'), "line 29: x is 'nan', but must be a"),
         (lambda text: text.replace('x: 0.2', 'x:'), "line 29: x is '', but must be a finite"),
         (lambda text: text.replace('x: 0.2', "x: '0.2'"), "line 29: x is '0.2', but must be"),
-        (lambda text: text.replace('x: 0.2', 'y: 0.2'), "line 30: the field 'y' stands twice."),
+        (lambda text: text.replace('x: 0.2', 'y: 0.2'), "line 30: the field 'y' occurs twice."),
         (lambda text: text.replace('x: 0.2', 'x: *x'), 'line 29: a message has no references (*)'),
         (
             lambda text: text.replace('x: 0.2', 'x: &a 0.2\n      k: *a'),
@@ -666,3 +666,13 @@ def test_a_broken_file_is_one_sentence_with_its_line(tmp_path, text, line, part)
         imported(tmp_path, text)
     assert caught.value.line == line
     assert '\n' not in str(caught.value)
+
+
+def test_a_speed_leaves_joint_motions_their_times(tmp_path):
+    text, _, _ = straight_line_of_joints(4)
+    found = imported(tmp_path, text, speed=0.1)
+    assert found.goal.waypoints.times[[0, -1]].tolist() == [1.0, 3.0]
+    assert 'the option speed: left out, because joint motions have none' in [
+        remark.text() for remark in found.remarks
+    ]
+    assert not imported(tmp_path, text, speed=0.1, lines=True).goal.waypoints.times.any()

@@ -693,3 +693,32 @@ def test_a_program_cannot_take_all_time_or_memory(tmp_path, monkeypatch, text):
     line, sentence = refusal(tmp_path, text)
     assert line > 0
     assert len(sentence) < 300
+
+
+@pytest.mark.parametrize(
+    'option', [{'scale': 2.0}, {'frame': 'part'}, {'origin': Pose((1, 0, 0))}]
+)
+def test_joint_positions_of_a_program_cannot_be_moved(tmp_path, option):
+    line, sentence = refusal(tmp_path, f'movel({A})\nmovej({Q})\n', **option)
+    assert line == 2
+    assert 'joint positions have no frame; give no frame, origin or scale' in sentence
+    assert len(places(imported(tmp_path, f'movel({A})\nmovel({B})\n', **option))) == 2
+    solved = imported(tmp_path, f'movej(get_inverse_kin({A}, qnear={Q}))\n', **option)
+    assert len(places(solved)) == 1
+
+
+@pytest.mark.parametrize(
+    'body',
+    [
+        'if get_standard_digital_in(3): break end\n  sync()',
+        'sleep(0.1)\n  if get_standard_digital_in(3) == True:\n    break\n  end',
+        'if not (get_standard_digital_in(3) == False): break end\n  sync()',
+    ],
+)
+def test_a_loop_that_an_input_breaks_is_a_wait(tmp_path, body):
+    found = imported(tmp_path, f'movel({A})\nwhile True:\n  {body}\nend\nmovel({B})\n')
+    (wait,) = found.goal.input_waits
+    assert (wait.waypoint, wait.input, wait.pin, wait.value) == (
+        (0, InputKind.STANDARD_DIGITAL, 3, True)
+    )
+    assert len(places(found)) == 2

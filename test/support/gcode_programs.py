@@ -74,7 +74,12 @@ WORDS = {
 #: What stands for a row that is no code.
 EXAMPLES = {
     'other M-codes': 'M88',
-    'names with _': 'EXCLUDE_OBJECT_DEFINE NAME=x POLYGON=[[1,2],[3,4]]',
+    'other names with _': 'QUAD_GANTRY_LEVEL',
+    'EXCLUDE_': 'EXCLUDE_OBJECT_DEFINE NAME=x POLYGON=[[1,2],[3,4]]',
+    'SET_': 'SET_VELOCITY_LIMIT ACCEL=3000',
+    'TIMELAPSE_': 'TIMELAPSE_TAKE_FRAME',
+    'TURN_OFF_': 'TURN_OFF_HEATERS',
+    'G15 H': 'G15 H2',
     'o-word': 'o100 sub',
     'IF': 'IF [#1 LT 5] GOTO 10',
     'WHILE': 'WHILE [#1 LT 5] DO1',

@@ -17,6 +17,8 @@ from typing import Any
 
 import yaml
 
+from ur_cartesian_driver.goal_files.goal_file import check_yaml
+from ur_cartesian_driver.goal_files.goal_schema import FieldError
 from ur_cartesian_driver.motion.goal.leads import Lead
 from ur_cartesian_driver.motion.goal.output_names import output_text, parse_output
 
@@ -41,13 +43,19 @@ def read_leads(path: str | os.PathLike[str]) -> tuple[Lead, ...]:
     """
     name = os.fspath(path)
     try:
-        content = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
+        text = Path(path).read_text(encoding='utf-8')
+        check_yaml(text)
+        content = yaml.safe_load(text)
     except OSError as error:
         raise LeadFileError(
             f'The lead_file {name} cannot be read: {error.strerror}; "ur-cartesian valve" writes '
             'one.'
         ) from None
-    except (yaml.YAMLError, ValueError) as error:  # ValueError: an impossible date, or no text
+    except FieldError as error:
+        raise LeadFileError(f'{name}: {error}') from None
+    except UnicodeDecodeError:
+        raise LeadFileError(f'{name} is not UTF-8; save it as UTF-8.') from None
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: an impossible date
         raise LeadFileError(f'{name} is not YAML: {" ".join(str(error).split())}.') from None
     if not isinstance(content, list) or not content:
         raise LeadFileError(

@@ -68,7 +68,7 @@ def term_table(*rows: Iterable[_T]) -> Mapping[str, _T]:
     for row in rows:
         for term in row:
             if table.setdefault(term.name, term) is not term:
-                raise ValueError(f'the term {term.name!r} stands twice')
+                raise ValueError(f'the term {term.name!r} occurs twice')
     return table
 
 

@@ -153,6 +153,11 @@ class ImportOptions:
     #: The active TCP for which a file's joint positions are meant.
     T_flange_tcp: Pose = IDENTITY
 
+    @property
+    def moves_path(self) -> bool:
+        """Whether the path gets another frame, origin or scale than the file's."""
+        return self.frame not in ('', 'base') or self.origin != IDENTITY or self.scale != 1.0
+
     def __post_init__(self) -> None:
         """
         Refuse a corner that no goal can have.

@@ -19,6 +19,7 @@ from ur_cartesian_driver.importing.imported_path import (
     MAX_DISTANCE,
     SAME_POINT,
     SAME_TURN,
+    TYPES_WITH_SPEED,
 )
 from ur_cartesian_driver.importing.path_times import with_times
 from ur_cartesian_driver.importing.simplification import simplify
@@ -388,7 +389,7 @@ def _given(path: ImportedPath, option: float | None, of_file: Floats) -> Floats:
     """Return the rates of the file, replaced by an option on lines and arcs."""
     if option is None:
         return of_file
-    plain = np.isin(path.types, (SegmentType.LINEAR, SegmentType.CIRCULAR, SegmentType.PROCESS))
+    plain = np.isin(path.types, TYPES_WITH_SPEED)
     return np.where(plain, option, of_file)
 
 

@@ -15,7 +15,11 @@ from dataclasses import replace
 import numpy as np
 
 from ur_cartesian_driver.importing.import_options import ImportOptions
-from ur_cartesian_driver.importing.imported_path import ImportedPath, ImportNotes
+from ur_cartesian_driver.importing.imported_path import (
+    ImportedPath,
+    ImportNotes,
+    TYPES_WITH_SPEED,
+)
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
 
@@ -41,8 +45,11 @@ def with_times(
     steps = np.diff(path.times)
     wrong = rows_where(~(steps > 0.0))[:1]
     why = ''
-    if options.speed is not None:
-        why = 'a speed is given'
+    has_speeds = np.isin(path.types, TYPES_WITH_SPEED).any()
+    if options.speed is not None and not has_speeds:
+        remarks.add(0, 'the option speed', 'left out, because joint motions have none')
+    if options.speed is not None and has_speeds:
+        why = 'left out, because the option speed replaces them'
     elif options.simplify:
         why = 'simplify merges points, whose times would no longer fit'
     elif path.is_rounded:

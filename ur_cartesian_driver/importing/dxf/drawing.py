@@ -139,7 +139,7 @@ def _header(record: Record) -> dict[str, Record]:
     for name, variable in list(_variables(record)):  # each has its values when all are there
         first = found.setdefault(name, variable)
         if name == '$INSUNITS' and variable.integer(70) != first.integer(70):
-            raise variable.fault('it stands twice')
+            raise variable.fault('it occurs twice')
     return found
 
 

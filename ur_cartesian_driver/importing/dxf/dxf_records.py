@@ -116,7 +116,7 @@ class Record:
             return default
         for value, line in found[1:]:
             if value != found[0][0]:
-                raise self.fault(f'group code {code} stands twice', line)
+                raise self.fault(f'group code {code} occurs twice', line)
         return found[0][0]
 
     def number(self, code: int, default: float | None = None) -> float:
@@ -134,7 +134,7 @@ class Record:
         value = self._number(code, *found[0])
         for text, line in found[1:]:
             if self._number(code, text, line) != value:
-                raise self.fault(f'group code {code} stands twice', line)
+                raise self.fault(f'group code {code} occurs twice', line)
         return value
 
     def numbers(self, code: int) -> list[float]:

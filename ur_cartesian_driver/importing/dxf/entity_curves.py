@@ -29,8 +29,8 @@ from ur_cartesian_driver.motion.geometry.vectors import (
 
 #: Largest angle [rad] of one arc of the robot; longer arcs are halved.
 _LONGEST_ARC = 0.95 * pi
-#: Rounding error [turns] of whole turns in files.
-_WHOLE_TURN = 1e-6
+#: Rounding error [turns] of whole turns in files, some of which write 6.2832.
+_WHOLE_TURN = 1e-5
 #: Arcs with a smaller bulge are drawn as lines: their height is below a billionth of the chord.
 _FLAT = 1e-9
 _CLOSED, _FITTED, _IN_SPACE, _MESH, _FACES, _FRAME = 1, 4, 8, 16, 64, 16
@@ -215,7 +215,7 @@ def _lwpolyline(record: Record, pen: _Pen, left_out: LeftOut) -> None:
         elif not corners:
             raise record.fault(f'group code {code} stands before the first 10', line)
         elif code == 20 and corners[-1][1] is not None:
-            raise record.fault('group code 20 stands twice for a vertex', line)
+            raise record.fault('group code 20 occurs twice for a vertex', line)
         else:
             corners[-1][1 if code == 20 else 2] = value
     found = []
@@ -242,7 +242,9 @@ def _polyline(record: Record, pen: _Pen, left_out: LeftOut) -> None:
             vertices.append(vertex)
             left_out.add_codes(vertex)
         elif not flags & _FITTED:
-            raise vertex.fault('it is of a frame (group code 70), and its POLYLINE is not fitted')
+            raise vertex.fault(
+                'it is a control point (group code 70), but its POLYLINE is no fitted spline'
+            )
     if flags & _IN_SPACE:
         points = [vertex.point(10) for vertex in vertices]
         for vertex in vertices:

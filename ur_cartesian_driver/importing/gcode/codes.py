@@ -86,6 +86,11 @@ _NO_WAIT = 'the path does not wait'
 _FLOW = 'let the CAM write the program out'
 _TEXT = 'a message, or the name of a file'
 OTHER_FILE = 'other files are not read'
+#: Beginnings of the names of Klipper's commands that do not move the tool.
+_HARMLESS = (
+    *('SET_', 'EXCLUDE_', 'TIMELAPSE_', 'TURN_OFF_', 'SAVE_GCODE_STATE', 'BED_MESH_PROFILE'),
+    *('BED_MESH_CLEAR', 'TEMPERATURE_WAIT', 'UPDATE_DELAYED_GCODE'),
+)
 
 _MOTION = (
     _honoured('motion', '', 'G0', 'G1', 'G2', 'G3', group='motion', stage=Stage.MOTION),
@@ -176,6 +181,9 @@ _OFFSETS = (
     _left_out('offsets', _IN_TCP, 'G43.1', 'G43.2', words=_AXES + 'HIK'),
     _refused('offsets', 'rotary axes would turn the tool', 'G43.4', 'G43.5'),
     _refused('offsets', 'on a lathe it sets coordinates; write G92', 'G50 X', 'G50 Z'),
+    _refused(
+        'offsets', 'on an Okuma it is the work offset; leave it out, with one in the file', 'G15 H'
+    ),
 )
 _OUTPUTS = (
     _honoured(
@@ -272,8 +280,15 @@ _PRINTERS = (
         alone=True,
         text=True,
     ),
-    _left_out('printers', _PRINTER, 'names with _', 'BEEP', 'CANCEL', 'PARK', 'PAUSE', 'PURGE'),
-    _left_out('printers', _PRINTER, 'RESPOND', 'RESTART', 'RESUME', 'STATUS'),
+    _left_out('printers', _PRINTER, *_HARMLESS, 'BEEP', 'RESPOND', 'RESTART', 'STATUS'),
+    _left_out(
+        'printers',
+        'a command or a macro whose moves are not in the file',
+        *('other names with _', 'SET_KINEMATIC_POSITION', 'SET_GCODE_OFFSET'),
+        *('CANCEL', 'PARK', 'PAUSE', 'PURGE', 'RESUME'),
+        moves_away=True,
+    ),
+    _refused('printers', 'it restores modes', 'RESTORE_GCODE_STATE'),
 )
 
 #: Codes by name. A code whose meaning a word changes has a row with that word: ``G10 L20``.
@@ -292,7 +307,10 @@ def code_named(name: str) -> Code | None:
         return family if family and family.topic == 'printers' else None
     # A name has at least three letters: X_5 is a broken word.
     is_name = '_' in name and sum(map(str.isalpha, name)) > 2
-    return CODES['names with _'] if row is None and is_name else row
+    if row is None and is_name:
+        start = next(filter(name.startswith, _HARMLESS), 'other names with _')
+        return CODES[start]
+    return row
 
 
 def code_on_line(name: str, words: Mapping[str, float]) -> Code | None:

@@ -20,7 +20,9 @@ def collect_gcode(file: Path, options: ImportOptions, into: PathCollector) -> No
 
     :raises BrokenFile: a line is no G-code, or cannot be executed.
     """
-    GcodeMachine(file_lines(file_text(file)), options, into).run()
+    is_sinumerik = file.suffix.lower() == '.mpf'
+    lines = file_lines(file_text(file))
+    GcodeMachine(lines, options, into, is_sinumerik=is_sinumerik).run()
 
 
 FORMAT = ImportFormat(

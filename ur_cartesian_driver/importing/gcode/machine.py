@@ -36,6 +36,10 @@ _OF_MOTION = frozenset('XYZIJKRP')
 _AXIS_WORDS = frozenset('XYZABCE')
 #: Codes that move to a machine position: along the named axes, or along all if none is named.
 _WITH_AXES = ('G28', 'G30', 'G53')
+_COMMENT = re.compile(r'\([^()]*\)|;.*')
+#: The codes by which a lathe is known, and those that end a feed per turn.
+_LATHE_CODE = re.compile(r'G\s*0*(50|92|94|96|98|99)(?![.\d])', re.I)
+_S_WORD, _F_WORD = (re.compile(rf'{letter}\s*[-+.\d]', re.I) for letter in 'SF')
 _CONDITION_END = re.compile(r'\s*M623\b', re.I)
 _UNITS = {'G20': LENGTH_UNITS['in'], 'G21': LENGTH_UNITS['mm']}
 #: The codes of the work offsets; G10 numbers them from 1.
@@ -49,8 +53,20 @@ _Words = dict[str, float]
 class GcodeMachine:
     """Executes a program and collects its points."""
 
-    def __init__(self, lines: Sequence[str], options: ImportOptions, into: PathCollector) -> None:
-        """Begin at the first line."""
+    def __init__(
+        self,
+        lines: Sequence[str],
+        options: ImportOptions,
+        into: PathCollector,
+        *,
+        is_sinumerik: bool = False,
+    ) -> None:
+        """
+        Begin at the first line.
+
+        :param is_sinumerik: names call subprograms, and M17 ends one.
+        """
+        self._is_sinumerik = is_sinumerik
         self._lines, self._options, self._into = lines, options, into
         self._sequence = LineSequence(lines)
         self._outputs = CodeOutputs(options.outputs, into)
@@ -58,9 +74,11 @@ class GcodeMachine:
         self._line = 0
         self._has_begun = self._seen_percent = False
         self._frame = _FRAMES[0]
-        self._feed_per_turn = self._surface_speed = self._is_lathe = False
+        self._feed_per_turn = self._surface_speed = False
         #: The line of an M622 whose M623 is still to come; 0 = none.
         self._condition = 0
+        #: For each M120 whose M121 is still to come: whether increments were in effect (G91).
+        self._saved: list[bool] = []
         #: The lines of the G0 motions during which the output of S stays on.
         self._powered_travels: list[int] = []
 
@@ -151,9 +169,12 @@ class GcodeMachine:
             raise self._fail(f'{code} is not known; remove it, or write it as moves')
         if row.treatment is Treatment.REFUSED:
             raise self._fail(f'{row.name} is not read: {row.reason}')
+        if self._is_sinumerik and (code == 'M17' or _is_name(code)):
+            raise self._fail(f'{code} is not read: it calls or ends a subprogram of a Sinumerik')
         return row
 
     def _check_codes(self, codes: Sequence[str], rows: Sequence[Code], words: _Words) -> None:
+        self._check_cycles(codes, words)
         groups: dict[str, str] = {}
         for code, row in zip(codes, rows, strict=True):
             if row.group and groups.setdefault(row.group, code) != code:
@@ -165,6 +186,18 @@ class GcodeMachine:
             ):
                 raise self._fail(
                     f'F beside {code} is of one unit or the other; give it in a line after'
+                )
+
+    def _check_cycles(self, codes: Sequence[str], words: _Words) -> None:
+        """Refuse the cycles of Fanuc's lathes whose codes are modes or offsets elsewhere."""
+        if words.keys().isdisjoint('XZ') or not _MOTIONS.isdisjoint(codes):
+            return
+        for code in codes:
+            if (code == 'G92' and 'F' in words) or (code in ('G90', 'G94') and self._is_lathe):
+                what = 'threading' if code == 'G92' else 'turning'
+                raise self._fail(
+                    f"{code} with X or Z is a {what} cycle on Fanuc's lathes; let the CAM write "
+                    'single moves'
                 )
 
     def _check_words(
@@ -216,15 +249,19 @@ class GcodeMachine:
         if row.name in _DO:
             _DO[row.name](self, code, own)
         elif row.treatment is Treatment.LEFT_OUT:
-            if code[0] == 'M' and (row.reason == NO_OUTPUT or code in self._outputs):
-                self._outputs.switch(self._line, code, own)
-            else:
-                self._omit(code, row.reason)
+            self._leave_out(code, row, own)
         if row.moves_away:
             named = {*own, *bare} & _AXIS_WORDS if row.name in _WITH_AXES else set()
             self._path.coordinates.lose(
                 ''.join(named.intersection(AXES)) if named else AXES, self._line
             )
+
+    def _leave_out(self, code: str, row: Code, own: _Words) -> None:
+        """Switch the output of an M-code, or else say that the code is left out."""
+        if code[0] == 'M' and (row.reason == NO_OUTPUT or code in self._outputs):
+            self._outputs.switch(self._line, code, own)
+        else:
+            self._omit(code, row.reason)
 
     def _take_words(self, words: _Words, *, beside_spindle: bool = False) -> None:
         """Carry out and remove the words that belong neither to a code nor to a motion."""
@@ -241,6 +278,11 @@ class GcodeMachine:
                 self._omit('word S', CODES['G96'].reason)
             elif letter == 'W' or (letter == 'U' and not self._has_v):
                 raise self._fail(f'{letter} is not read: {CODES["W"].reason}')
+            elif letter in 'AC' and self._is_lathe:
+                raise self._fail(
+                    f'{letter} is not read: on a lathe it is an angle, a chamfer or a turn of the '
+                    'spindle; let the CAM write single moves'
+                )
             elif not row or not row.reason or (letter in 'HD' and words.keys() & _OF_MOTION):
                 raise self._fail(f'{letter}{value:g} belongs to no code of its line')
             else:
@@ -308,7 +350,6 @@ class GcodeMachine:
     def _set_spindle_mode(self, code: str, _: _Words) -> None:
         self._surface_speed = code == 'G96'
         if code != 'G97':
-            self._is_lathe = True
             self._omit(code, CODES['G96'].reason)
 
     def _set_motion(self, code: str, _: _Words) -> None:
@@ -367,6 +408,18 @@ class GcodeMachine:
         if not self._sequence.back(self._line, own):
             self._omit(f'{code} in the main program', 'it is executed once')
 
+    def _save_modes(self, code: str, own: _Words) -> None:
+        self._saved.append(self._path.relative)
+        self._leave_out(code, CODES[code], own)
+
+    def _restore_modes(self, code: str, own: _Words) -> None:
+        if self._saved and self._saved.pop() != self._path.relative:
+            raise self._fail(
+                'M121 restores G90 or G91 of M120 in RepRapFirmware, not in Marlin; write G90 or '
+                'G91 before it, as at M120'
+            )
+        self._leave_out(code, CODES[code], own)
+
     def _begin_condition(self, code: str, _: _Words) -> None:
         self._condition = self._line
         self._omit(code, CODES['M622'].reason)
@@ -378,6 +431,20 @@ class GcodeMachine:
 
     def _number(self, _: str, own: _Words) -> None:
         self._sequence.meet_number(self._line, int(own['O']), is_first=not self._has_begun)
+
+    @cached_property
+    def _is_lathe(self) -> bool:
+        """Return whether the program has a surface speed, or limits it, or feeds per turn."""
+        per_turn = False
+        for line in self._lines:
+            text = _COMMENT.sub('', line)
+            for match in _LATHE_CODE.finditer(text):
+                per_turn = match[1] == '99' or (per_turn and match[1] not in ('94', '98'))
+                if match[1] == '96' or (match[1] in ('50', '92') and _S_WORD.search(text)):
+                    return True
+            if per_turn and _F_WORD.search(text):
+                return True
+        return False
 
     @cached_property
     def _has_v(self) -> bool:
@@ -404,6 +471,8 @@ _DO: Mapping[str, _Action] = {
         ('M2 M30', GcodeMachine._end),
         ('M98', GcodeMachine._call),
         ('M99', GcodeMachine._return),
+        ('M120', GcodeMachine._save_modes),
+        ('M121', GcodeMachine._restore_modes),
         ('M622', GcodeMachine._begin_condition),
         ('%', GcodeMachine._percent),
         ('O', GcodeMachine._number),
@@ -415,3 +484,8 @@ _DO: Mapping[str, _Action] = {
     'G64 P': GcodeMachine._set_path_control,
     'G64 Q': GcodeMachine._set_path_control,
 }
+
+
+def _is_name(code: str) -> bool:
+    """Return whether a code is a name, such as PARK or _HOME, and no letter with a number."""
+    return len(code) > 1 and code[:2].replace('_', 'A').isalpha()

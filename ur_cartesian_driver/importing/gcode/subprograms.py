@@ -81,7 +81,7 @@ class LineSequence:
         if number is None or set(words) - {'P', 'L'}:
             raise BrokenFile(line, 'M98 needs the number of a subprogram in P, and takes L beside')
         if number < 1.0 or number % 1.0 or repeats % 1.0 or not 0.0 <= repeats <= 9999.0:
-            raise BrokenFile(line, f'M98 P{number:g} L{repeats:g} has no number that is meant')
+            raise BrokenFile(line, 'M98 needs a whole P of at least 1, and L from 0 to 9999')
         first = self._first_line(line, int(number))
         if first is None and 'L' not in words and number >= _PACKED:
             repeats, number = divmod(number, _PACKED)

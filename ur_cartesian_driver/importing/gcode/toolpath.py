@@ -151,9 +151,15 @@ class Toolpath:
                 )
             centre = self._centre(line, plane, start, words)
             arc = arc_between(plane, start, end, centre, direction, int(turns))
-            lines = arc.lines(self._options.tolerance) if arc.rises else []
+            # The scale is applied later, and the tolerance is meant for the scaled path.
+            tolerance = self._options.tolerance / abs(self._options.scale)
+            lines = arc.lines(tolerance) if arc.rises else []
         except ValueError as error:
             raise BrokenFile(line, str(error)) from None
+        if 'P' in words:
+            self._into.remarks.add(
+                line, 'P of an arc', 'turns in all, as in LinuxCNC; Marlin adds them to the arc'
+            )
         if lines:
             self._into.remarks.add(
                 line, f'{self.motion} with a rise', f'a helix, made of {len(lines)} lines'

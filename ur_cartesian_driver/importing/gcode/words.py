@@ -156,7 +156,7 @@ def _odd_block(number: int, line: str, text: str) -> Block:
     if '(' in rest or ')' in rest:
         raise BrokenFile(number, f'{_shown(line)} has a parenthesis without the other one')
     if rest[0].isdigit():
-        raise BrokenFile(number, f'{_shown(line)} has more digits than a number that is meant')
+        raise BrokenFile(number, f'{_shown(line)} has a number of more than 15 digits')
     if re.match(r'[A-Z]([^A-Z_]|$)', rest) or (not named and 'A' <= rest[0] <= 'Z'):
         raise BrokenFile(number, f'{rest[0]} has no number')
     raise BrokenFile(number, f'{_shown(line)} is no G-code')

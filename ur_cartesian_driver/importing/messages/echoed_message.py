@@ -173,7 +173,7 @@ def _value(event: Any, events: Iterator[Any], first: int, depth: int) -> Any:
             break
         name = getattr(key, 'value', '')
         if not name or name in part.fields:
-            what = f'the field {quoted(name)} stands twice' if name else 'a field has no name'
+            what = f'the field {quoted(name)} occurs twice' if name else 'a field has no name'
             raise BrokenFile(first + key.start_mark.line, what)
         part.fields[name] = _value(next(events), events, first, depth + 1)
     return part

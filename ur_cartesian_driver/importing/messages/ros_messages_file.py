@@ -18,7 +18,12 @@ import numpy as np
 
 from ur_cartesian_driver.importing.import_format import ImportFormat, Treatment
 from ur_cartesian_driver.importing.import_options import ImportOptions
-from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes, PathCollector
+from ur_cartesian_driver.importing.imported_path import (
+    BrokenFile,
+    ImportNotes,
+    JOINTS_HAVE_NO_FRAME,
+    PathCollector,
+)
 from ur_cartesian_driver.importing.messages.echoed_message import (
     echoed_messages,
     EchoedMessage,
@@ -36,7 +41,6 @@ from ur_cartesian_driver.importing.messages.message_terms import (
 )
 from ur_cartesian_driver.importing.text_file import file_text, quoted
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.geometry.pose import IDENTITY
 from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows
 from ur_cartesian_driver.motion.goal.goal import Posture, SegmentType
 
@@ -319,8 +323,8 @@ def _collect_joints(message: Any, options: ImportOptions, into: PathCollector) -
         does not suit its field.
     """
     line = getattr(message, 'line', 0)
-    if options.frame not in ('', 'base') or options.origin != IDENTITY or options.scale != 1.0:
-        raise BrokenFile(line, 'joint positions have no frame; give no frame, origin or scale')
+    if options.moves_path:
+        raise BrokenFile(line, JOINTS_HAVE_NO_FRAME)
     _say_others(message, ('joint_names', 'points'), into.remarks)
     names = [str(name) for name in _sequence(message.joint_names, 'joint_names', line)]
     order = _joint_order(names, getattr(message.joint_names, 'line', line), into.remarks)

@@ -28,6 +28,8 @@ class ArmPlace:
         """Begin at an unknown position."""
         self._motion, self._arm = controller.motion, options.arm
         self._model = options.arm.model.name
+        #: Whether options move the path, which joint positions cannot follow.
+        self.moves_path = options.moves_path
         self._motion.T_flange_tcp = options.T_flange_tcp
         #: Whether the file determines the pose; whether it also determines the joint positions.
         self.is_known = self.knows_joints = False

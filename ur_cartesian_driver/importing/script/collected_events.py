@@ -7,7 +7,11 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import dataclass, replace
 
-from ur_cartesian_driver.importing.imported_path import PathCollector
+from ur_cartesian_driver.importing.imported_path import (
+    BrokenFile,
+    JOINTS_HAVE_NO_FRAME,
+    PathCollector,
+)
 from ur_cartesian_driver.importing.script.arm_place import ArmPlace
 from ur_cartesian_driver.importing.script.running_script import MAIN, RunningScript
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
@@ -176,7 +180,11 @@ class CollectedEvents:
         self._events.append(replace(output, offset=offset))
 
     def hand_over(self, into: PathCollector) -> None:
-        """Add all events to a path; joint positions become poses of the other points' TCP."""
+        """
+        Add all events to a path; joint positions become poses of the other points' TCP.
+
+        :raises BrokenFile: options move the path, and a point has joint positions of the file.
+        """
         tcp = self.place.tcp if self._tcp is None else self._tcp
         if (found := self.place.set_tcps.get(tcp)) is not None:
             line, pose = found
@@ -195,6 +203,8 @@ class CollectedEvents:
         if point.joints is not None:
             pose = self.place.forward(point.joints, tcp)
             if point.joints not in self.place.solutions:
+                if self.place.moves_path:
+                    raise BrokenFile(point.line, JOINTS_HAVE_NO_FRAME)
                 into.remarks.add(point.line, 'joint positions', self.place.of_arm(tcp))
         assert pose is not None
         into.add(

@@ -32,6 +32,7 @@ from ur_cartesian_driver.urscript.parsing.syntax_tree import (
     Expression,
     FunctionDefinition,
     HaltStatement,
+    IfStatement,
     LabelStatement,
     PauseStatement,
     ReturnStatement,
@@ -161,12 +162,11 @@ def _without_waiting(node: SyntaxNode) -> Any:
 
 def _is_endless(loop: WhileStatement) -> bool:
     """Return whether a loop's condition is always true, and no statement ends a round early."""
-    condition = loop.condition
-    return (
-        isinstance(condition, ConstantExpression)
-        and truth(condition.value)
-        and not any(_may_end(statement) for statement in loop.body)
-    )
+    return _is_true(loop.condition) and not any(_may_end(statement) for statement in loop.body)
+
+
+def _is_true(condition: Expression) -> bool:
+    return isinstance(condition, ConstantExpression) and truth(condition.value)
 
 
 def _may_end(node: SyntaxNode, in_loop: bool = False) -> bool:
@@ -183,12 +183,14 @@ def _may_end(node: SyntaxNode, in_loop: bool = False) -> bool:
 
 def _input_wait(loop: WhileStatement) -> CallStatement | None:
     """Return the call that replaces a loop if the loop only waits for a digital input."""
-    for statement in loop.body:
-        call = statement.call if isinstance(statement, CallStatement) else None
-        waits = isinstance(call, CallExpression) and call.function in ('sync', 'sleep')
-        if not waits and not isinstance(statement, LabelStatement):
-            return None
-    read, level = _input_level(loop.condition)
+    rest = tuple(statement for statement in loop.body if not _only_waits(statement))
+    if not rest:
+        read, level = _input_level(loop.condition)
+    elif len(rest) == 1 and (leaves := _break_condition(rest[0])) and _is_true(loop.condition):
+        read, level = _input_level(leaves)
+        level = not level
+    else:
+        return None
     if read is None or read.function not in _INPUTS or len(read.arguments) != 1:
         return None
     name, awaited = (
@@ -196,6 +198,23 @@ def _input_wait(loop: WhileStatement) -> CallStatement | None:
         for value in (read.function, not level)
     )
     return _call(loop, WAIT, name, read.arguments[0].value, awaited)
+
+
+def _only_waits(statement: Statement) -> bool:
+    """Return whether a statement only takes time, or none."""
+    call = statement.call if isinstance(statement, CallStatement) else None
+    waits = isinstance(call, CallExpression) and call.function in ('sync', 'sleep')
+    return waits or isinstance(statement, LabelStatement)
+
+
+def _break_condition(statement: Statement) -> Expression | None:
+    """Return the condition of an `if` that only leaves the loop; None = it is no such `if`."""
+    if not isinstance(statement, IfStatement) or len(statement.branches) > 1:
+        return None
+    (branch,) = statement.branches
+    body = [each for each in branch.body if not isinstance(each, LabelStatement)]
+    only_leaves = len(body) == 1 and isinstance(body[0], BreakStatement)
+    return branch.condition if only_leaves and not statement.otherwise else None
 
 
 def _input_level(condition: Expression) -> tuple[CallExpression | None, bool]:

@@ -43,9 +43,13 @@ def cell_values(
     """
     values, faults = {}, []
     for column, cells in _with_points(texts, lines).items():
-        read = _times if column.role == 't' else _numbers
         try:
-            values[column.role] = column.factor * read(column, cells, lines, remarks)
+            read = (
+                _times(column, cells, lines, remarks)
+                if column.role == 't'
+                else _numbers(column, cells, lines)
+            )
+            values[column.role] = column.factor * read
         except BrokenFile as fault:
             faults.append(fault)
     if faults:
@@ -55,7 +59,7 @@ def cell_values(
     return values
 
 
-def _numbers(column: Column, cells: Sequence[str], lines: Sequence[int], _: ImportNotes) -> Floats:
+def _numbers(column: Column, cells: Sequence[str], lines: Sequence[int]) -> Floats:
     """
     Return the numbers of a column.
 
@@ -85,14 +89,33 @@ def _times(
     :raises BrokenFile: a cell is neither.
     """
     if _MOMENT.search(cells[0]):
-        return np.array([_seconds(cell, line) for line, cell in zip(lines, cells, strict=True)])
-    times = _numbers(column, cells, lines, remarks)
+        return _moments(cells, lines)
+    times = _numbers(column, cells, lines)
     if not column.has_unit:
         for bound, factor, unit in _UNIX_UNITS:
-            if abs(times[0]) > bound:
+            if np.abs(times).max() > bound:
                 remarks.add(0, f'the times of {column.title!r}', f'read as {unit} since 1970')
                 return times * factor
     return times
+
+
+def _moments(cells: Sequence[str], lines: Sequence[int]) -> Floats:
+    """
+    Return the seconds of dates with times, or of times of day.
+
+    :raises BrokenFile: a cell is neither, or not in the notation of the first one.
+    """
+    seconds = [_seconds(cell, line) for line, cell in zip(lines, cells, strict=True)]
+    for line, cell in zip(lines, cells, strict=True):
+        if _MOMENT.search(cell) is None or _has_date(cell) != _has_date(cells[0]):
+            raise BrokenFile(
+                line, f'{quoted(cell.strip())} is no time such as {cells[0].strip()} before it'
+            )
+    return np.array(seconds)
+
+
+def _has_date(cell: str) -> bool:
+    return len(cell.strip().partition(':')[0]) > 2
 
 
 def _seconds(cell: str, line: int) -> float:

@@ -14,8 +14,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 import re
 
-from ur_cartesian_driver.importing.import_format import honoured, left_out, refused, term_table
-from ur_cartesian_driver.importing.tables.column_units import is_unit, Quantity
+from ur_cartesian_driver.importing.import_format import (
+    honoured,
+    left_out,
+    refused,
+    term_table,
+    Treatment,
+)
+from ur_cartesian_driver.importing.tables.column_units import is_unit, plain_unit, Quantity, UNITS
 
 POSITION = 'position'
 POSE = 'pose of a robot, in m and rad'
@@ -101,11 +107,12 @@ TERMS = term_table(
         QUATERNION,
         *('q{xyzw}', 'quat_{xyzw}', 'quaternion_{xyzw}', 'orientation_{xyzw}', 'ori_{xyzw}'),
         *('o{xyzw}', 'rot_{xyzw}', 'rotation_{xyzw}', 'tcp_q{xyzw}', 'ee_quat_{xyzw}'),
-        'q_RS_{xyzw}',
+        *('q_RS_{xyzw}', 'pose_q{xyzw}'),
     ),
     honoured(
         ROTATION_VECTOR,
         *('r{xyz}', 'rotvec_{xyz}', 'rvec_{xyz}', 'rv_{xyz}', 'tcp_r{xyz}', 'tcp_pose_r{xyz}'),
+        'pose_r{xyz}',
     ),
     honoured(ANGLES, 'roll, pitch, yaw'),
     refused(
@@ -140,8 +147,12 @@ OTHERS_REASON = _WORDS
 
 #: Words in a name that suggest an orientation.
 _ORIENTATION_WORDS = frozenset(
-    'quat quaternion orientation orient rot rotation euler rpy roll pitch yaw heading'.split()
+    'quat quaternion orientation orient ori orn rot rotation euler rpy roll pitch yaw heading '
+    'angle axis aa'.split()
 )
+#: Matches the end of a name such as tool_rx, which suggests an orientation.
+_TURN_END = re.compile(r'[\s_./-][rq][wxyz]', re.IGNORECASE)
+_JOINT = re.compile(r'joint|\bj\d', re.IGNORECASE)
 _BRACKETS = re.compile(r'(.*?)\s*[\[({<]([^\[\](){}<>]*)[\])}>]')
 _UNIT_BEHIND = re.compile(r'[\s_/,:]+(?:in\s+)?')
 
@@ -163,11 +174,15 @@ def _columns(term: str) -> Iterator[str]:
 #: The significant characters of the columns of each term.
 COLUMNS: Mapping[str, tuple[str, ...]] = {name: tuple(_columns(name)) for name in TERMS}
 _KNOWN = frozenset(column for columns in COLUMNS.values() for column in columns)
+_TURNS = frozenset(
+    role for topic in (QUATERNION, ROTATION_VECTOR, ANGLES, NORMAL) for role in ROLES[topic]
+)
 _ORIENTATIONS = frozenset(
     column
     for name, term in TERMS.items()
-    if term.topic in (QUATERNION, ROTATION_VECTOR, ANGLES, NORMAL)
-    for column in COLUMNS[name]
+    if term.treatment is Treatment.HONOURED
+    for column, role in zip(COLUMNS[name], ROLES[term.topic], strict=True)
+    if role in _TURNS
 )
 
 
@@ -195,15 +210,35 @@ def read_title(text: str) -> Title:
     return Title('', '', text)
 
 
+def _split(text: str) -> tuple[str, str]:
+    """Return the name and the unit, which can be empty, in a title."""
+    if (match := _BRACKETS.fullmatch(text)) is not None:
+        return match[1], match[2].strip()
+    for gap in reversed(list(_UNIT_BEHIND.finditer(text))):
+        if is_unit(text[gap.end() :]):
+            return text[: gap.start()], text[gap.end() :]
+    return text, ''
+
+
 def _known(name: str) -> str:
     """Return the significant characters of a name or its path's end; empty = both are unknown."""
     ends = (name, '.'.join(re.split(r'[./]', name)[-2:]))
     return next((found for end in ends if (found := letters(end)) in _KNOWN), '')
 
 
+def body_of(title: Title) -> str:
+    """Return the beginning of a path of names, such as ``/ee`` of ``/ee/pose/position/x``."""
+    names = re.split(r'[./]', _split(title.text)[0].strip('/'))
+    if title.name == letters('.'.join(names)):
+        return ''
+    return '/'.join(name for name in names[:-2] if name != 'pose')
+
+
 def is_orientation(title: Title) -> bool:
-    """Return whether a title's name or words mean an orientation or a normal."""
-    words = re.findall(r'[A-Z]?[a-z]+|[A-Z]+(?![a-z])', title.text)
-    return title.name in _ORIENTATIONS or not _ORIENTATION_WORDS.isdisjoint(
-        word.lower() for word in words
-    )
+    """Return whether a title's name, words or unit mean an orientation or a normal."""
+    if title.name in _ORIENTATIONS:
+        return True
+    name, unit = _split(title.text)
+    words = {word.lower() for word in re.findall(r'[A-Z]?[a-z]+|[A-Z]+(?![a-z])', name)}
+    is_angle = plain_unit(unit) in UNITS[Quantity.ANGLE] and _JOINT.search(name) is None
+    return is_angle or not _ORIENTATION_WORDS.isdisjoint(words) or bool(_TURN_END.match(name[-3:]))

@@ -12,6 +12,7 @@ from ur_cartesian_driver.importing.import_format import Treatment
 from ur_cartesian_driver.importing.import_options import ImportOptions, ToolOrientation
 from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes
 from ur_cartesian_driver.importing.tables.column_names import (
+    body_of,
     COLUMNS,
     FIXED_UNITS,
     is_orientation,
@@ -91,7 +92,7 @@ def find_columns(
         for column in columns:
             if names.count(column) > 1:
                 same = [title for title in titles if title.name == column]
-                raise BrokenFile(line, f'{_listed(same)} are the same')
+                raise BrokenFile(line, f'{_listed(same)} have the same name; rename one')
         group = [titles[names.index(column)] for column in columns]
         reasons |= {kind: f'the {kind} comes from {_names(group)}' for kind in kinds}
         topic = TERMS[term].topic
@@ -102,6 +103,8 @@ def find_columns(
             taken.append(_column(title.text, index, role, unit or fixed, line, options))
     if _POSITION not in reasons:
         _refuse_header(titles, line)
+    _check_w(titles, is_oriented=_ORIENTATION in reasons or _NORMAL in reasons, line=line)
+    _check_bodies([titles[column.index] for column in taken if _is_of_pose(column)], line)
     if unitless := [titles[c.index] for c in taken if _is_turn(c) and not c.has_unit]:
         remarks.add(line, _listed(unitless), 'no unit: read as a rotation vector [rad]')
     indices = {column.index for column in taken}
@@ -120,6 +123,39 @@ _KINDS = {
     for name, term in TERMS.items()
     if term.treatment is Treatment.HONOURED
 }
+
+
+def _check_w(titles: Sequence[Title], *, is_oriented: bool, line: int) -> None:
+    """Refuse columns x, y, z and w that are, or can be, a quaternion."""
+    names = {title.name for title in titles}
+    # With p and r, w is an angle.
+    if not names.issuperset('xyzw') or names.issuperset('pr'):
+        return
+    positions = [
+        term for term, kinds in _KINDS.items() if _POSITION in kinds and names >= {*COLUMNS[term]}
+    ]
+    if len(positions) > 1 or not is_oriented:
+        found = [title for title in titles if title.name in [*'xyzw']]
+        raise BrokenFile(
+            line,
+            f'{_listed(found)} can be a quaternion; name them qx, qy, qz, qw if they are one, '
+            'else rename w',
+        )
+
+
+def _check_bodies(titles: Sequence[Title], line: int) -> None:
+    """Refuse a pose whose position and orientation are of two bodies."""
+    bodies = {body: title for title in titles if (body := body_of(title))}
+    if len(bodies) > 1:
+        raise BrokenFile(
+            line,
+            f'{_listed([*bodies.values()])} are of different bodies; take the columns of one of '
+            'them out, or give the option orientation',
+        )
+
+
+def _is_of_pose(column: Column) -> bool:
+    return QUANTITIES[column.role] in (Quantity.LENGTH, Quantity.ANGLE, Quantity.PURE)
 
 
 def _is_turn(column: Column) -> bool:
