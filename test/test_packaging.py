@@ -209,8 +209,9 @@ def driver_launch(monkeypatch):
         def perform(self, given):
             return given.get(self._name, '')
 
-    monkeypatch.setattr('launch.substitutions.LaunchConfiguration', LaunchConfiguration)
-    monkeypatch.setattr('launch_ros.actions.Node', lambda **fields: fields)
+    substitutions, actions = sys.modules['launch.substitutions'], sys.modules['launch_ros.actions']
+    monkeypatch.setattr(substitutions, 'LaunchConfiguration', LaunchConfiguration)
+    monkeypatch.setattr(actions, 'Node', lambda **fields: fields)
     return runpy.run_path(str(share_path() / 'launch' / 'driver.launch.py'))
 
 

@@ -137,7 +137,7 @@ def test_a_cancel_and_a_protective_stop_at_the_same_time_end_in_the_stop(moment)
 #: Longest time from a push to standstill: the bound of the age, and braking [s].
 REACTION = 0.3
 #: Data rate of the robot's states [bytes/s].
-NEEDED = 692 / CYCLE
+NEEDED = 732 / CYCLE
 
 
 @pytest.mark.parametrize('share', [0.9, 0.5, 0.1])

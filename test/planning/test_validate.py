@@ -570,6 +570,11 @@ REFUSALS = [
         'segments[1].dwell is 1 s, but points[2] follows 1 s after trajectory.points[1]; the arm',
     ),
     (
+        with_segment(TIMED, 1, dwell=0.9995),
+        InvalidGoal,
+        'segments[1].dwell is 0.9995 s, but points[2] follows 1 s after trajectory.points[1]; the',
+    ),
+    (
         with_segment(with_point(TIMED, 0, time=0.0), 0, dwell=0.5),
         InvalidGoal,
         'segments[0].dwell needs a motion to points[0], but the robot is there at time 0; give',

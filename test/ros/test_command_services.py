@@ -255,7 +255,7 @@ def test_a_goal_that_waits_for_its_time_keeps_its_tcp(single_cell):
     handle = cell.send(goal)
     answer = call('set_tcp', SetTCP.Request(tcp=Pose(orientation=UNIT)))
     assert not answer.success
-    assert 'A goal that is being planned' in answer.message
+    assert 'is using the present value' in answer.message
     cell.await_(handle.cancel_goal_async())
     cell.result(handle)
     assert call('set_tcp', SetTCP.Request(tcp=Pose(orientation=UNIT))).success

@@ -57,7 +57,9 @@ def test_contact_stops_the_goal_that_moves_the_arm(single_cell, client):
     status, result = cell.run(cell.goal((4.0, 0.0, 0.1, 0.0)))
     assert status == GoalStatus.STATUS_ABORTED
     assert result.error_code == ErrorCode.EXECUTION_FAILED
-    assert result.error_string.startswith('The tool touched, and the watch for contact ')
+    assert result.error_string.startswith(
+        'The tool touched something while detect_tool_contact watched'
+    )
     status, success, message = end(cell, watching)
     assert (status, success) == (GoalStatus.STATUS_SUCCEEDED, True)
     assert message.startswith('The tool touched at x ')

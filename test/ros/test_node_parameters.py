@@ -106,6 +106,7 @@ def test_every_option_is_a_parameter_but_for_what_is_found_out():
         'dialect',
         'prelude',
         'leads',
+        'read_files',
         'robot',
         'twin',
     }

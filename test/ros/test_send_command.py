@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """``ur-cartesian send`` as a process: whatever ends it, no arm moves on alone."""
 
+import os
 from pathlib import Path
 import signal
 import subprocess
@@ -86,6 +87,19 @@ def test_a_signal_ends_the_sender_after_its_goal(senders, number):
     assert process.returncode == 128 + number, output + errors
     assert output.splitlines()[-1].startswith('CANCELED, CANCELLED (-16): ')
     assert not errors
+
+
+def test_a_goal_in_a_pipe_is_read_once_and_not_noted(senders, tmp_path):
+    goal, pipe = tmp_path / 'goal.yaml', tmp_path / 'pipe'
+    os.mkfifo(pipe)
+    whole = senders.start('--validate-only', until_moving=False)
+    whole.communicate(timeout=60.0)
+    process = senders.command(pipe, '--validate-only')
+    with open(pipe, 'w', encoding='utf-8') as end:
+        end.write(goal.read_text())
+    output, errors = process.communicate(timeout=60.0)
+    assert process.returncode == whole.returncode == 0, output + errors
+    assert list(tmp_path.glob('*.stopped')) == []
 
 
 def test_a_goal_that_was_stopped_is_resumed(senders, tmp_path):

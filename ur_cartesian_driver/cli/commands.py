@@ -50,8 +50,9 @@ def send(arguments: argparse.Namespace) -> int:
     """Send a goal, show its progress, and wait for its result."""
     from ur_cartesian_driver.ros import client
 
-    # Before the motion: the file may be edited or removed while the arm moves.
-    sent_file = '' if arguments.file == '-' else digest(goal_file(arguments.file))
+    # Before the motion: the file may be edited while the arm moves. A pipe can be read only once.
+    is_noted = arguments.file != '-' and goal_file(arguments.file).is_file()
+    sent_file = digest(goal_file(arguments.file)) if is_noted else ''
     goal = whole = read_goal(arguments)
     validate_only = goal.validate_only or arguments.validate_only
     left = None

@@ -47,7 +47,7 @@ TERMS = term_table(
         *('target_q', 'actual_qd', 'target_qd'),
     ),
     honoured('outputs', 'digital_output'),
-    left_out('outputs', 'they are not switched', 'analog_output'),
+    left_out('outputs', 'they are not switched', 'analog_output', 'pulse_counts'),
     left_out(
         'state of the robot',
         'a goal has no such quantity',

@@ -132,7 +132,7 @@ def test_a_watch_stops_a_trajectory_and_succeeds(ur, controller):
     status, result = ur.result(moving)
     assert status == GoalStatus.STATUS_ABORTED
     assert result.error_code == result.PATH_TOLERANCE_VIOLATED
-    assert 'the watch for contact (detect_tool_contact)' in result.error_string
+    assert 'while detect_tool_contact watched' in result.error_string
     # The watch is over, as that of the UR driver is.
     status, result = ur.result(ur.send(client, swing(ur, client, (3, 0.1))))
     assert (status, result.error_code) == (GoalStatus.STATUS_SUCCEEDED, 0), result.error_string

@@ -9,10 +9,12 @@ from collections.abc import Iterator, Sequence
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.goal.goal import MAX_STOP_TIME, Segment
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where, SegmentRows
+from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 from ur_cartesian_driver.motion.plan.primitive import Wait
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import is_timed, point_field, segment_field
 from ur_cartesian_driver.planning.request.point_events.point_event import PlacedStop, PointEvent
+from ur_cartesian_driver.planning.request.spline_rules import MIN_SPLINE_TIME
 
 
 class Dwells(PointEvent[Segment]):
@@ -34,7 +36,8 @@ class Dwells(PointEvent[Segment]):
                 raise InvalidGoal(
                     field, f'is {dwell:g} s, more than {MAX_STOP_TIME:g} s', 'split the goal'
                 )
-            if is_timed(goal) and i + 1 < len(times) and times[i + 1] - times[i] <= dwell:
+            is_followed = is_timed(goal) and i + 1 < len(times)
+            if is_followed and times[i + 1] - times[i] - dwell < MIN_SPLINE_TIME - SAME_TIME:
                 raise InvalidGoal(
                     field,
                     f'is {dwell:g} s, but points[{i + 1}] follows {times[i + 1] - times[i]:g} s '
