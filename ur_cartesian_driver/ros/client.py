@@ -105,12 +105,6 @@ def apply_leads(
     return goal
 
 
-def _message(
-    path: Path | FollowCartesianTrajectory.Goal | None,
-) -> FollowCartesianTrajectory.Goal | None:
-    return path.to_message() if isinstance(path, Path) else path
-
-
 def _prefixed(tf_prefix: str, name: str) -> str:
     return tf_prefix + name if name else ''
 
@@ -344,8 +338,9 @@ class GoalClient:
         This can be called from anywhere while the goal runs, also in the callback of :meth:`send`.
         The call does not wait; requests are sent one after the other.
 
-        :param path: the points, with times from the start of the goal; from a message, only
-            points, segments and outputs are used. None = no points, allowed only with ``last``.
+        :param path: the points, with times from the start of the goal; of it, only points,
+            segments and outputs are used. Outputs count from the first point of a path, or, in a
+            message, of the goal. None = no points, allowed only with ``last``.
         :param last: whether these are the last points of the goal.
         :param replace_from_point: the first point that the new ones replace, together with all
             later points.
@@ -363,7 +358,7 @@ class GoalClient:
                 'append while send or execute waits for its end.'
             )
         return appender.append(
-            _message(path),
+            path,
             last=last,
             replace_from_point=replace_from_point,
             replace_from_time=replace_from_time,
@@ -392,7 +387,7 @@ class GoalClient:
         service = self._find_service(AppendPoints, 'append_points', timeout)
         try:
             appender = GoalAppender(service, UUID(), AT_END)
-            answer = appender.append(_message(path), **where)
+            answer = appender.append(path, **where)
             return self._spin_until(
                 answer, driver, 'whether the points were appended is not known'
             )
