@@ -17,27 +17,21 @@ import numpy as np
 import pytest
 from random_cases import cases, random_of
 from robot_in_memory import RobotInMemory
+from traced_run import ARM, HOME, OPTIONS, STEP, TracedRun, ZIGZAG
 
-from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal, IOCommand, OutputKind, Segment, Waypoint
 from ur_cartesian_driver.motion.goal.leads import Lead
-from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning import plan
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
-ARM, STEP = Arm(robot_model('ur5e')), 0.002
 #: The slider of the runs that tell the time of the path.
 SLOW = 0.2
 #: How late or early, or how far from there [m] an output may switch near a rest.
 REST_CYCLES, REST_BOUND = 10, 1e-4
-HOME = (0.3, -1.4, 1.5, -1.6, -1.5, 0.2)
-OPTIONS = PlanningOptions(max_tool_speed=1.0)
-#: A zigzag that does not come near itself [m].
-ZIGZAG = ((0.0, 0.03), (0.05, 0.05), (0.07, 0.0), (0.12, 0.02), (0.13, 0.07))
 
 
 def command(waypoint, pin, value=1.0, **place):
@@ -86,45 +80,8 @@ def spline(home, commands, period=0.5, **changes):
     )
 
 
-class Run:
-    """One run of a goal: the way of the tool, and the edges of the outputs, by cycle."""
-
-    def __init__(
-        self, robot, goal_of, slider=lambda cycle: 1.0, act=lambda controller, cycle: None
-    ):
-        state = robot.place(HOME, Pose((0.0, 0.02, 0.12)))
-        self.goal = goal_of(state.actual_tcp_pose)
-        self.plan = plan(self.goal, state, ARM, OPTIONS)
-        outputs = robot.controller.io.digital_out.standard
-        outputs[:] = [False] * 8
-        before, self.edges = list(outputs), []
-        positions = [robot.controller.motion.T_base_tcp.position]
-
-        def watch(controller):
-            positions.append(controller.motion.T_base_tcp.position)
-            for pin, (a, b) in enumerate(zip(before, outputs, strict=True)):
-                if a != b:
-                    self.edges.append((pin, b, len(positions) - 1))
-            before[:] = outputs
-            controller.set_slider(slider(len(positions)))
-            act(controller, len(positions))
-
-        robot.controller.set_slider(slider(0))
-        run = robot.run(list(self.plan.instructions), on_cycle=watch)
-        assert not run.failure, run.failure
-        self.positions = np.array(positions)
-        self.ways = np.append(
-            0.0, np.cumsum(np.linalg.norm(np.diff(self.positions, axis=0), axis=1))
-        )
-
-    def way_of(self, point):
-        """Return the way to where the tool is nearest to a point of the goal."""
-        target = np.array(self.goal.waypoints[point].pose.position)
-        a, step = self.positions[:-1], np.diff(self.positions, axis=0)
-        square = np.maximum((step**2).sum(axis=1), 1e-300)
-        u = np.clip(((target - a) * step).sum(axis=1) / square, 0.0, 1.0)
-        k = int(np.argmin(np.linalg.norm(a + u[:, None] * step - target, axis=1)))
-        return self.ways[k] + u[k] * np.sqrt(square[k])
+class Run(TracedRun):
+    """One run of a goal with commands."""
 
     def place(self, wanted):
         """Return the way to the place of a command."""

@@ -16,10 +16,9 @@ import pytest
 from random_cases import cases, random_of
 from robot_cell import run_cell
 from robot_in_memory import RobotInMemory
+from traced_run import ARM, HOME, OPTIONS, STEP, TracedRun, ZIGZAG
 
 from ur_cartesian_driver.driver.recordings.recording import Recording
-from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
@@ -36,11 +35,6 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
-ARM, STEP = Arm(robot_model('ur5e')), 0.002
-HOME = (0.3, -1.4, 1.5, -1.6, -1.5, 0.2)
-OPTIONS = PlanningOptions(max_tool_speed=1.0)
-#: A zigzag that does not come near itself [m].
-ZIGZAG = ((0.0, 0.03), (0.05, 0.05), (0.07, 0.0), (0.12, 0.02), (0.13, 0.07))
 TRAIN = PulseTrain(
     first_waypoint=0,
     last_waypoint=3,
@@ -90,46 +84,21 @@ def zigzag(home, trains, kind='stops', speed=0.1, points=ZIGZAG, **changes):
     )
 
 
-class Run:
-    """One run: the way of the tool, and the edges of the standard digital outputs, by cycle."""
+class Run(TracedRun):
+    """One run of a goal with pulses: cycles of the edges by pin, and the count that is told."""
 
     def __init__(self, robot, goal, slider=lambda cycle: 1.0, act=lambda controller, cycle: None):
-        state = robot.place(HOME, Pose((0.0, 0.02, 0.12)))
-        self.goal = goal(state.actual_tcp_pose) if callable(goal) else goal
-        self.plan = plan(self.goal, state, ARM, OPTIONS)
-        outputs = robot.controller.io.digital_out.standard
-        outputs[:] = [False] * 8
-        before = list(outputs)
-        self.rises, self.falls = ([[] for _ in range(8)] for _ in range(2))
         self.counts = []
-        positions = [robot.controller.motion.T_base_tcp.position]
 
-        def watch(controller):
-            positions.append(controller.motion.T_base_tcp.position)
-            for pin, (a, b) in enumerate(zip(before, outputs, strict=True)):
-                if a != b:
-                    (self.rises if b else self.falls)[pin].append(len(positions) - 1)
-            before[:] = outputs
+        def count_and_act(controller, cycle):
             self.counts.append(controller.io.outputs.integers[37])
-            controller.set_slider(slider(len(positions)))
-            act(controller, len(positions))
+            act(controller, cycle)
 
-        robot.controller.set_slider(slider(0))
-        run = robot.run(list(self.plan.instructions), on_cycle=watch)
-        assert not run.failure, run.failure
-        self.positions = np.array(positions)
-        self.ways = np.append(
-            0.0, np.cumsum(np.linalg.norm(np.diff(self.positions, axis=0), axis=1))
+        super().__init__(robot, goal, slider, count_and_act)
+        self.rises, self.falls = (
+            [[cycle for pin, up, cycle in self.edges if (pin, up) == (k, rises)] for k in range(8)]
+            for rises in (True, False)
         )
-
-    def way_of(self, point):
-        """Return the way to where the tool is nearest to a point of the goal."""
-        target = np.array(self.goal.waypoints[point].pose.position)
-        a, step = self.positions[:-1], np.diff(self.positions, axis=0)
-        square = np.maximum((step**2).sum(axis=1), 1e-300)
-        u = np.clip(((target - a) * step).sum(axis=1) / square, 0.0, 1.0)
-        k = int(np.argmin(np.linalg.norm(a + u[:, None] * step - target, axis=1)))
-        return self.ways[k] + u[k] * np.sqrt(square[k])
 
     def places(self, train):
         """Return the ways to the pulses of a train (count,)."""
