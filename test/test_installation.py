@@ -30,8 +30,8 @@ pytestmark = pytest.mark.installation
 
 NAME = 'ur_cartesian_driver'
 GENERATED = ('msg', 'srv', 'action')
-#: How long a node may need until its robot is ready [s].
-READY_TIMEOUT = 30.0
+#: How long a node may need until its robot is ready, on a computer that has much else to do [s].
+READY_TIMEOUT = 120.0
 
 CELL_TEST = """
 def test_the_arm_is_ready_for_a_goal(ur_sim, cartesian_driver):
@@ -168,11 +168,13 @@ def test_the_installed_node_carries_out_a_goal_in_each_execution_mode(
     ):
         try:
             for mode in ExecutionMode:
-                result = send_when_ready(client, goal_in(mode))
+                result = send_when_ready(node, client, goal_in(mode))
                 said = (mode, result.error_string, output.read_text())
                 assert result.error_code == ErrorCode.SUCCESSFUL, said
             node.send_signal(signal.SIGINT)
             assert node.wait(15.0) == 0
+        except TimeoutError:
+            raise AssertionError(f'the node said: {output.read_text()}') from None
         finally:
             node.kill()
     assert 'Traceback' not in output.read_text()
@@ -188,14 +190,14 @@ def goal_in(mode):
     return goal
 
 
-def send_when_ready(client, goal):
+def send_when_ready(node, client, goal):
     """Send a goal again and again until the driver has connected to its robot."""
     deadline = monotonic() + READY_TIMEOUT
     while True:
         try:
-            _, result = client.send(goal, lambda _: None, timeout=READY_TIMEOUT)
+            _, result = client.send(goal, lambda _: None, timeout=5.0)
         except TimeoutError:
-            if monotonic() > deadline:
+            if monotonic() > deadline or node.poll() is not None:
                 raise
             continue
         if result.error_code != ErrorCode.ROBOT_NOT_READY or monotonic() > deadline:
