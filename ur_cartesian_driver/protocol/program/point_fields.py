@@ -93,6 +93,7 @@ from ur_cartesian_driver.motion.plan.primitive import (
     ChangePayload,
     EndPress,
     Instruction,
+    LEAD_PIECES,
     LeadLaw,
     MoveC,
     MoveJ,
@@ -220,8 +221,8 @@ def _indexed(name: str, count: int = 6) -> tuple[str, ...]:
     return tuple(f'{name}[{i}]' for i in range(count))
 
 
-def _stop_names(*groups: Sequence[str], time: str = 'word 18') -> tuple[str, ...]:
-    """Return the names of a stop whose words from 0, 6 and 12 on are groups; the rest is 0."""
+def _group_names(*groups: Sequence[str], time: str = 'word 18') -> tuple[str, ...]:
+    """Return the names of a record whose words from 0, 6 and 12 on are groups; the rest is 0."""
     names = [f'word {i}' for i in range(18)]
     for first, group in zip((0, 6, 12), groups, strict=False):
         names[first : first + len(group)] = group
@@ -265,23 +266,33 @@ _OUTPUT_NAMES = (
 _NAMES: Mapping[float, Sequence[str]] = {
     MotionType.SPLINE: _SPLINE_NAMES,
     MotionType.SWITCH_OUTPUT: _OUTPUT_NAMES,
-    MotionType.WAIT: _stop_names(time='duration'),
-    MotionType.AWAIT_INPUT: _stop_names(
+    MotionType.WAIT: _group_names(time='duration'),
+    MotionType.AWAIT_INPUT: _group_names(
         (), (), ('input', 'pin', 'threshold', 'below', 'go_on'), time='timeout'
     ),
-    MotionType.CHANGE_PAYLOAD: _stop_names(
+    MotionType.CHANGE_PAYLOAD: _group_names(
         ('mass', *_indexed('center_of_gravity', 3)), _indexed('inertia'), time='transition_time'
     ),
-    MotionType.CALL_FUNCTION: _stop_names(_indexed('arguments'), (), ('number',)),
-    MotionType.PRESS_LAW: _stop_names(
+    MotionType.CALL_FUNCTION: _group_names(_indexed('arguments'), (), ('number',)),
+    MotionType.PRESS_LAW: _group_names(
         _indexed('wrench'),
         _indexed('limits'),
         ('damping', 'gain_scaling', 'zero_sensor', 'contact'),
     ),
-    MotionType.BEGIN_PRESS: _stop_names(
+    MotionType.BEGIN_PRESS: _group_names(
         _indexed('T_base_task'), _indexed('compliant'), ('follows_tool',)
     ),
-    MotionType.END_PRESS: _stop_names(),
+    MotionType.END_PRESS: _group_names(),
+}
+#: The same for a SWITCH_OUTPUT that is a law, by its word 12.
+_LAW_NAMES: Mapping[float, Sequence[str]] = {
+    FollowKind.LAW: _group_names(('gain', 'offset', 'minimum', 'maximum', 'filter_time')),
+    FollowKind.LEAD: _group_names(
+        _indexed('speeds', LEAD_PIECES + 1), (), ('kind', 'lead', 'word 14', 'distance')
+    ),
+    FollowKind.PULSE_LAW: _group_names(
+        ('distance [mm]', 'phase', 'width', 'count [millions]', 'slot', 'output', 'pin')
+    ),
 }
 
 #: Class -> its motion type for a target in joint positions, and its type for a target pose.
@@ -498,7 +509,7 @@ def check_fields(fields: PointFields) -> None:
     """
     duration, blend, kind = fields[18], fields[19], fields[20]
     if kind in _WITH_DELAY and not duration >= 0.0:
-        name = field_names(kind)[PointField.DURATION]
+        name = field_names(fields)[PointField.DURATION]
         raise LocalProtocolError(f'{name} is {duration!r} s, but must not be negative.')
     if kind == MotionType.SPLINE or kind in _WITH_DELAY:
         return
@@ -517,8 +528,11 @@ def check_fields(fields: PointFields) -> None:
         )
 
 
-def field_names(kind: float) -> Sequence[str]:
-    """Return the names of the 21 numbers of a motion type, for errors."""
+def field_names(fields: Sequence[float] | Floats) -> Sequence[str]:
+    """Return the names of the 21 numbers of a point, for errors."""
+    kind = float(fields[PointField.TYPE])
+    if kind == MotionType.SWITCH_OUTPUT:
+        return _LAW_NAMES.get(float(fields[PointField.OUTPUT_KIND]), _OUTPUT_NAMES)
     return _NAMES.get(kind, _MOVE_NAMES)
 
 
