@@ -17,6 +17,7 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
 from ur_cartesian_driver.planning.request.point_events.output_event import OutputEvent
 from ur_cartesian_driver.planning.request.point_events.timed_path import (
+    DrivenStretch,
     PassedPoint,
     PlacedOutput,
     TimedPath,
@@ -37,7 +38,7 @@ class Pulses(OutputEvent[PulseTrain]):
     field = 'pulses'
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Refuse entries on the same part, and what else drives their outputs there."""
+        """Refuse entries for one output on the same part, and presses there."""
         super().check(goal, options)
         if goal.pulses and goal.keep_open:
             raise NotAvailable(
@@ -109,12 +110,18 @@ class Pulses(OutputEvent[PulseTrain]):
             width=train.width,
             count=count,
         )
-        # Not 0: in a stop, the robot program switches waiting outputs of value 0.
+        # A stop carries out waiting records of value 0, and must not carry out this one.
         record = SwitchOutput(
             output=train.output, pin=train.pin, value=1.0, begins_pulses=True
         )  # fmt: skip
+        stretch = DrivenStretch(
+            end=end.time + max(train.width, path.control_cycle),
+            text=f'gives pulses from point {train.first_waypoint} to point {train.last_waypoint}',
+        )
         return [
             PlacedOutput(
+                field=field,
+                stretch=stretch,
                 time=begin.time if begin.trigger_time is None else begin.trigger_time,
                 after_index=begin.after,
                 report_index=begin.row,
@@ -128,7 +135,7 @@ class Pulses(OutputEvent[PulseTrain]):
 def _check_others(
     goal: GoalTable, field: str, train: PulseTrain, before: Sequence[PulseTrain]
 ) -> None:
-    """Refuse what else drives the output of an entry on its part of the path, and presses."""
+    """Refuse other pulses of the output on the part of the path of an entry, and presses."""
     first, last = train.first_waypoint, train.last_waypoint
     name = output_name(train.output, train.pin)
     for other in before:
@@ -141,14 +148,6 @@ def _check_others(
                 f'{field}.pin',
                 f'is {train.pin}, but {name} already gives pulses on the same points',
                 'let one end where the other begins',
-            )
-    for k, command in enumerate(goal.io_commands):
-        is_same = (command.output, command.pin) == (train.output, train.pin)
-        if is_same and first <= command.waypoint <= last:
-            raise InvalidGoal(
-                f'io_commands[{k}].pin',
-                f'is {command.pin}, but {name} gives pulses from point {first} to point {last}',
-                'use another output',
             )
     for k, press in enumerate(goal.presses):
         if first < press.last_waypoint and press.first_waypoint < last:
