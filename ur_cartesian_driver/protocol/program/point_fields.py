@@ -43,8 +43,9 @@ and the time constant of the filter [s]. A record of the output kind 6 gives the
 output, likewise: words 0 - 11 are the planned speeds from its place back to its trigger pose, word
 13 is the lead [s], 15 the way between the two [m or rad], and 17 is 1 if the tool only turns.
 Likewise a record of the output kind 7 gives the law of the pulses that begin with the next record
-of kind 8: words 0 - 6 are the distance between pulses [mm], the way to the first one [m], their
-width [s], their number in millions, the slot of their count, and kind and pin of the output.
+of kind 8: words 0 - 7 are the distance between pulses [mm], the way to the first one [m], their
+width [s], their number in millions, the slot of their count, kind and pin of the output, and 1 if
+those that are left at the end of the trajectory are not given.
 
 The stops, which only our own program knows, are motions during which the arm stands still.
 WAIT waits: word 18 is the time from the end of the previous motion until the next one may begin.
@@ -291,7 +292,10 @@ _LAW_NAMES: Mapping[float, Sequence[str]] = {
         _indexed('speeds', LEAD_PIECES + 1), (), ('kind', 'lead', 'word 14', 'distance')
     ),
     FollowKind.PULSE_LAW: _group_names(
-        ('distance [mm]', 'phase', 'width', 'count [millions]', 'slot', 'output', 'pin')
+        (
+            *('distance [mm]', 'phase', 'width', 'count [millions]', 'slot', 'output', 'pin'),
+            'goes_on',
+        )
     ),
 }
 
@@ -468,7 +472,8 @@ def _lead_fields(law: LeadLaw) -> PointFields:
 def _pulse_fields(law: PulseLaw) -> PointFields:
     numbers = (1e3 * law.distance, law.phase, law.width, 1e-6 * law.count)
     output, switch = (law.slot, law.output, law.pin), (FollowKind.PULSE_LAW, 0, 1, 0, 1, 0)
-    return (*numbers, *output, *(0.0,) * 5, *switch, 0, 0, MotionType.SWITCH_OUTPUT)
+    rest = (law.goes_on, *(0.0,) * 4)
+    return (*numbers, *output, *rest, *switch, 0, 0, MotionType.SWITCH_OUTPUT)
 
 
 def _stop_fields(stop: Stop) -> PointFields:

@@ -79,9 +79,12 @@ class PathClock:
         values, length = (self._turns, turn) if turns else (self._arc_lengths, arc_length)
         times = time - span * np.arange(pieces + 1) / pieces
         speeds = np.array([self._speed(values, each) for each in times.tolist()])
-        # The robot program takes the acceleration between two speeds for constant.
-        found = float((speeds[1:] + speeds[:-1]).sum()) * span / (2.0 * pieces)
-        return length, speeds * (length / found if found > 0.0 else 0.0), turns
+        # The robot program takes the acceleration between two speeds for constant. The speed at
+        # the begin stays, because there the program measures how fast the time of the path runs.
+        mean, ends = length * pieces / span, 0.5 * float(speeds[0] + speeds[-1])
+        inner = float(speeds[1:-1].sum())
+        speeds[1:-1] *= max(mean - ends, 0.0) / inner if inner > 0.0 else 0.0
+        return length, speeds, turns
 
     def max_speed(self, begin: float, end: float) -> float:
         """Return the largest speed of the tool from one time to another [m/s]."""

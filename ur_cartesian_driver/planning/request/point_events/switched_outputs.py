@@ -45,7 +45,8 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
             )
         for field, waypoint in self.places(goal):
             check_point(field, waypoint, goal)
-        if goal.keep_open:
+        # The path to the last point of an open spline does not change any more.
+        if goal.keep_open and (goal.replace_horizon or not mode.traits.is_spline):
             for i, command in enumerate(goal.io_commands):
                 _check_open(f'{self.field}[{i}]', command)
 
@@ -145,7 +146,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
 
 
 def _check_open(where: str, command: IOCommand) -> None:
-    """Refuse places and leads in a goal to which points can be appended."""
+    """Refuse places and leads in a goal whose path changes when points are appended."""
     for field, value in (
         (f'{where}.distance', command.distance),
         (f'{where}.fraction', command.fraction),
@@ -155,8 +156,9 @@ def _check_open(where: str, command: IOCommand) -> None:
             raise NotAvailable(
                 field,
                 f'is {value:g}, but a goal with keep_open switches outputs at its points or '
-                'later: points that are yet to come change the path and its times',
-                'add a point there, or send all points at once',
+                'later, unless it is a SPLINE without replace_horizon: points that are yet to '
+                'come change the path and its times',
+                'add a point there, or set execution to SPLINE',
             )
 
 
