@@ -27,8 +27,10 @@ SLOW = 0.4
 REST_CYCLES, REST_BOUND = 10, 1e-4
 #: How far beside its place an output may always switch [m]: a cycle of a tool with 10 mm/s.
 RESOLUTION = 2e-5
-#: The same with a lead over a stop or a corner [m].
-STOP_BOUND = 1e-4
+#: The same with a lead over a stop or a corner, or while the slider moves [m].
+WIDE_BOUND = 1e-4
+#: Change of the slider in some cycles that does not count.
+SLIDER_RESTS = 0.005
 #: What rounding on the wire moves a place by [m].
 ROUNDING = 2e-6
 #: For so long after it goes on [cycles] the program waits until the arm moves.
@@ -107,7 +109,8 @@ def judge_commands(run, path_time, bound, pauses=()):
 
     Near a rest the speed tells little of the slider, and the tool makes little way: there the
     bound is wider. So it is with a lead over a stop or a corner, which may be shorter than the
-    pieces in which the lead comes to the robot. What is due in a pause, in which the tool coasts on, comes when it has ended.
+    pieces in which the lead comes to the robot, and while the slider moves. What is due in a
+    pause, in which the tool coasts on, comes when it has ended.
 
     :param pauses: cycles in which the program is paused, and goes on.
     """
@@ -120,8 +123,11 @@ def judge_commands(run, path_time, bound, pauses=()):
     for wanted in run.goal.io_commands:
         place, edge = run.place(wanted), at[wanted.pin]
         left = path_time(place) - times
-        # What the program decides is carried out a cycle later: in the meantime the slider moves.
-        dues = [_due(left, rate, np.roll(rate, s), max(-wanted.offset, 0.0)) for s in (0, 1, 2)]
+        # What the program decides is carried out a cycle later. In the meantime the slider moves,
+        # or ceases to.
+        before = np.roll(rate, 2)
+        seen = rate, np.roll(rate, 1), before, 3.0 * before - 2.0 * np.roll(rate, 3)
+        dues = [_due(left, rate, each, max(-wanted.offset, 0.0)) for each in seen]
         due = min(dues, key=lambda each: abs(edge - each))
         late = edge - due
         paused = [end for begin, end in pauses if begin - 1 <= due <= end + GOING_ON]
@@ -138,9 +144,12 @@ def judge_commands(run, path_time, bound, pauses=()):
             verdict.late.append(late)
             verdict.off.append(off)
         near = slow and (abs(late) < REST_CYCLES or abs(off) < REST_BOUND)
-        over_stop = wanted.offset < 0.0 and path_time.slows_between(run.ways[edge], place)
-        within = STOP_BOUND if over_stop else RESOLUTION
-        if abs(late) > bound + over_stop and not near and abs(off) > within:
+        is_wide = wanted.offset < 0.0 and (
+            path_time.slows_between(run.ways[edge], place)
+            or np.ptp(rate[max(edge - 6, 0) : edge + 1]) > SLIDER_RESTS
+        )
+        within = WIDE_BOUND if is_wide else RESOLUTION
+        if abs(late) > bound + 2.0 * is_wide and not near and abs(off) > within:
             verdict.misses[wanted.pin] = round(float(late), 2)
     return verdict
 

@@ -23,7 +23,8 @@ from ur_cartesian_driver.path import PathPlace, resume
 
 KINDS = ('stops', 'dwells', 'rounded', 'spline', 'appended', 'resumed')
 LAST = len(ZIGZAG) - 1
-#: How late or early an output may be [cycles].
+#: How late or early an output may be [cycles]; where points are appended, the speed at the begin
+#: of a lead is known less well: one more.
 BOUND = 1.0
 
 
@@ -174,6 +175,6 @@ def verdicts(case, robot):
     slow = JudgedRun(robot, case.goal, lambda cycle: SLOW, sizes=case.sizes)
     run = JudgedRun(robot, case.goal, case.slider, case.act, sizes=case.sizes)
     return (
-        judge_commands(run, PathTime(slow), BOUND, case.pauses),
+        judge_commands(run, PathTime(slow), BOUND + (case.kind == 'appended'), case.pauses),
         *(judge_pulses(run, train, BOUND, case.pauses) for train in run.goal.pulses),
     )
