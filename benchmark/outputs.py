@@ -7,9 +7,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 import sys
 from time import process_time
+from typing import Any
 
 from figures import Figure, percentile, processor_seconds
 import paths
@@ -39,20 +41,19 @@ def run(quick: bool) -> Iterator[Figure]:
 
 def _edges(goals: int) -> Iterator[Figure]:
     """Yield how late or early edges are, with the judge of the tests."""
-    from output_judge import RESOLUTION
-    from random_outputs import accepted, verdicts
-    from robot_in_memory import RobotInMemory
-
-    robot = RobotInMemory('ur5e')
+    # The modules of the tests have no types.
+    support: Any = import_module('random_outputs')
+    resolution: float = import_module('output_judge').RESOLUTION
+    robot: Any = import_module('robot_in_memory').RobotInMemory('ur5e')
     found: dict[str, list[float]] = {'outputs by place': [], 'pulses': []}
     for number in range(goals):
-        of_commands, *of_pulses = verdicts(accepted(number, robot)[0], robot)
+        of_commands, *of_pulses = support.verdicts(support.accepted(number, robot)[0], robot)
         for name, judged in (('outputs by place', [of_commands]), ('pulses', of_pulses)):
             found[name] += [
                 abs(late)
                 for each in judged
                 for late, off in zip(each.late, each.off, strict=True)
-                if abs(off) > RESOLUTION or abs(late) < 1.0
+                if abs(off) > resolution or abs(late) < 1.0
             ]
     for name, late in found.items():
         for percent in (50.0, 99.0, 100.0):
@@ -67,9 +68,8 @@ def _edges(goals: int) -> Iterator[Figure]:
 
 def _cycles() -> Iterator[Figure]:
     """Yield the time of a cycle in which pulses are given and leads run."""
-    from robot_in_memory import RobotInMemory
-
-    robot, times = RobotInMemory(paths.MODEL), []
+    robot: Any = import_module('robot_in_memory').RobotInMemory(paths.MODEL)
+    times = []
     for goal in _with_and_without(40, leads=8):
         state = robot.place(HOME, IDENTITY)
         records = list(plan(goal, state, _arm(), OPTIONS).instructions)

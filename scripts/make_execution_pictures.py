@@ -15,6 +15,7 @@ import asyncio
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib import import_module
 from math import nan
 from pathlib import Path
 import sys
@@ -341,21 +342,25 @@ def draw_beads() -> Path:
     """Draw where beads begin and end without and with the lead of a valve; return the picture."""
     from matplotlib import pyplot
     import numpy as np
-    from robot_in_memory import RobotInMemory
-    from simulated_valve import Bead, CLOSE, errors, OPEN, PIN
-    from simulated_valve import CYCLE as STEP
 
     from ur_cartesian_driver.motion.goal.goal import OutputKind
     from ur_cartesian_driver.motion.goal.leads import Lead
     from ur_cartesian_driver.planning import PlanningOptions
 
-    drawing, robot = CHECKOUT / 'doc' / 'valves_beads.svg', RobotInMemory('ur5e')
+    # The modules of the tests have no types.
+    beads: Any = import_module('simulated_valve')
+    robot: Any = import_module('robot_in_memory').RobotInMemory('ur5e')
+    drawing = CHECKOUT / 'doc' / 'valves_beads.svg'
     valve = Lead(
-        name='valve_1', output=OutputKind.STANDARD_DIGITAL, pin=PIN, open=OPEN, close=CLOSE
+        name='valve_1',
+        output=OutputKind.STANDARD_DIGITAL,
+        pin=beads.PIN,
+        open=beads.OPEN,
+        close=beads.CLOSE,
     )
     options = PlanningOptions(leads=(valve,))
     rows = [
-        (1e3 * speed, *(1e3 * errors(robot, Bead(speed, length), lead, options)))
+        (1e3 * speed, *(1e3 * beads.errors(robot, beads.Bead(speed, length), lead, options)))
         for lead in ('', 'valve_1')
         for speed in np.linspace(0.01, 0.25, 25)
         for length in (0.03, 0.0303, 0.0306, 0.0309)
@@ -370,7 +375,7 @@ def draw_beads() -> Path:
         axes.plot(table[:, 0], table[:, 2], '.', color='#c8372d', label='ends')
         axes.set(xlabel='speed [mm/s]', ylabel='behind its place [mm]', title=title)
         axes.grid(alpha=0.3)
-    half = 0.5 * STEP * np.array([0.0, 250.0])
+    half = 0.5 * beads.CYCLE * np.array([0.0, 250.0])
     for sign in (-1.0, 1.0):
         right.plot([0.0, 250.0], sign * half, color='#9aa5b1')
     right.text(30.0, 0.15, 'half a cycle', color='#6b7682')

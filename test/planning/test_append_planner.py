@@ -249,7 +249,7 @@ def test_places_and_leads_of_open_splines_are_where_they_are_in_the_whole_goal(s
     assert [type(one) for one in wire] == [type(one) for one in known]
     for one, other in zip(wire, known, strict=True):
         # Where a part begins, the speeds of a lead are known from one side only.
-        assert_same(one, other, 1e-4 if isinstance(one, LeadLaw) else 1e-6)
+        assert_same(one, other, 2e-4 if isinstance(one, LeadLaw) else 1e-6)
 
 
 @pytest.mark.parametrize(
@@ -297,7 +297,7 @@ def test_pulses_of_open_goals_are_one_record_whatever_is_appended(goal):
     wire, _, _ = in_parts(replace(goal, pulses=(PHOTOS,)), (3, 3, 3))
     assert [type(one) for one in wire] == [type(one) for one in known]
     for one, other in zip(wire, known, strict=True):
-        if isinstance(one, PulseLaw):
+        if isinstance(one, PulseLaw) and isinstance(other, PulseLaw):
             assert one == replace(other, count=1_000_000, goes_on=True)
         else:
             assert_same(one, other)

@@ -472,11 +472,14 @@ class _PartPlanner:
             # The stop leads to no point: outputs that are due during it come after the last point.
             segments.append(replace(stop, waypoint=stop.waypoint + 1))
         ends, rows = _end_times(segments, start_time), PlannedRows.of(segments)
-        path = TimedPath(rows, reference, None, start_time)
+        timed_path = TimedPath(rows, reference, None, start_time)
         pending, new = self._before.outputs, self._appended.io_commands
         due_commands = [
             *pending,
-            *((self._due_time(f'io_commands[{i}]', c, path, ends), c) for i, c in enumerate(new)),
+            *(
+                (self._due_time(f'io_commands[{i}]', c, timed_path, ends), c)
+                for i, c in enumerate(new)
+            ),
         ]
         commands = []
         for time, command in pending:

@@ -82,8 +82,8 @@ class PathClock:
         # The robot program takes the acceleration between two speeds for constant. Where it is
         # not, the speeds beside give the piece its length; but those at begin and end are exact:
         # at the begin the program measures how fast the time of the path runs.
-        ways = np.array([self._between(values, each) for each in times])
-        lacking = -np.diff(ways) * (pieces / span) - 0.5 * (speeds[1:] + speeds[:-1])
+        lengths = np.array([self._between(values, each) for each in times])
+        lacking = -np.diff(lengths) * (pieces / span) - 0.5 * (speeds[1:] + speeds[:-1])
         speeds[1:-1] += 0.5 * (lacking[1:] + lacking[:-1])
         speeds[[1, -2]] += 0.5 * lacking[[0, -1]]
         return length, np.maximum(speeds, 0.0), turns
