@@ -8,6 +8,7 @@ The judge (``test/support/output_judge.py``) knows nothing of the plan.
 
 from dataclasses import replace
 
+from append_goals import AppendMotion, circle
 import numpy as np
 from output_judge import judge_pulses, JudgedRun, SLIDERS
 import pytest
@@ -262,6 +263,33 @@ def test_each_pulse_is_reported_and_recorded_with_its_time_and_pose(tmp_path):
     assert np.array_equal(recording.actual_pose[rows, :3], poses)
     times = np.diff([pulse.timestamp for pulse in pulses])
     assert np.allclose(np.diff(recording.time[rows]), times)
+
+
+def test_pulses_go_on_along_appended_points():
+    async def scenario(cell):
+        home = cell.memory.read().actual_tcp_pose
+        goal = Goal(
+            waypoints=tuple(circle(home, 1, 10)),
+            keep_open=True,
+            execution=ExecutionMode.SPLINE,
+            pulses=(replace(CELL_TRAIN, last_waypoint=9),),
+        )
+        motion = AppendMotion(cell, goal)
+        *points, end = circle(home, 11, 10)
+        rest = replace(end, time=end.time + 0.1, twist=(0.0,) * 6)
+        await motion.append([*points, rest], last=True)
+        outcome = await motion.ended()
+        assert outcome.succeeded, outcome
+        return [pulse.pose.position for pulse in cell.owner.pulses], points
+
+    places, points = run_cell(scenario)
+    # The circle has a radius of 50 mm; a chord between two pulses is shorter by 1 um.
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    assert np.abs(steps - 0.004).max() < 2.6 * 0.08 * 0.008
+    assert steps.mean() == pytest.approx(0.004, abs=3e-5)
+    begin, end = (np.array(points[k].pose.position) for k in (0, -1))
+    for place in (begin, end):
+        assert np.linalg.norm(places - place, axis=1).min() < 0.004
 
 
 @pytest.mark.parametrize('end', ['cancel', 'stop', 'protective_stop'])
