@@ -31,8 +31,9 @@ RESOLUTION = 2e-5
 WIDE_BOUND = 1e-4
 #: Change of the slider in some cycles that does not count.
 SLIDER_RESTS = 0.005
-#: What rounding on the wire moves a place by [m].
-ROUNDING = 2e-6
+#: By how much the tool's way may be longer or shorter than the plan knows [m]: a pulse that is
+#: nearer to the last point may come or not.
+ROUNDING = 1e-5
 #: For so long after it goes on [cycles] the program waits until the arm moves.
 GOING_ON = 8
 
@@ -190,8 +191,8 @@ def judge_pulses(run, train, bound, pauses=()):
     rises, width = run.cycles(train.pin, rises=True), max(round(train.width / STEP), 1)
     following = places[-1] + train.distance
     if not train.count and following < run.way_of(train.last_waypoint) + ROUNDING:
-        if len(rises) > len(places) or following < run.way_of(train.last_waypoint) - ROUNDING:
-            places = np.append(places, following)  # just beside the last point, it may come
+        if len(rises) > len(places):
+            places = np.append(places, following)
     assert len(rises) == len(places), (len(rises), len(places))
     assert set(run.cycles(train.pin, rises=False) - rises) <= {width} or pauses
     ways, first = np.unique(counted, return_index=True)
