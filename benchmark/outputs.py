@@ -20,7 +20,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY
 from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind, PulseTrain
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.sim.simulator_config import HOME
