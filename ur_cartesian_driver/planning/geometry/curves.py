@@ -261,7 +261,7 @@ def goal_arcs(
     :param start: (n, 7) the pose in base at which each segment begins; ``end``: the target. Where
         arcs are FIXED, ends and the starts after them are turned as the arcs arrive, in place.
     """
-    rows = np.flatnonzero(segments.types == SegmentType.CIRCULAR)
+    rows = np.flatnonzero(segments.types == int(SegmentType.CIRCULAR))
     if not len(rows):
         return rows, NO_ARCS, {}
     vias = transform_rows(T_base_frame, segments.vias[rows])

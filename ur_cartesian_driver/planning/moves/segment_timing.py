@@ -102,7 +102,10 @@ class SegmentTimings:
         self._arc_time = distance / np.sqrt(options.max_linear_acceleration * radius)
         self._arc_leads = self._arc_time > np.maximum(blend_samples.joint_time, self._tool_time)
         n = len(geometries)
-        does_else = np.isin(geometries.begin + np.arange(n), list(stops))
+        does_else = np.zeros(n, dtype=np.bool_)
+        does_else[[point - geometries.begin for point in stops if point >= geometries.begin]] = (
+            True
+        )
         does_else[0] |= geometries.waits
         #: The requested speeds and times, with remarks on changes due to the limits.
         self.requests = requests = SpeedRequests(geometries, options, model, does_else, running)
@@ -136,8 +139,7 @@ class SegmentTimings:
         """Meet the times within the limits; a move that cannot meet its time takes longer."""
         for _ in range(_MAX_ROUNDS):
             wanted = self._wanted - self._ahead + np.append(0.0, self._ahead[:-1])
-            self.chain.meet(wanted, self._rate, self._max_rate, self._at_rate)
-            late = self.chain.times.durations - wanted
+            late = self.chain.meet(wanted, self._rate, self._max_rate, self._at_rate) - wanted
             late[~((late > wanted * (_NEARLY - 1.0)) & (self._rate >= self._max_rate))] = 0.0
             if not self._slow_down() and not self._go_ahead(late):
                 break
@@ -234,6 +236,8 @@ class SegmentTimings:
     def _slow_blends(self, rate: Floats, speed: Floats) -> None:
         """Lower, in place, the rates and speeds of moves whose blends exceed a limit."""
         samples, times = self._samples, self.chain.times
+        if not len(samples.index):
+            return
         after = samples.index - self._geometries.begin + 1
         begin, end = times.begin_rate[after], times.end_rate[after]
         # A measured law may make a blend slower, but never the arm faster than by the assumed law.

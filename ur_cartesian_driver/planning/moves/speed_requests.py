@@ -26,6 +26,9 @@ from ur_cartesian_driver.planning.moves.speed_limits import SpeedLimits
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     FOLLOWS_BLEND_LAWS,
+    IS_JOINT,
+    IS_LINEAR,
+    IS_PROCESS,
     point_field,
     type_table,
 )
@@ -117,7 +120,7 @@ class SpeedRequests:
         self._kinds, self._curves = geometries.kinds, geometries.path.curves
         self.length: Floats = limits.length
         #: Whether each segment is a line on which the turn leads.
-        self.turn_leads_line = limits.is_turn & (self._kinds == SegmentType.LINEAR)
+        self.turn_leads_line = limits.is_turn & IS_LINEAR[self._kinds]
         self.peak = np.where(self.turn_leads_line, _PEAK_OF_TURN, _PEAK)
         # The length that the robot uses, by the turn ratio, as a fraction of the leading length.
         ratio = options.laws.turn_ratio
@@ -189,7 +192,7 @@ class SpeedRequests:
             self.turn_leads_line, 1.0 / (1.0 + np.maximum(1.0, 2.0 * self._counted)), RAMP_SHARE
         )
         fillet, arc = path.fillet & after, path.blend_length
-        at_radius = after & (self._kinds == SegmentType.PROCESS)
+        at_radius = after & IS_PROCESS[self._kinds]
         # Lengths per unit of ``s``.
         leaving = np.maximum(2.0 * tail, 1e-12)
         joining = np.maximum(2.0 * head, 1e-12)
@@ -274,26 +277,25 @@ class SpeedRequests:
         choices = (
             (segments.velocities > 0.0, np.maximum(segments.velocities, _TINY)),
             (limits.is_optimized, options.optimized_velocity),
-            (kinds == SegmentType.JOINT, options.joint_velocity),
+            (IS_JOINT[kinds], options.joint_velocity),
             (speeds > 0.0, np.maximum(speeds, _TINY)),
             (~limits.translates, options.angular_velocity),
-            (limits.is_turn & (kinds != SegmentType.LINEAR), both),
+            (limits.is_turn & ~IS_LINEAR[kinds], both),
         )
-        conditions = [condition for condition, _ in choices]
-        self._source = np.select(conditions, range(len(choices)), len(choices))
-        return np.select(conditions, [speed for _, speed in choices], options.linear_velocity)
+        found = np.full(len(kinds), options.linear_velocity)
+        self._source[:] = len(choices)
+        for number, (condition, speed) in reversed([*enumerate(choices)]):
+            self._source[condition] = number
+            found = np.where(condition, speed, found)
+        return found
 
     def _default_accelerations(self) -> Floats:
         options = self._options
-        return np.select(
-            [self.limits.is_optimized, self._kinds == SegmentType.JOINT, self.limits.translates],
-            [
-                options.optimized_acceleration,
-                options.joint_acceleration,
-                options.linear_acceleration,
-            ],
-            options.angular_acceleration,
+        of_tool = np.where(
+            self.limits.translates, options.linear_acceleration, options.angular_acceleration
         )
+        moves = np.where(IS_JOINT[self._kinds], options.joint_acceleration, of_tool)
+        return np.where(self.limits.is_optimized, options.optimized_acceleration, moves)
 
     def _turning_lines(self, velocity: Floats, acceleration: Floats) -> None:
         """
@@ -355,7 +357,7 @@ class SpeedRequests:
         self.allowed_acceleration, most = most, np.minimum(most, _UNLIMITED)
         # Speeding up, cruising and braking take a third of the time each; a move that is blended
         # begins to brake for its point only in the blend.
-        brakes = path.has_blend_after & (self._kinds != SegmentType.PROCESS)
+        brakes = path.has_blend_after & ~IS_PROCESS[self._kinds]
         tail = np.where(brakes, self.length * (1.0 - path.u_leave), inf)
         needed = np.maximum(4.5 * length / self.time**2, (length / self.time) ** 2 / tail)
         by_speed = np.where(own > 0.0, own, np.maximum(self._default_accelerations(), needed))

@@ -16,7 +16,11 @@ from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 
 
 def type_table(types: Collection[SegmentType]) -> Flags:
-    """Return an array by segment type, True for ``types``; indexing it is faster than np.isin."""
+    """
+    Return an array by segment type, True for ``types``.
+
+    Indexing it is faster than np.isin, and than to compare an array with a member.
+    """
     return np.array([kind in types for kind in SegmentType])
 
 
@@ -32,6 +36,12 @@ IS_STRAIGHT = type_table(
         SegmentType.OPTIMIZED_LINEAR,
     )
 )
+IS_LINEAR, IS_JOINT, IS_ARC, IS_PROCESS = (
+    type_table((kind,))
+    for kind in (
+        SegmentType.LINEAR, SegmentType.JOINT, SegmentType.CIRCULAR, SegmentType.PROCESS
+    )
+)  # fmt: skip
 IS_JOINT_MOVE = type_table((SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT))
 IS_OPTIMIZED = type_table(_OPTIMIZED)
 TAKES_TOOL_SPEED = ~type_table((SegmentType.JOINT, *_OPTIMIZED))
