@@ -23,7 +23,7 @@ from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.goal.goal_table import Rows
 from ur_cartesian_driver.motion.goal.joint_goal import JointTolerances
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
-from ur_cartesian_driver.motion.plan.move_rows import classes
+from ur_cartesian_driver.motion.plan.move_rows import classes, SplineRows
 from ur_cartesian_driver.motion.plan.offset_band import OffsetBand
 from ur_cartesian_driver.motion.plan.primitive import (
     Instruction,
@@ -140,6 +140,10 @@ class LateLines(Sequence[str]):
         """Return lines that are all made when any of them is first read."""
         lines = cache(make)
         return cls(range(count), lambda rows: lines()[rows.start : rows.stop])
+
+    def __add__(self, other: Sequence[str]) -> LateLines:
+        """Return these lines, followed by others."""
+        return LateLines.at_once(len(self) + len(other), lambda: [*self, *other])
 
     def __len__(self) -> int:
         """Return the number of lines."""
@@ -337,7 +341,10 @@ class Plan:
     def joint_spline(self) -> JointSpline:
         """The joints over time, rests included, for a plan whose motions are all splines."""
         pieces: list[Spline] = []
-        for primitive in self.rows.primitives:
+        primitives = self.rows.primitives
+        if isinstance(primitives, SplineRows):
+            return JointSpline.of(self.start, primitives)
+        for primitive in primitives:
             if isinstance(primitive, Spline):
                 pieces.append(primitive)
             elif isinstance(primitive, Wait):  # a rest follows a motion

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from math import degrees, inf
 
 import numpy as np
@@ -211,6 +211,7 @@ def end_state(plan: Plan) -> SplineState:
     )
 
 
+@lru_cache(maxsize=8)  # it is checked, then sent
 def plan_stop(state: SplineState, arm: Arm, deceleration: float) -> Spline:
     """
     Return the piece that brings a moving arm to rest, each joint in its direction of motion.
@@ -242,6 +243,7 @@ def plan_stop(state: SplineState, arm: Arm, deceleration: float) -> Spline:
     )
 
 
+@lru_cache(maxsize=8)
 def rows_along(piece: Spline, state: SplineState, samples: int) -> tuple[Floats, Floats, Floats]:
     """Return joint positions and their rates at times evenly along a piece that begins so."""
     spline = JointSpline.of(state.q, [piece], velocities=state.qd, accelerations=state.qdd)
