@@ -17,7 +17,7 @@ the ending of a spline is a piece that brakes after the last point
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 import re
 
 import numpy as np
@@ -25,7 +25,6 @@ import numpy as np
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Int32s
-from ur_cartesian_driver.motion.geometry.pose_rows import keep_hemisphere
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import IOCommand, Segment
 from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable, WaypointRows
@@ -144,11 +143,6 @@ def plan_append(
         assert appendable.state is not None
         cut, from_rest = appendable.state.time, False
     check_appended_points(appendable, appended, options)
-    options = replace(
-        options,
-        max_approach_distance=0.0,
-        max_points=min(options.max_points + REPLANNED_POINTS, MAX_POINTS),
-    )
     time, records_before = appendable.time, appendable.committed_records
     if from_rest:
         time, records_before = appendable.rest_time, appendable.records
@@ -212,10 +206,15 @@ class _PartPlanner:
             io_commands=self._pending_commands(first, start_time),
             keep_open=not appended.last,
         )
+        options = replace(
+            self._options,
+            max_approach_distance=0.0,
+            max_points=min(self._options.max_points + REPLANNED_POINTS, MAX_POINTS),
+        )
         # The first replanned motion was sent before: planning starts from the blend after it.
         running = replannable[0].planned if len(replannable) == REPLANNED_POINTS else None
         try:
-            plan = plan_goal(goal, self._at_rest(q_start), self._arm, self._options, running)
+            plan = plan_goal(goal, self._at_rest(q_start), self._arm, options, running)
         except GoalRefused as refusal:
             raise refusal.reworded(_renumber_text(str(refusal), first)) from None
         start_time += _blend_half(plan.segments[0]) - _blend_half(running) if running else 0.0
@@ -337,7 +336,7 @@ class _PartPlanner:
             pieces, path = before.replanned
             segments = pieces + segments
             begin = state_at(before, before.time)
-            reference = _join_paths(path, reference)
+            reference = path + reference
         plan = Plan(
             goal=goal,
             segments=segments,
@@ -455,7 +454,7 @@ class _PartPlanner:
         waypoints = rows.waypoints
         if closing is not None:
             stop, path = closing
-            rows, reference = rows + stop, _join_paths(reference, path)
+            rows, reference = rows + stop, reference + path
             # The stop leads to no point: outputs that are due during it come after the last point.
             waypoints = np.append(waypoints, stop.waypoints + 1)
         ends = _end_times(waypoints, rows.durations, start_time)
@@ -573,21 +572,9 @@ def _renumber_text(text: str, first: int) -> str:
 def _path_from(
     path: ReferencePath, start_time: float, tolerance: float = 2.0 * SAME_TIME
 ) -> ReferencePath:
-    """Return copies of a path's rows from a time [s] on, so that the path itself can be freed."""
-    row = max(int(np.searchsorted(path.time, start_time + tolerance, side='right')) - 1, 0)
-    return ReferencePath(
-        **{each.name: getattr(path, each.name)[row:].copy() for each in fields(path)}
-    )
-
-
-def _join_paths(first: ReferencePath, second: ReferencePath) -> ReferencePath:
-    """Return two paths as one; the second begins where the first ends."""
-    columns = {
-        each.name: np.concatenate([getattr(first, each.name), getattr(second, each.name)[1:]])
-        for each in fields(ReferencePath)
-    }
-    keep_hemisphere(columns['poses'])
-    return ReferencePath(**columns)
+    """Return the rows of a path from a time [s] on."""
+    row = int(np.searchsorted(path.time, start_time + tolerance, side='right')) - 1
+    return path.since(max(row, 0))
 
 
 def _end_times(waypoints: Int32s, durations: Floats, start_time: float) -> dict[int, float]:

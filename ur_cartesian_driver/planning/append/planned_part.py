@@ -66,14 +66,6 @@ class PlannedPart:
 
 def unreported_piece(piece: Spline, waypoint: int) -> PlannedRows:
     """Return a piece to a waypoint as a row without a line in the report."""
-    rows = SplineRows.of([piece])
-    return PlannedRows(
-        waypoints=np.array([waypoint], dtype=np.int32),
-        lengths=np.zeros(1),
-        angles=np.zeros(1),
-        durations=rows.durations,
-        blend_entries=np.zeros((1, 5)),
-        joints=rows.targets,
-        primitives=rows,
-        report_lines=LateLines(range(1), lambda _: ['']),
-    )
+    number, none = np.array([waypoint], dtype=np.int32), np.zeros(1)
+    line = LateLines(range(1), lambda _: [''])
+    return PlannedRows.of_pieces(SplineRows.of([piece]), number, none, none, line)

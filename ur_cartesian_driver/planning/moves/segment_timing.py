@@ -18,7 +18,6 @@ import numpy as np
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
-from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
 from ur_cartesian_driver.motion.plan.plan import PlannedSegment
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
@@ -28,9 +27,9 @@ from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometr
 from ur_cartesian_driver.planning.moves.speed_requests import RAMP_SHARE, SpeedRequests
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
+    IS_ARC_OR_PROCESS,
     point_field,
     segment_field,
-    type_table,
 )
 
 #: Times that differ by less than the factor ``_NEARLY`` are the same. A time that is exceeded by
@@ -38,8 +37,6 @@ from ur_cartesian_driver.planning.request.goal_fields import (
 _NEARLY, _KEPT = 1.0 + 1e-5, 1.002
 #: Smallest speed or acceleration that the wire, which transmits millionths, carries accurately.
 MIN_SPEED = 1e-5
-#: Motions whose blend the robot skips if the tool covers the blend radius in one control cycle.
-_NEEDS_A_CYCLE = type_table((SegmentType.CIRCULAR, SegmentType.PROCESS))
 #: A limit exceeded by less than this factor counts as kept.
 _WITHIN = 1.0 + 1e-6
 #: Greatest number of rounds in which moves that are too fast are slowed.
@@ -333,7 +330,8 @@ class SegmentTimings:
         takes_too_long = self.wire_times > self.options.max_segment_time
         slowest = np.minimum(self.velocities, self.accelerations)
         too_slow = by_speed & (slowest < MIN_SPEED)
-        needs_a_cycle = _NEEDS_A_CYCLE[self._geometries.kinds] & path.has_blend_after
+        # Their blend is skipped if the tool covers its radius in one control cycle.
+        needs_a_cycle = IS_ARC_OR_PROCESS[self._geometries.kinds] & path.has_blend_after
         # A blend that is too small for the requested speed is refused, not passed slowly.
         asked = np.where(self._is_slowed_in_arc(), requests.speed, self.velocities)
         too_small = needs_a_cycle & (path.radius < asked * self._model.control_cycle)

@@ -23,7 +23,7 @@ from ur_cartesian_driver.planning.geometry.blended_path import CurveRows
 from ur_cartesian_driver.planning.geometry.curves import SAME_POSITION
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.goal_fields import IS_ARC, IS_JOINT, IS_PROCESS
+from ur_cartesian_driver.planning.request.goal_fields import IS_ARC, IS_ARC_OR_PROCESS, IS_JOINT
 
 #: Lower bound of lengths, for a first segment that ends where the robot already is.
 _MIN_LENGTH = 1e-9
@@ -69,7 +69,7 @@ class SpeedLimits:
         turn = np.minimum(curves.angle, self.length)  # a FIXED arc turns the tool by the arc angle
         ratio = max(options.turn_ratio, options.laws.turn_ratio)
         counted = np.maximum(curves.length, turn / ratio) / self.length
-        ahead = IS_ARC[kinds] | IS_PROCESS[kinds]
+        ahead = IS_ARC_OR_PROCESS[kinds]
         faster = np.where(ahead, np.minimum(1.0, counted), 1.0)
         self.speed *= faster
         self.acceleration *= faster

@@ -26,11 +26,11 @@ from ur_cartesian_driver.planning.moves.speed_limits import SpeedLimits
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     FOLLOWS_BLEND_LAWS,
+    IS_ARC_OR_PROCESS,
     IS_JOINT,
     IS_LINEAR,
     IS_PROCESS,
     point_field,
-    type_table,
 )
 from ur_cartesian_driver.planning.request.program_features import takes_times
 
@@ -42,9 +42,7 @@ RAMP_SHARE = 1.0 / 3.0
 #: not published. It is only used to estimate the time of such a move.
 _OPTIMIZED_JOINT_ACCELERATION = 40.0
 #: Motions that accept a time on the wire.
-_TIMED_ON_WIRE = type_table((SegmentType.LINEAR, SegmentType.JOINT))
-#: Motions that accept no time, and whose speed has not been measured if the turn leads.
-_UNMEASURED_TURNS = type_table((SegmentType.CIRCULAR, SegmentType.PROCESS))
+_TIMED_ON_WIRE = IS_LINEAR | IS_JOINT
 #: Ratios of peak speed to mean speed of a timed move: ``_PEAK`` for the trapezoid in thirds;
 #: ``_PEAK_OF_TURN`` for the triangle that results on a line whose turn leads, if the robot turns
 #: the tool at a higher number [rad/s] than it moves the tool [m/s].
@@ -342,7 +340,8 @@ class SpeedRequests:
     def _by_time(self) -> None:
         """Request times."""
         geometries, limits, timed = self.geometries, self.limits, self.has_wire_time
-        unmeasured = ~timed & limits.is_turn & _UNMEASURED_TURNS[self._kinds]
+        # How fast these run if the turn leads has not been measured.
+        unmeasured = ~timed & limits.is_turn & IS_ARC_OR_PROCESS[self._kinds]
         for row in rows_where(unmeasured)[:1]:
             raise InvalidGoal(
                 point_field(geometries.begin + row, 'time_from_start'),

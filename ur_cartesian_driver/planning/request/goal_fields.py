@@ -24,25 +24,15 @@ def type_table(types: Collection[SegmentType]) -> Flags:
     return np.array([kind in types for kind in SegmentType])
 
 
+IS_LINEAR, IS_JOINT = type_table((SegmentType.LINEAR,)), type_table((SegmentType.JOINT,))
+IS_ARC, IS_PROCESS = type_table((SegmentType.CIRCULAR,)), type_table((SegmentType.PROCESS,))
+IS_ARC_OR_PROCESS = IS_ARC | IS_PROCESS
 _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 #: By segment type: whether it moves the tool on a straight line; whether it is a straight line in
 #: joint space; whether its speeds are fractions of the robot's limits; and whether it takes a
 #: speed of the tool.
-IS_STRAIGHT = type_table(
-    (
-        SegmentType.AUTO,
-        SegmentType.LINEAR,
-        SegmentType.PROCESS,
-        SegmentType.OPTIMIZED_LINEAR,
-    )
-)
-IS_LINEAR, IS_JOINT, IS_ARC, IS_PROCESS = (
-    type_table((kind,))
-    for kind in (
-        SegmentType.LINEAR, SegmentType.JOINT, SegmentType.CIRCULAR, SegmentType.PROCESS
-    )
-)  # fmt: skip
 IS_JOINT_MOVE = type_table((SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT))
+IS_STRAIGHT = ~(IS_JOINT_MOVE | IS_ARC)
 IS_OPTIMIZED = type_table(_OPTIMIZED)
 TAKES_TOOL_SPEED = ~type_table((SegmentType.JOINT, *_OPTIMIZED))
 #: By segment type: whether the blend behind it follows the measured laws of blends. Those of
