@@ -75,8 +75,9 @@ class ReferencePath:
         for array in arrays:
             array.setflags(write=False)
 
-    def since(self, row: int) -> ReferencePath:
-        """Return copies of the rows from one on, so that the path itself can be freed."""
+    def since(self, time: float) -> ReferencePath:
+        """Return copies of the rows from a time [s] on, so that the path itself can be freed."""
+        row = max(int(np.searchsorted(self.time, time, side='right')) - 1, 0)
         return ReferencePath(**{k: column[row:].copy() for k, column in self._columns().items()})
 
     def __add__(self, other: ReferencePath) -> ReferencePath:

@@ -186,11 +186,8 @@ class _PartPlanner:
     def append_moves(self, records_before: int, start_time: float) -> AppendPlan:
         """Return a part made of robot motions, planned with the last motions before the part."""
         before, appended = self._before, self._appended
-        replannable, q_start, time_before = (
-            before.replannable,
-            before.q_rest,
-            before.last_client_time,
-        )
+        replannable, q_start = before.replannable, before.q_rest
+        time_before = before.last_client_time
         if replannable:
             q_start, time_before = replannable[0].q_before, replannable[0].time_before
         first = before.points - len(replannable)
@@ -402,7 +399,7 @@ class _PartPlanner:
         if pending:
             piece = rows[moving - 1 : moving]
             time -= float(piece.durations[0])
-            replanned = piece, _path_from(plan.reference, time)
+            replanned = piece, plan.reference.since(time + 2.0 * SAME_TIME)
         assert isinstance(rows.primitives, SplineRows)
         spline = JointSpline.of(
             begin.q,
@@ -559,7 +556,7 @@ def _renumber_plan(plan: Plan, first: int, waypoint: int, start_time: float) -> 
             ),
             notes={row: _renumber_text(note, first) for row, note in rows.notes.items()},
         ),
-        reference=_path_from(path, start_time, SAME_TIME),
+        reference=path.since(start_time + SAME_TIME),
         find_slow_stretches=tuple,  # the plan's function would name other points
     )
 
@@ -567,14 +564,6 @@ def _renumber_plan(plan: Plan, first: int, waypoint: int, start_time: float) -> 
 def _renumber_text(text: str, first: int) -> str:
     """Return a text with its points renumbered from the start of the goal."""
     return _NUMBER.sub(lambda found: f'{found[1]}{int(found[2]) + first}', text)
-
-
-def _path_from(
-    path: ReferencePath, start_time: float, tolerance: float = 2.0 * SAME_TIME
-) -> ReferencePath:
-    """Return the rows of a path from a time [s] on."""
-    row = int(np.searchsorted(path.time, start_time + tolerance, side='right')) - 1
-    return path.since(max(row, 0))
 
 
 def _end_times(waypoints: Int32s, durations: Floats, start_time: float) -> dict[int, float]:

@@ -33,6 +33,7 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines, JointSamples
 from ur_cartesian_driver.planning.preflight.start_checks import check_approach, check_reported_tcp
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
+from ur_cartesian_driver.planning.preflight.tightest_margins import joint_limit_distances
 from ur_cartesian_driver.planning.request.default_tolerances import apply_default_tolerances
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.request.joint_goal_rules import (
@@ -288,9 +289,7 @@ def _sampled(trajectory: _Trajectory, state: RobotState, arm: Arm) -> _Samples:
 
 
 def _check_ranges(samples: _Samples, arm: Arm) -> None:
-    low, high = np.array(arm.model.position_limits).T
-    q = samples.q
-    outside = (q < low - _ROUNDING) | (q > high + _ROUNDING)
+    outside = joint_limit_distances(arm, samples.q) < -_ROUNDING
     if not outside.any():
         return
     row = int(np.flatnonzero(outside.any(axis=1))[0])
@@ -298,7 +297,7 @@ def _check_ranges(samples: _Samples, arm: Arm) -> None:
     raise JointLimitExceeded(
         f'{point_field(int(samples.points[row]), "positions")}, at '
         f'{100.0 * samples.u[row]:.1f} % of its segment: {JOINT_NAMES[k]} turns to '
-        f'{q[row, k]:.4f} rad, its range is {arm.model.range_text(k)}; keep it within.'
+        f'{samples.q[row, k]:.4f} rad, its range is {arm.model.range_text(k)}; keep it within.'
     )
 
 

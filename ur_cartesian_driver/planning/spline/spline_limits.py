@@ -16,10 +16,12 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
+from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates, largest_joint_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Int32s
+from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
+from ur_cartesian_driver.motion.goal.goal_table import zeros
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
@@ -27,6 +29,11 @@ from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 
 _ROUNDING = 1e-6
+#: A joint is near a limit if the bound of its rate exceeds this part of the limit: the inverse of
+#: the Jacobian differs a little from place to place. It is computed at every so many samples.
+_NEAR, _FEW = 0.5, 3
+# Rows per block, so that the intermediate arrays stay in the CPU cache.
+_BLOCK = 1024
 
 
 #: A quantity along a spline: name of the tool or joint to which it belongs, values (m,), limit,
@@ -130,7 +137,16 @@ def worst_excess(
     """Return the quantity along a path that exceeds its limit most; None if none does."""
     begin, end = path.spline.times[path.piece], path.spline.times[path.piece + 1]
     twists, accelerations = path.spline.rates(path.piece, path.u * (end - begin))
-    qd, qdd = joint_rates(kinematics.arm, kinematics.T_flange_tcp, path.q, twists, accelerations)
+    q, arm = path.q, kinematics.arm
+    qd = qdd = zeros(len(q))
+    speeds = np.abs(np.diff(q, axis=0)) / np.diff(path.times)[:, None]
+    near = bool((speeds > _NEAR * np.array(arm.model.max_joint_speed)).any())
+    rates, changes = (
+        (float(length_rows(rows[:, :3]).max()), float(length_rows(rows[:, 3:]).max()))
+        for rows in (twists, accelerations)
+    )
+    if near or may_near_limits(kinematics, q[::_FEW], rates, changes, options):
+        qd, qdd = joint_rates(arm, kinematics.T_flange_tcp, q, twists, accelerations)
     samples = RateSamples(
         points=path.points,
         u=path.fractions,
@@ -140,6 +156,30 @@ def worst_excess(
         qdd=qdd,
     )
     return worst_excess_of(samples, kinematics.arm.model, options)
+
+
+def may_near_limits(
+    kinematics: TcpKinematics,
+    q: Floats,
+    rates: tuple[float, float],
+    accelerations: tuple[float, float],
+    options: PlanningOptions,
+) -> bool:
+    """
+    Return whether a joint may come near a limit in one of the configurations (n, 6) [rad].
+
+    The inverse of the Jacobian bounds the joint rates by those of the tool.
+
+    :param rates: greatest speed and turn rate of the tool [m/s], [rad/s].
+    :param accelerations: likewise [m/s^2], [rad/s^2].
+    """
+    arm, T_flange_tcp = kinematics.arm, kinematics.T_flange_tcp
+    for k in range(0, len(q), _BLOCK):
+        qd, qdd = largest_joint_rates(arm, T_flange_tcp, q[k : k + _BLOCK], rates, accelerations)
+        speeds = qd / arm.model.max_joint_speed
+        if max(speeds.max(), qdd.max() / options.max_joint_acceleration) > _NEAR:
+            return True
+    return False
 
 
 def worst_excess_of(

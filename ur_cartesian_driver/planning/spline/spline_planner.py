@@ -39,6 +39,7 @@ from ur_cartesian_driver.planning.min_speed import slower_by
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines, JointSamples
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
+from ur_cartesian_driver.planning.preflight.tightest_margins import joint_limit_distances
 from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
 from ur_cartesian_driver.planning.spline.joint_polynomials import (
     fit_joint_polynomials,
@@ -252,8 +253,7 @@ def rows_along(piece: Spline, state: SplineState, samples: int) -> tuple[Floats,
 
 def _joint_outside_range(arm: Arm, q: Floats) -> int | None:
     """Return a joint that leaves its range; None if none does."""
-    low, high = np.array(arm.model.position_limits).T
-    outside = ((q < low - 1e-9) | (q > high + 1e-9)).any(axis=0)
+    outside = (joint_limit_distances(arm, q) < -1e-9).any(axis=0)
     return int(np.argmax(outside)) if outside.any() else None
 
 

@@ -21,7 +21,6 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     conjugate_rows,
     multiply_rows,
     normalized_rows,
-    transform_rows,
 )
 from ur_cartesian_driver.motion.geometry.rotation_rows import log_rows, rotation_rates
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
@@ -85,7 +84,11 @@ def _in_frame(points: ToolPoints, T_new_old: Pose) -> ToolPoints:
         np.concatenate([rates[:, :3] @ R.T, rates[:, 3:] @ R.T], axis=1)
         for rates in (points.twists, points.accelerations)
     )
-    poses = transform_rows(T_new_old, points.poses)
+    positions = points.poses[:, :3] @ R.T + T_new_old.position
+    orientations = normalized_rows(
+        multiply_rows(np.array([T_new_old.quaternion]), points.poses[:, 3:])
+    )
+    poses = np.concatenate([positions, orientations], axis=1)
     return replace(points, twists=twists, accelerations=accelerations, poses=poses)
 
 
