@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import keep_hemisphere
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal
-from ur_cartesian_driver.motion.goal.goal_table import Rows, zeros
+from ur_cartesian_driver.motion.goal.goal_columns import Rows, zeros
 from ur_cartesian_driver.motion.goal.joint_goal import JointTolerances
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.move_rows import classes, SplineRows

@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Int32s
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import IOCommand, Segment
-from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable, WaypointRows
+from ur_cartesian_driver.motion.goal.goal_columns import goal_table, GoalTable, WaypointRows
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline, SAME_TIME
 from ur_cartesian_driver.motion.plan.move_rows import SplineRows
 from ur_cartesian_driver.motion.plan.plan import (
