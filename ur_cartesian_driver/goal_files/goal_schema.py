@@ -181,15 +181,17 @@ def _slot_value(value: Any, slot: Any) -> Any:
 
 def _number(value: object, key: str) -> float:
     # YAML reads 1e-3 as a text, because its own notation is 1.0e-3.
-    with suppress(ValueError):
+    with suppress(ValueError, OverflowError):
         if isinstance(value, (int, float, str)) and not isinstance(value, bool):
             return float(value)
+    if isinstance(value, int) and not isinstance(value, bool):
+        raise FieldError(f'{key} is {value!r:.20}..., which is too large for a number.')
     raise FieldError(f'{key} is {value!r}, but must be a number.')
 
 
 def _whole(value: object, kind: Whole, key: str) -> int:
     if not isinstance(value, int) or isinstance(value, bool) or not kind.low <= value <= kind.high:
         raise FieldError(
-            f'{key} is {value!r}, but must be a whole number from {kind.low} to {kind.high}.'
+            f'{key} is {value!r:.60}, but must be a whole number from {kind.low} to {kind.high}.'
         )
     return value
