@@ -56,6 +56,7 @@ from ur_cartesian_driver.planning.preflight.tightest_margins import (
 )
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.preview import sample
+from ur_cartesian_driver.preview.pictures import pyplot
 from ur_cartesian_driver.sim.calibration import random_calibration
 from ur_cartesian_driver.sim.simulator_config import HOME
 
@@ -450,14 +451,8 @@ def draw(results: Sequence[SweepResult], picture: FilePath) -> None:
 
     :raises OSError: matplotlib is not installed, or the file cannot be written.
     """
-    try:
-        import matplotlib
-    except ImportError:
-        raise OSError('no picture without matplotlib; install it (extra `plot`)') from None
-    matplotlib.use('Agg')
-    from matplotlib import pyplot
-
-    figure, charts = pyplot.subplots(2, 2, figsize=(11.0, 8.0), layout='constrained')
+    plt = pyplot()
+    figure, charts = plt.subplots(2, 2, figsize=(11.0, 8.0), layout='constrained')
     for chart, (column, title) in zip(charts.flat, COLUMNS.items(), strict=False):
         names, values, grid = _grid(results, column)
         chart.set_title(title)
@@ -473,7 +468,7 @@ def draw(results: Sequence[SweepResult], picture: FilePath) -> None:
             chart.set_yticks([])
     figure.suptitle(summary(results).split(';')[0].rstrip('.'))
     figure.savefig(picture, dpi=110)
-    pyplot.close(figure)
+    plt.close(figure)
 
 
 def _ticks(values: Sequence[Coordinate]) -> tuple[list[int], list[str]]:

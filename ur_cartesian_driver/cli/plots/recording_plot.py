@@ -23,6 +23,7 @@ from ur_cartesian_driver.driver.recordings.recording_format import (
 )
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
+from ur_cartesian_driver.preview.pictures import pyplot
 
 #: Largest number of packets in a picture.
 MAX_ROWS = 6000
@@ -71,14 +72,8 @@ def draw(recording: Recording, picture: Path, title: str = '') -> None:
     :param picture: the file to write; its suffix decides the format.
     :raises OSError: matplotlib is not installed, or the picture cannot be written.
     """
-    try:
-        import matplotlib
-    except ImportError:
-        raise OSError('no picture without matplotlib; install it (extra `plot`)') from None
-    matplotlib.use('Agg')
-    from matplotlib import pyplot
-
-    with matplotlib.rc_context(
+    plt = pyplot()
+    with plt.rc_context(
         {
             'font.size': 9.0,
             'axes.spines.top': False,
@@ -91,13 +86,13 @@ def draw(recording: Recording, picture: Path, title: str = '') -> None:
             'path.simplify_threshold': 0.5,
         }
     ):
-        figure = pyplot.figure(figsize=(12.0, 7.2), layout='constrained')
+        figure = plt.figure(figsize=(12.0, 7.2), layout='constrained')
         figure.suptitle(title or _title(recording), fontsize=11.0)
         left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.0, 1.35))[0]
         _draw_path(left, recording)
         _draw_time(right, recording)
         figure.savefig(picture, dpi=100)
-        pyplot.close(figure)
+        plt.close(figure)
 
 
 def _title(recording: Recording) -> str:
