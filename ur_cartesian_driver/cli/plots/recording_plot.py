@@ -17,10 +17,8 @@ import numpy as np
 
 from ur_cartesian_driver.cli.progress import timed
 from ur_cartesian_driver.driver.recordings.recording import Recording
-from ur_cartesian_driver.driver.recordings.recording_format import (
-    OUTPUT_NAMES,
-    PART_SUFFIX,
-)
+from ur_cartesian_driver.driver.recordings.recording_folder import newest_recording
+from ur_cartesian_driver.driver.recordings.recording_format import OUTPUT_NAMES
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.preview.pictures import pyplot
@@ -46,20 +44,6 @@ def plot(arguments: argparse.Namespace) -> int:
         draw(Recording.load(file, MAX_ROWS), picture)
     print(f'picture: {picture}')
     return 0
-
-
-def newest_recording(path: Path) -> Path:
-    """
-    Return the path of a recording; for a directory, the newest one in it.
-
-    :raises OSError: the directory contains no recording.
-    """
-    if path.is_dir() and path.suffix != PART_SUFFIX:
-        found = sorted(path.glob('*_points*.npz')) or sorted(path.glob(f'*_points*{PART_SUFFIX}'))
-        if not found:
-            raise OSError(f'there is no recording in {path}; see the parameter record_directory')
-        return found[-1]
-    return path
 
 
 # ---- the picture ----------------------------------------------------------------------------
