@@ -229,20 +229,17 @@ def _add_send(command: CommandParser) -> None:
         action='store_true',
         help='go on where the goal of this file was stopped (noted in FILE.stopped)',
     )
-    command.add_argument(
-        '--overlap',
-        type=float,
-        default=5.0,
-        metavar='MM',
-        help='how far before that place the path is resumed (5 mm)',
-    )
-    command.add_argument(
-        '--approach',
-        type=float,
-        default=30.0,
-        metavar='MM',
-        help='from how far behind the path, along the z axis of the tool (30 mm)',
-    )
+    for name, default, text in (
+        ('overlap', '5mm', 'how far before that place the path is resumed'),
+        ('approach', '30mm', 'from how far behind the path, along the z axis of the tool'),
+    ):
+        command.add_argument(
+            f'--{name}',
+            type=argument_types.resume_length,
+            default=default,
+            metavar='LENGTH',
+            help=text,
+        )
     command.add_argument(
         '--report', action='store_true', help='print the report: what was done, and why'
     )
