@@ -475,7 +475,7 @@ class Driver(RobotServices, InteractiveMotions):
             else '',
         )
         data = pack_parts(request)
-        active = ActiveMotion(number, plan, on_progress, self._send)
+        active = ActiveMotion(number, plan, on_progress, self._send, self._log)
         if job.feed_override is not None:
             active.motion.feed_problem = (
                 HAS_FEED_INPUT if self.config.feed_override_input else None

@@ -7,11 +7,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
+import logging
 from math import isfinite
 import threading
 
 from ur_cartesian_driver.driver.appender import Appender, AppendResult
-from ur_cartesian_driver.driver.callbacks import run_callback
+from ur_cartesian_driver.driver.callbacks import LOG, run_callback
 from ur_cartesian_driver.driver.ipc.channel import (
     CancelMotion,
     Request,
@@ -207,14 +208,16 @@ class ActiveMotion:
         plan: Plan,
         on_progress: OnProgress | None,
         send: Callable[[Request], None],
+        log: logging.Logger = LOG,
     ) -> None:
         """
         Begin with no progress and no outcome.
 
         :param send: sends requests to the robot loop.
+        :param log: takes the errors of ``on_progress``.
         """
         self._outcome: Future[Outcome] = Future()
-        self._on_progress = on_progress
+        self._on_progress, self._log = on_progress, log
         #: Guards the attributes below.
         self._lock = threading.Lock()
         #: The plan; None once a thread makes its report.
@@ -257,7 +260,7 @@ class ActiveMotion:
         """Keep a progress report of the robot loop, and pass it on."""
         self.motion.progress = progress
         if self._on_progress is not None:
-            run_callback(self._on_progress, progress)
+            run_callback(self._on_progress, progress, self._log)
 
     def end(self, outcome: Outcome) -> None:
         """Deliver the outcome; any further outcome is ignored."""
