@@ -24,6 +24,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     PulseTrain,
     SafeOutput,
     ScriptCall,
+    Segment,
     SegmentType,
 )
 from ur_cartesian_driver.path import (
@@ -494,6 +495,69 @@ def test_a_dwell_stops_the_arm_and_delays_what_follows():
     ]
     spline = Path(HERE).spline((-0.5, 0.0, 0.45), duration=1.0).dwell(0.2)
     assert spline.goal().waypoints[0].twist == (0.0,) * 6
+
+
+def test_a_dwell_stays_at_its_place_on_the_way_back():
+    """A dwell belongs to a place: there and back, the arm rests once where it turns round."""
+    there = Path(HERE).by(dy=0.1).by(dx=0.1).dwell(0.5)
+
+    def dwells(path):
+        return [(p.pose.position, s.dwell) for p, s in zip(*rows(path), strict=True) if s.dwell]
+
+    def rows(path):
+        goal = path.goal()
+        return goal.waypoints, goal.segments or [Segment()] * len(goal.waypoints)
+
+    end = there.end.position
+    assert dwells(there.then(there.reversed())) == [(end, 0.5)]
+    # Where the path turns back at a point of another one, that point gets the dwell.
+    assert dwells(Path(HERE).by(dy=0.1).by(dx=0.1).then(there.reversed())) == [(end, 0.5)]
+    assert dwells(there.reversed().reversed()) == [(end, 0.5)]
+    passes = there.repeated(3, dz=0.02, alternating=True)
+    assert [(round(place[2], 6), dwell) for place, dwell in dwells(passes)] == [
+        (0.5, 0.5),
+        (0.52, 0.5),
+        (0.54, 0.5),
+    ]
+    assert {round(place[0], 6) for place, _ in dwells(passes)} == {round(end[0], 6)}
+    assert dwells(there.dwell(0.0).reversed()) == []
+
+
+def test_a_moved_spline_keeps_the_rates_that_are_given():
+    """Judge: a velocity turns with its frame, and v + w x r holds at a point beside it."""
+    path = Path(HERE).spline((-0.4, 0.0, 0.5), duration=1.0, twist=(0.1, nan, 0.3))
+    path = path.spline((-0.3, 0.0, 0.5), duration=1.0, twist=ZERO6)
+    moved = path.offset(dx=0.1)._table().waypoints
+    np.testing.assert_array_equal(moved.twists[0], [0.1, nan, 0.3, nan, nan, nan])
+    quarter = path.transformed(Pose((0.0, 0.0, 0.0), axis_angle(Z, deg(90))))
+    twist = quarter._table().waypoints.twists[0]
+    np.testing.assert_allclose(twist, [nan, 0.1, 0.3, nan, nan, nan], atol=1e-12)
+    with pytest.raises(InvalidGoal, match=r'transformed\(\) at point 0 turns a twist of which'):
+        path.transformed(Pose((0.0, 0.0, 0.0), axis_angle(Z, 1.0)))
+    whole = Path(HERE).spline((-0.4, 0.0, 0.5), duration=1.0, twist=(0.1, 0.0, 0.0))
+    turned = whole.transformed(Pose((0.0, 0.0, 0.0), axis_angle(Z, 1.0)))
+    twist = turned._table().waypoints.twists[0]
+    np.testing.assert_allclose(twist[:3], 0.1 * np.array([np.cos(1.0), np.sin(1.0), 0.0]))
+    assert np.isnan(twist[3:]).all()
+
+
+def test_beside_a_spline_the_tool_has_the_speed_of_its_turn():
+    straight = Path(HERE).spline((-0.4, 0.0, 0.5), duration=1.0, twist=(0.1, 0.0, 0.0))
+    straight = straight.spline((-0.3, 0.0, 0.5), duration=1.0)
+    twist = straight.offset(dz=0.1, of_tool=True)._table().waypoints.twists[0]
+    np.testing.assert_array_equal(twist, [0.1, 0.0, 0.0, nan, nan, nan])
+    turning = Path(HERE).spline((-0.4, 0.0, 0.5), tilted(0.3), duration=1.0, twist=(0.1, 0.0, 0.0))
+    with pytest.raises(InvalidGoal, match=r'offset\(\) at point 0 has a linear twist, but the'):
+        turning.offset(dz=0.1, of_tool=True)
+    given = Path(HERE).spline(
+        (-0.4, 0.0, 0.5), tilted(0.3), duration=1.0, twist=(0.1, 0.0, 0.0, 0.0, 2.0, 0.0)
+    )
+    beside = given.offset(dz=0.1, of_tool=True)
+    arm = np.array(beside.end.position) - given.end.position
+    twist = beside._table().waypoints.twists[0]
+    np.testing.assert_allclose(twist[:3], np.array([0.1, 0, 0]) + np.cross([0, 2.0, 0], arm))
+    free = Path(HERE).spline((-0.4, 0.0, 0.5), tilted(0.3), duration=1.0)
+    assert np.isnan(free.offset(dz=0.1, of_tool=True)._table().waypoints.twists).all()
 
 
 @pytest.mark.parametrize(

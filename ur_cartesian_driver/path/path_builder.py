@@ -26,6 +26,7 @@ from ur_cartesian_driver.goal_files.goal_schema import message_of, with_defaults
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.vectors import ZERO3
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import (
     CORNER_ANGLE,
@@ -254,16 +255,23 @@ class Path(PathWithEvents):
                 'add a motion to there',
             )
         if self._points and other._points:
-            first, last = other._points[0], self._points[-1]
-            if first.in_spline != last.in_spline:
+            after, last = other._points[0], self._points[-1]
+            if after.in_spline != last.in_spline:
                 raise mixed_spline('then()')
-            if bool(first.duration) != bool(last.duration):
+            if bool(after.duration) != bool(last.duration):
                 raise InvalidGoal(
                     'then()', 'joins a path with durations and one without', 'give both, or none'
                 )
+        first, start = self, self._start
+        if other._start is not None:
+            rest = other._start.segment.dwell  # of a path that is reversed
+            if not self._points and (start is None or rest):
+                start = other._start
+            elif rest and not self._points[-1].segment.dwell:
+                first = self.dwell(rest)
         return self._with(
-            _start=self._start if len(self) or self._start else other._start,
-            _points=(*self._points, *other._points),
+            _start=start,
+            _points=(*first._points, *other._points),
             _feed=other._feed,
             _settings=merged(self._settings, other._settings),
         )
@@ -275,36 +283,52 @@ class Path(PathWithEvents):
         Return this path moved by a distance [m].
 
         :param of_tool: move each point along the axes of the tool there, not of the frame.
-        :raises InvalidGoal: with ``of_tool``, an arc turns the tool, so that the result is no arc.
+        :raises InvalidGoal: with ``of_tool``, an arc turns the tool, so that the result is no arc;
+            or the tool turns in a spline at a point whose twist has no angular part.
         """
         step = vector('offset()', (dx, dy, dz), MAX_COORDINATE_OF_BASE, 'd')
         if not of_tool:
             return self.transformed(Pose(step))
+        if step == ZERO3:
+            return self
         T_tool_new = Pose(step)
-        previous = (self.start, *self.poses)
+        poses = (self.start, *self.poses, None)
         points = (
-            seen_from(point, T_tool_new, before, f'offset() at point {i}')
-            for i, (point, before) in enumerate(zip(self._points, previous, strict=False))
+            seen_from(point, T_tool_new, poses[i], poses[i + 2], f'offset() at point {i}')
+            for i, point in enumerate(self._points)
         )
         start = self._start
         return self._with(
-            _start=None if start is None else seen_from(start, T_tool_new, None, 'offset()'),
+            _start=None
+            if start is None
+            else seen_from(start, T_tool_new, poses[0], poses[1], 'offset() at the start'),
             _points=tuple(points),
         )
 
     def transformed(self, T: Pose) -> Path:
-        """Return this path with each pose transformed by a pose in the frame: ``T @ pose``."""
+        """
+        Return this path with each pose transformed by a pose in the frame: ``T @ pose``.
+
+        :raises InvalidGoal: the position is too far away, or the pose turns a twist of a spline of
+            which only some linear or angular components are given.
+        """
         T = Pose(
             vector('transformed()', T.position, MAX_COORDINATE), unit_quaternion('T', T.quaternion)
         )
         return self._with(
-            _start=None if self._start is None else moved(self._start, T),
-            _points=tuple(moved(point, T) for point in self._points),
+            _start=None if self._start is None else moved(self._start, T, 'transformed()'),
+            _points=tuple(
+                moved(point, T, f'transformed() at point {i}')
+                for i, point in enumerate(self._points)
+            ),
         )
 
     def reversed(self) -> Path:
         """
         Return the path backwards, from its end to its start.
+
+        A dwell at the end comes first then. A goal cannot begin with a dwell, so such a path has
+        to follow another one, by :meth:`then`.
 
         :raises InvalidGoal: the path has no start at which to end, or has events, which cannot be
             reversed.
@@ -504,6 +528,13 @@ class Path(PathWithEvents):
     def _table(self) -> GoalTable:
         """Return the goal with its frames unresolved."""
         self._check_ends()
+        if self._start is not None and self._start.segment.dwell:
+            raise InvalidGoal(
+                'reversed()',
+                f'has a dwell of {self._start.segment.dwell:g} s at its start, where no goal can '
+                'have one',
+                'call dwell(0) before it, or let it follow another path by then()',
+            )
         return goal_of_points(self._points, self._settings, self.start, self.frame, self.tool)
 
     def _fields(self) -> dict[str, Any]:
