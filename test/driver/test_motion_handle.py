@@ -49,7 +49,7 @@ def test_an_offset_is_sent_in_plain_numbers():
 @pytest.mark.parametrize(
     ('plan', 'values', 'text'),
     [
-        (PlanWithReport, {}, 'path_offset is empty in the goal that runs; set its limits'),
+        (PlanWithReport, {}, 'path_offset is not set in the running goal; set its limits'),
         (PlanWithBand, {'across': nan}, 'across is nan; it must be finite'),
         (PlanWithBand, {'normal': 'near'}, "normal is 'near'"),
         (PlanWithBand, {'age': -1}, 'age is -1.0; it must be finite, and at least 0'),
@@ -79,7 +79,7 @@ def test_a_feed_is_sent_even_if_it_is_an_invalid_signal():
 
 def test_a_goal_without_feed_override_takes_none():
     motion = ActiveMotion(7, cast('Any', PlanWithReport()), None, print).motion
-    with pytest.raises(InvalidGoal, match='feed_override is empty in the goal that runs; set its'):
+    with pytest.raises(InvalidGoal, match='feed_override is not set in the running goal; set its'):
         motion.set_feed_override(0.5)
 
 

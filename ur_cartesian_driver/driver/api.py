@@ -363,8 +363,8 @@ class Driver(RobotServices, InteractiveMotions):
             raise RobotNotReady('A person guides the arm by hand; end freedrive first.')
         if is_paused(state) or is_stopped(state):
             raise RobotNotReady(
-                'A motion is running that is paused or stopped, so no other motion can preempt '
-                'it; resume or cancel it.'
+                'The running motion is paused or stopped, so no other motion can preempt it; '
+                'resume or cancel it.'
             )
 
     @property

@@ -31,16 +31,17 @@ from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 OnProgress = Callable[[Progress], None]
 
 
-#: The goal takes no signal; an input of the robot gives it.
+#: Why a client cannot slow a motion: its goal has no bounds for a signal; or an input of the robot
+#: gives the signal.
 NO_FEED_OVERRIDE = (
     'feed_override',
-    'is empty in the goal that runs',
+    'is not set in the running goal',
     'set its minimum in the goal',
 )
 HAS_FEED_INPUT = (
     'feed_override_input',
-    'names an input of the robot, which alone slows the goals',
-    "set the parameter to '' for signals of clients",
+    'names an input of the robot, whose signal slows all goals',
+    "set the parameter to '' so that clients can give the signal",
 )
 
 
@@ -140,7 +141,7 @@ class MotionHandle:
         """
         if self.offset_timeout is None:
             raise InvalidGoal(
-                'path_offset', 'is empty in the goal that runs', 'set its limits in the goal'
+                'path_offset', 'is not set in the running goal', 'set its limits in the goal'
             )
         values = {'along': along, 'across': across, 'normal': normal, 'age': age}
         for name, value in values.items():
