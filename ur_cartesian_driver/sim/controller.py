@@ -27,6 +27,7 @@ from ur_cartesian_driver.motion.state.rtde_state import (
     SafetyMode,
     SafetyStatus,
 )
+from ur_cartesian_driver.protocol.rtde.rtde_fields import fields_of, INPUT_TYPES
 from ur_cartesian_driver.sim.motion import MotionGenerator
 from ur_cartesian_driver.sim.motion.actual_motion import ActualMotion
 from ur_cartesian_driver.sim.motion.contact.contact_motion import ArmState, ContactMotion
@@ -483,8 +484,16 @@ class Controller:
 
         :param frequency: lowest rate of writing [Hz]; 0 ends the check.
         :param action: 'pause' or 'stop' the program if the input is late; 'ignore' = do nothing.
-        :raises RuntimeException: the action has another value.
+        :raises RuntimeException: the robot has no such input, reads inputs at a lower rate, or the
+            action has another value. (Assumed: the manual names the values, but no error.)
         """
+        if variable not in fields_of(INPUT_TYPES, self.config.version):
+            raise RuntimeException(f'variable_name is {variable!r}, which is no RTDE input')
+        if frequency * self.cycle > 1.0:
+            rate = 1.0 / self.cycle
+            raise RuntimeException(
+                f'min_frequency is {frequency:g}; inputs are read {rate:g} times a second'
+            )
         if action not in ('pause', 'stop', 'ignore'):
             raise RuntimeException(f"action is {action!r}; it must be 'pause', 'stop' or 'ignore'")
         self.watchdogs.watch(variable, frequency, action, self.time)
