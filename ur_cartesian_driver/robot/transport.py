@@ -21,6 +21,7 @@ import socket
 OnData = Callable[[bytes], None]
 OnClosed = Callable[[str], None]
 
+
 #: Pauses between attempts to connect [s]; the last pause repeats.
 BACKOFF_PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0)
 CONNECT_TIMEOUT = 2.0
@@ -42,6 +43,10 @@ REMEDIES = {
     errno.EADDRINUSE: 'another driver may use it; set {name} to a free port or to 0',
     errno.EACCES: 'set {name} to a port above 1023 or to 0',
 }
+
+
+def ignore(_: object) -> None:
+    """Do nothing; for callbacks that nobody needs."""
 
 
 class TcpConnection(asyncio.BufferedProtocol):
