@@ -21,7 +21,6 @@ import socket
 OnData = Callable[[bytes], None]
 OnClosed = Callable[[str], None]
 
-
 #: Pauses between attempts to connect [s]; the last pause repeats.
 BACKOFF_PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0)
 CONNECT_TIMEOUT = 2.0
