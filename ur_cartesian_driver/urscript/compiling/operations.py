@@ -21,7 +21,7 @@ from ur_cartesian_driver.urscript.compiling.generated_code import (
     SWITCH,
 )
 from ur_cartesian_driver.urscript.container_methods import call_method
-from ur_cartesian_driver.urscript.script_values import SIZED, ThreadHandle, Value
+from ur_cartesian_driver.urscript.script_values import FLOATS, SIZED, ThreadHandle, Value
 
 #: Names of the operators in generated code.
 OPERATORS = {
@@ -73,6 +73,9 @@ def operations(runtime: Runtime) -> dict[str, Any]:
 
     def copied(value: Value) -> Value:
         """Return a value that is stored or passed on."""
+        if type(value) is list and FLOATS.issuperset(map(type, value)):
+            pay(len(value))
+            return value[:]
         if type(value) in SIZED:
             pay(values.size_of(value))
             return values.copy(value)
@@ -100,10 +103,18 @@ def operations(runtime: Runtime) -> dict[str, Any]:
         return call_method(target, method, arguments)
 
     def operator(symbol: str) -> Callable[[Value, Value], Value]:
-        operate = values.BINARY[symbol]
+        operate, compute = values.BINARY[symbol], values.COMPUTE.get(symbol)
 
         def binary(a: Value, b: Value) -> Value:
             kind_a, kind_b = type(a), type(b)
+            if kind_a is list and compute is not None and FLOATS.issuperset(map(type, a)):
+                # Most lists.
+                if kind_b is list and len(a) == len(b) and FLOATS.issuperset(map(type, b)):
+                    pay(2 * len(a))
+                    return list(map(compute, a, b))
+                if kind_b is float:
+                    pay(len(a) + 1)
+                    return [compute(item, b) for item in a]
             if kind_a in SIZED or kind_b in SIZED:
                 pay(values.work_on(a, b))
             return operate(a, b)
