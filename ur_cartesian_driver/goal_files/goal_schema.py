@@ -19,7 +19,7 @@ from typing import Any, TypeAlias
 
 from ur_cartesian_driver.motion.goal.field_table import Form, goal_fields, GoalField
 from ur_cartesian_driver.motion.goal.goal import Goal
-from ur_cartesian_driver.motion.goal.goal_table import SegmentRows, WaypointRows
+from ur_cartesian_driver.motion.goal.goal_columns import SegmentRows, WaypointRows
 
 #: A message, or an object with its fields.
 Message: TypeAlias = Any

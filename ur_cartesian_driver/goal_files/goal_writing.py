@@ -16,7 +16,7 @@ from ur_cartesian_driver.motion.goal.field_table import (
     in_order_of_files,
 )
 from ur_cartesian_driver.motion.goal.goal import Goal
-from ur_cartesian_driver.motion.goal.goal_table import (
+from ur_cartesian_driver.motion.goal.goal_columns import (
     goal_table,
     GoalRows,
     SegmentRows,

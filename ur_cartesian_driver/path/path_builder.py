@@ -40,7 +40,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     StaleOffset,
     Tolerance,
 )
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.path.centre_line import CentreLine, RestToRest
 from ur_cartesian_driver.path.outputs import Output

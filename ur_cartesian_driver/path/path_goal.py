@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.field_table import goal_fields, points_of, shifted
 from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable, SegmentRows, WaypointRows
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, SegmentRows, WaypointRows
 from ur_cartesian_driver.path.path_numbers import NANOSECONDS, to_nanoseconds
 from ur_cartesian_driver.path.path_points import PathPoint, SAME_POSITION
 from ur_cartesian_driver.planning.request.point_events.registry import EVENT_KINDS

@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     SegmentType,
     Waypoint,
 )
-from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable, rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import goal_table, GoalTable, rows_where
 from ur_cartesian_driver.motion.goal.known_frames import FRAMES_OF_TOOL
 from ur_cartesian_driver.planning.geometry.blended_path import curves_of
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline

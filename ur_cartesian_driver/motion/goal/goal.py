@@ -14,8 +14,9 @@ if messages name or represent it differently, :class:`~.field_table.Range` if no
 allowed, :class:`~.field_table.Mark` for other properties. Schema, reading, writing, conversion of
 users' values to the declared types, and checks of ranges and enumerations follow from these. Goals
 can have thousands of points, so the driver stores points and segments in columns
-(:mod:`~.goal_table`); ``WaypointColumns`` and ``SegmentColumns`` declare a column for each field,
-and its flat array in messages. Rules that concern more than one field are in ``planning.request``.
+(:mod:`~.goal_columns`); ``WaypointColumns`` and ``SegmentColumns`` declare a column for each
+field, and its flat array in messages. Rules that concern more than one field are in
+``planning.request``.
 
 To add a number to segments, declare it in MotionSegment.msg and PackedPoints.msg, in ``Segment``
 and ``SegmentColumns``, and use it where the motion is planned. Paths accept it by name, as in
