@@ -17,7 +17,7 @@ from importlib import import_module
 from types import SimpleNamespace
 from typing import Any, TypeAlias
 
-from ur_cartesian_driver.motion.goal.field_table import Form, goal_fields, GoalField
+from ur_cartesian_driver.motion.goal.field_annotations import Form, goal_fields, GoalField
 from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.goal.goal_columns import SegmentRows, WaypointRows
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any, TypeAlias
 
 from ur_cartesian_driver.goal_files.goal_packing import packed_fields
-from ur_cartesian_driver.motion.goal.field_table import (
+from ur_cartesian_driver.motion.goal.field_annotations import (
     Form,
     goal_fields,
     GoalField,

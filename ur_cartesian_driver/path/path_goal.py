@@ -13,7 +13,7 @@ from typing import Any
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal.field_table import goal_fields, points_of, shifted
+from ur_cartesian_driver.motion.goal.field_annotations import goal_fields, points_of, shifted
 from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType
 from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, SegmentRows, WaypointRows
 from ur_cartesian_driver.path.path_numbers import NANOSECONDS, to_nanoseconds

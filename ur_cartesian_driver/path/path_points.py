@@ -13,7 +13,7 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import Pose, Quaternion, rotate
 from ur_cartesian_driver.motion.geometry.vectors import add, Vector3, Vector6, vector6, ZERO6
 from ur_cartesian_driver.motion.goal.declared_types import with_declared_types, WrongType
-from ur_cartesian_driver.motion.goal.field_table import goal_fields
+from ur_cartesian_driver.motion.goal.field_annotations import goal_fields
 from ur_cartesian_driver.motion.goal.goal import ArcMode, Goal, Segment, Waypoint
 from ur_cartesian_driver.motion.state.rigid_body import acceleration_at, twist_at
 from ur_cartesian_driver.planning.request.field_rules import check_record

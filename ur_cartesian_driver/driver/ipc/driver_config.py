@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from ur_cartesian_driver.execution.goal.goal_monitor import MAX_PLAN_DEVIATION
 from ur_cartesian_driver.execution.offsets.feed_input import parse_feed_input
-from ur_cartesian_driver.motion.goal.field_table import Range
+from ur_cartesian_driver.motion.goal.field_annotations import Range
 from ur_cartesian_driver.robot.link_settings import LinkSettings, Port
 
 

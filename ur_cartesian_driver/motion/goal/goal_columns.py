@@ -24,7 +24,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
 from ur_cartesian_driver.motion.goal.declared_types import with_declared_types
-from ur_cartesian_driver.motion.goal.field_table import (
+from ur_cartesian_driver.motion.goal.field_annotations import (
     declared_columns,
     Form,
     goal_fields,

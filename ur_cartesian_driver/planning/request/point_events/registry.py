@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.goal.field_table import goal_fields, index_fields
+from ur_cartesian_driver.motion.goal.field_annotations import goal_fields, index_fields
 from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.planning.options import PlanningOptions
