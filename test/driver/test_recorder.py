@@ -226,7 +226,7 @@ def test_a_stalled_disk_costs_pieces_of_the_plan_with_a_warning_and_nothing_else
     recorder = Recorder(str(tmp_path), 100.0, warnings)
     recorder._start_workers()
     stalled = threading.Event()
-    recorder._writer.submit(lambda: stalled.wait() and None)
+    recorder._writer.submit(lambda: None if stalled.wait() else None)
     for _ in range(MAX_PENDING_JOBS):
         recorder._writer.submit(lambda: None)
     recorder.start(JOB, dict(METADATA), packet(0))
