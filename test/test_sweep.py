@@ -5,7 +5,7 @@
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 import csv
 from dataclasses import replace
-from math import pi
+from math import nan, pi
 import os
 
 import numpy as np
@@ -189,3 +189,19 @@ def test_the_command_refuses_what_is_too_much_or_contradicts(capsys):
     assert main(['sweep', 'square', '--monte-carlo', '2', '--calibration-seed', '1']) == 1
     assert 'draws calibrations of its own' in capsys.readouterr().err
     assert PlanningOptions() == VARIANT.options
+
+
+def test_the_map_is_of_what_a_user_can_choose_and_of_what_all_variants_share():
+    """Calibrations are no axis beside places, and variants need not have the same coordinates."""
+    places = at_places(VARIANT, x=(0.0, 0.02), y=(0.0, 0.01))
+    results = sweep([each for place in places for each in calibrated(place, 3)], Inline())
+    assert heat_map(results).splitlines()[1].split() == ['x', '/', 'y', '0', '0.02']
+    mixed = sweep([VARIANT, *at_places(VARIANT, x=(0.0, 0.02))], Inline())
+    assert heat_map(mixed).splitlines()[1].split() == ['x', '0', '0.02']
+
+
+def test_the_smallest_margin_is_one_that_is_known():
+    first, second = sweep([VARIANT, VARIANT], Inline())
+    unknown = replace(first, margins=replace(first.margins, clearance=nan))
+    for results in ([unknown, second], [second, unknown]):
+        assert summary(results) == summary([second, second])

@@ -371,13 +371,13 @@ def summary(results: Sequence[SweepResult]) -> str:
     text = f'{len(passed)} of {len(results)} variants pass'
     if not passed:
         return f'{text}.'
-    least = (
-        f'{title.split(" [")[0]} {_text(min(_value(r, name) for r in passed))} '
-        f'{title.split("[")[1].rstrip("]")}'
-        for name, title in COLUMNS.items()
-        if name != 'duration'
-    )
-    return f'{text}; smallest margins: {", ".join(least)}.'
+    margins = []
+    for name, title in COLUMNS.items():
+        if name != 'duration':
+            what, unit = title.rstrip(']').split(' [')
+            least = np.fmin.reduce([_value(r, name) for r in passed])  # NaN is not known
+            margins.append(f'{what} {_text(float(least))} {unit}')
+    return f'{text}; smallest margins: {", ".join(margins)}.'
 
 
 def _text(value: Coordinate) -> str:
@@ -392,7 +392,8 @@ def _axes(results: Sequence[SweepResult]) -> list[str]:
     for result in results:
         for name, value in result.variant.coordinates.items():
             values.setdefault(name, set()).add(value)
-    return sorted(values, key=lambda name: -len(values[name]))[:2]
+    # The arm's calibration only where there is nothing to choose.
+    return sorted(values, key=lambda name: (name == 'calibration', -len(values[name])))[:2]
 
 
 def _grid(
@@ -405,12 +406,13 @@ def _grid(
     """
     names = _axes(results)
     values: list[list[Coordinate]] = [
-        sorted({r.variant.coordinates[name] for r in results}, key=_order) for name in names
+        sorted({r.variant.coordinates.get(name, '') for r in results}, key=_order)
+        for name in names
     ]
     grid = np.full([len(each) for each in values], nan)
     for result in results:
         cell = tuple(
-            each.index(result.variant.coordinates[name])
+            each.index(result.variant.coordinates.get(name, ''))
             for name, each in zip(names, values, strict=True)
         )
         grid[cell] = np.fmin(grid[cell], _value(result, column) if result.passes else -inf)

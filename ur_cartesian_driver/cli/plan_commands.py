@@ -89,7 +89,12 @@ def show(arguments: argparse.Namespace) -> int:
                 return 1
             status, state = 1, planning.state
             page = refusal_page(
-                planning.goal, refusal, planning.arm, state.actual_q, state.T_flange_tcp
+                planning.goal,
+                refusal,
+                planning.arm,
+                state.actual_q,
+                state.T_flange_tcp,
+                planning.planes,
             )
     except ImportError as error:
         print(f'ur-cartesian show: {error}', file=sys.stderr)

@@ -16,8 +16,8 @@ The distance of two cylinders is at least their separation along any direction. 
 direction, both axes are shortened at both ends by :data:`_CUT` radii, to skeletons. The direction
 between the nearest points of the skeletons gives a bound in closed form: the distance of these
 points, less the length by which each cylinder reaches beyond its skeleton in this direction. Where
-cylinders may be close, a second direction raises the bound: that between points of theirs which
-alternate projections bring near to the nearest ones.
+cylinders may be close, a second direction raises the bound. It joins two points that approach the
+nearest ones, found by projecting alternately onto both cylinders.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ _REACH_SLACK = 0.02
 # error is 1e-6 of a length.
 _PARALLEL = 1e-12
 _TINY = 1e-300
-# How often a point is projected onto both bodies of a pair: once more gains 0.2 mm.
+# How often a point is projected onto both bodies of a pair: a third round would gain 0.2 mm.
 _PROJECTIONS = 2
 # The second direction is tried for the bodies of two links whose first bounds are within this [m]
 # of the least: any of them may be the nearest.
@@ -202,9 +202,9 @@ class CollisionBodies:
         Return a lower bound of the distance of each pair of links in :attr:`pairs`.
 
         :param q: (n, 6) [rad].
-        :param enough: a distance that is neither less than this [m] nor the smallest of all may be
-            replaced by a coarser lower bound, which is no less than either. This is faster if
-            consecutive rows are close to each other.
+        :param enough: distances from here on [m], except the smallest of all, may be replaced by
+            coarser lower bounds, but never by less than this or that smallest distance. This is
+            faster if consecutive rows are close to each other.
         :returns: (n, pairs) separation of their cylinders [m]; negative where these may overlap.
         """
         every = np.ones(len(self.pairs), dtype=np.bool_)

@@ -40,8 +40,11 @@ def plot(arguments: argparse.Namespace) -> int:
     """Draw a recording."""
     file = newest_recording(Path(arguments.file))
     picture = Path(arguments.output or file.with_suffix('.png'))
+    recording = Recording.load(file, MAX_ROWS)
+    if not len(recording.time):
+        raise ValueError(f'{file} has no packets, so there is nothing to draw')
     with timed('drawing'):
-        draw(Recording.load(file, MAX_ROWS), picture)
+        draw(recording, picture)
     print(f'picture: {picture}')
     return 0
 

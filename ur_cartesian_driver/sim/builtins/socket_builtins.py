@@ -23,11 +23,10 @@ from ur_cartesian_driver.urscript.script_values import INT_MAX, INT_MIN, to_text
 
 CONNECT_TIMEOUT = 2.0
 #: Largest number of reads of one socket in a cycle; a further read waits for the next
-#: cycle. With TCP's flow control, this bound holds back a peer that writes without a pause, so
-#: that the program can do its other work. The bound of a real controller is not published.
+#: cycle. Without it, a peer that never stops writing would keep the program reading for ever; with
+#: it, TCP's flow control slows the peer down. The bound of a real controller is not published.
 READS_PER_CYCLE = 32
-#: Largest number of values in one read of numbers, and of characters in one string that is read
-#: without a suffix.
+#: Most values in one read of numbers; most characters in one string that is read without a suffix.
 MAX_NUMBERS, MAX_CHARACTERS = 30, 1023
 MAX_PORT = 65_535
 
