@@ -437,7 +437,9 @@ class Controller:
         """
         program = self._stored_program(PurePosixPath(name).name)
         if isinstance(program, str):
-            self.programs.compile_first(program, lambda: then(self.load_program(name)))
+            self.programs.compile_first(
+                program, lambda mistake: then(mistake or self.load_program(name))
+            )
         else:
             then(self.load_program(name))
 

@@ -226,9 +226,17 @@ class ProgramRunner:
             self.start_failure = reason
         return bool(reason)
 
-    def compile_first(self, text: str, then: Callable[[], None]) -> None:
-        """Compile a program beside the cycles, so that loading it afterwards takes no time."""
-        self.compile_aside(lambda: self._compile_text(text), lambda _: then())
+    def compile_first(self, text: str, then: Callable[[str], None]) -> None:
+        """
+        Compile a program beside the cycles, so that loading it afterwards takes no time.
+
+        :param then: called with the mistake in the program; empty = there is none.
+        """
+
+        def end(compiled: CompiledProgram | CompileError) -> None:
+            then(str(compiled) if isinstance(compiled, CompileError) else '')
+
+        self.compile_aside(lambda: self._compile_text(text), end)
 
     def load(self, name: str, text: str) -> str:
         """
