@@ -196,7 +196,6 @@ def _whole(value: object, kind: Whole, key: str) -> int:
         names = {} if kind.choices is None else kind.choices.__members__
         choice = names.get(str(value).upper())
         meant = '' if choice is None else f'; {choice.name} is {choice.value}'
-        raise FieldError(
-            f'{key} is {value!r}, but must be a whole number from {kind.low} to {kind.high}{meant}.'
-        )
+        range_text = f'from {kind.low} to {kind.high}'
+        raise FieldError(f'{key} is {value!r}, but must be a whole number {range_text}{meant}.')
     return value
