@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings on disk: of a whole motion, of half a motion, and on a full disk."""
 
+from collections.abc import Callable
 import contextlib
 import json
 import os
@@ -13,6 +14,7 @@ import subprocess
 import sys
 import threading
 import tracemalloc
+from typing import cast
 
 import numpy as np
 import pytest
@@ -227,7 +229,7 @@ def test_a_stalled_disk_costs_pieces_of_the_plan_with_a_warning_and_nothing_else
     recorder = Recorder(str(tmp_path), 100.0, warnings)
     recorder._start_workers()
     stalled = threading.Event()
-    recorder._writer.submit(lambda: None if stalled.wait() else None)
+    recorder._writer.submit(cast('Callable[[], None]', stalled.wait))
     for _ in range(MAX_PENDING_JOBS):
         recorder._writer.submit(lambda: None)
     recorder.start(JOB, dict(METADATA), packet(0))

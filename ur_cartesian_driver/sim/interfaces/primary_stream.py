@@ -59,7 +59,7 @@ NO_TIMESTAMP = 2**64 - 1
 STATE_RATE = 10.0
 #: Reported limit of the joint accelerations [rad/s^2], as recorded on a UR5e.
 _JOINT_ACCELERATION = 40.0
-#: Type of the robot -> type of its controller box; the boxes of other robots are not known.
+#: Type of the robot -> type of its controller box; unknown for other robots, which report 4.
 _CONTROLLER_BOXES = {1: 4, 2: 5, 3: 6, 4: 16, 7: 10, 8: 11}
 _EMERGENCY = frozenset({SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP})
 #: Position limit [rad] that is sent for an endless joint, instead of infinity.
@@ -82,7 +82,7 @@ def version_frame(controller: Controller) -> bytes:
 
 
 class PrimaryStream:
-    """The data for all clients: messages at once, states periodically and at mode changes."""
+    """The data for all clients: messages at once, states periodically and at safety changes."""
 
     def __init__(self, controller: Controller) -> None:
         """Compute the sub-packages that never change."""

@@ -70,7 +70,8 @@ class CompileAside(Protocol):
         """Do the work, and call ``then`` with its result."""
 
 
-def _compile_at_once(work: Callable[[], T], then: Callable[[T], None]) -> None:
+def compile_at_once(work: Callable[[], T], then: Callable[[T], None]) -> None:
+    """Compile between two cycles."""
     then(work())
 
 
@@ -156,7 +157,7 @@ class ProgramRunner:
         #: Number of stops: a program that was sent before a stop does not start after the stop.
         self._stops = 0
         #: Function that compiles: at once, or in a thread while the cycles go on.
-        self.compile_aside: CompileAside = _compile_at_once
+        self.compile_aside: CompileAside = compile_at_once
 
     @property
     def current_thread(self) -> Hashable:
