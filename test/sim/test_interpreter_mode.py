@@ -44,6 +44,15 @@ def client(bench):
     return Client(bench)
 
 
+def test_a_character_is_a_byte_as_on_the_other_script_ports(bench, client):
+    """The manual of URScript: (extended) ASCII."""
+    statement = 'textmsg("Düse 1 µm")\n'.encode('latin-1')
+    answers = client.session.feed(statement)
+    bench.step()
+    assert answers + client.session.answers() == b'ack: 1: ' + statement
+    assert bench.log == ['Düse 1 µm']
+
+
 def test_statements_are_acknowledged_with_numbers_from_one_and_executed_in_order(bench, client):
     assert client.say('textmsg(n)', 'n = double(21)', 'textmsg(n)') == [
         'ack: 1: textmsg(n)',

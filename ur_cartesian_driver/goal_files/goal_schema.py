@@ -18,9 +18,9 @@ from importlib import import_module
 from types import SimpleNamespace
 from typing import Any, TypeAlias
 
-from ur_cartesian_driver.motion.goal.field_table import Form, goal_fields, GoalField
+from ur_cartesian_driver.motion.goal.field_annotations import Form, goal_fields, GoalField
 from ur_cartesian_driver.motion.goal.goal import Goal
-from ur_cartesian_driver.motion.goal.goal_table import SegmentRows, WaypointRows
+from ur_cartesian_driver.motion.goal.goal_columns import SegmentRows, WaypointRows
 
 #: A message, or an object with its fields.
 Message: TypeAlias = Any
@@ -185,9 +185,11 @@ def _slot_value(value: Any, slot: Any) -> Any:
 
 def _number(value: object, key: str) -> float:
     # YAML reads 1e-3 as a text, because its own notation is 1.0e-3.
-    with suppress(ValueError):
+    with suppress(ValueError, OverflowError):
         if isinstance(value, (int, float, str)) and not isinstance(value, bool):
             return float(value)
+    if isinstance(value, int) and not isinstance(value, bool):
+        raise FieldError(f'{key} is {value!r:.20}..., which is too large for a number.')
     raise FieldError(f'{key} is {value!r}, but must be a number.')
 
 
@@ -196,6 +198,8 @@ def _whole(value: object, kind: Whole, key: str) -> int:
         names = {} if kind.choices is None else kind.choices.__members__
         choice = names.get(str(value).upper())
         meant = '' if choice is None else f'; {choice.name} is {choice.value}'
-        range_text = f'from {kind.low} to {kind.high}'
-        raise FieldError(f'{key} is {value!r}, but must be a whole number {range_text}{meant}.')
+        raise FieldError(
+            f'{key} is {value!r:.60}, but must be a whole number from {kind.low} to '
+            f'{kind.high}{meant}.'
+        )
     return value

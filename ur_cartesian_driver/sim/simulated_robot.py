@@ -305,6 +305,8 @@ class SimulatedRobot:
                     connection.write(package)
             for client, client_connection in self._interpreter.session_connections:
                 client_connection.write(client.answers())
+            for _, dashboard_client in self._dashboard.session_connections:
+                dashboard_client.poll()
             for _, api_client in self._robot_api.session_connections:
                 api_client.poll()
             for message in stream.messages():

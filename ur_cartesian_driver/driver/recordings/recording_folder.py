@@ -199,14 +199,39 @@ def enforce_quota(
             path.unlink(missing_ok=True)
 
 
+def newest_recording(path: Path) -> Path:
+    """
+    Return the path of a recording; for a directory, the newest one in it.
+
+    Files and folders that do not have the name of a recording, such as renamed ones, are left out;
+    folders of motions that run or were killed count only if there is no file.
+
+    :raises OSError: the directory contains no recording.
+    """
+    if not path.is_dir() or path.suffix == disk.PART_SUFFIX:
+        return path
+    found = _recordings(path)
+    files = [each for each in found if each.suffix != disk.PART_SUFFIX]
+    if not found:
+        raise OSError(
+            f'there is no recording in {path}; see the parameter record_directory, and name a '
+            'file that was renamed'
+        )
+    return (files or found)[-1]
+
+
+def _recordings(directory: Path) -> list[Path]:
+    """Return all recordings of a directory, the oldest first."""
+    return sorted(p for p in directory.iterdir() if _RECORDING_NAME.fullmatch(p.name))
+
+
 def _unused_recordings(directory: Path) -> list[Path]:
     """Return the recordings that no process writes, the oldest first."""
-    return sorted(
+    return [
         path
-        for path in directory.iterdir()
-        if _RECORDING_NAME.fullmatch(path.name)
-        and not (path.suffix == disk.PART_SUFFIX and _is_written(path))
-    )
+        for path in _recordings(directory)
+        if path.suffix != disk.PART_SUFFIX or not _is_written(path)
+    ]
 
 
 def _size(recording: Path) -> int:

@@ -191,7 +191,10 @@ def _member_of(kind: type[IntEnum]) -> Convert:
     def convert(value: Any) -> Any:
         if type(value) is kind:
             return value
-        number = _int(value)
+        try:
+            number = _int(value)
+        except WrongType:
+            raise _wrong(value, kind.__name__) from None
         try:
             return kind(number)
         except ValueError:

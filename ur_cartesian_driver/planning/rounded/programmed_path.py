@@ -23,7 +23,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     distance_rows,
     keep_hemisphere,
 )
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.planning.geometry.blended_path import curves_of
 from ur_cartesian_driver.planning.geometry.samples import STEP_ANGLE, STEP_LENGTH
 from ur_cartesian_driver.planning.request.validate import arc_error

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ur_cartesian_driver.motion.state.rtde_state import RobotStatus, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotStatus, SafetyMode
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     encode_message,
     encode_state,
@@ -30,6 +30,7 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
     ToolModeInfo,
 )
 from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.programs.program_runner import PAUSED
 from ur_cartesian_driver.sim.rtde_output_values import COMPUTED, FIXED
 
 #: Field of a sub-package -> RTDE output with the same meaning.
@@ -127,7 +128,7 @@ class PrimaryStream:
 
 def _mode(controller: Controller) -> RobotModeData:
     state, safety = controller.programs.state, controller.safety.mode
-    paused = state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
+    paused = state in PAUSED
     return RobotModeData(
         timestamp=round(controller.timestamp * 1e6),
         power_on=bool(controller.robot_status & RobotStatus.POWER_ON),
