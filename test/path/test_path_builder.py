@@ -344,11 +344,15 @@ def test_a_weave_swings_evenly_along_a_line_and_an_arc():
         (lambda: digital(9), 'the pin of standard digital output 9 is 9'),
         (
             lambda: START.by(dx=0.1).set(TORCH, True, before=0.1),
-            'set() at point 0 has before=0.1 s, but no motion with a duration',
+            'set() at point 0 has before=0.1 s, but the motion to this point has no duration',
+        ),
+        (
+            lambda: START.by(dx=0.1, duration=1).set(TORCH, True, before=0.1, after=0.2),
+            'set() at point 0 combines before with after; use one of them.',
         ),
         (
             lambda: START.by(dx=0.1, duration=1).set(TORCH, True, before=0.1, fraction=-0.5),
-            'set() at point 0 has before=0.1 s and a place beside the point',
+            'set() at point 0 combines before with distance or fraction',
         ),
         (
             lambda: START.by(dx=0.1).set(TORCH, True, distance='8mm'),  # type: ignore[arg-type]
@@ -690,7 +694,8 @@ def test_beside_a_spline_the_tool_has_the_speed_of_its_turn():
         ),
         (
             lambda: Path(HERE).by(dy=0.1).call('f').wait_for(digital_input(3), timeout=2.0),
-            'follows a call(), which comes after it; let the function wait',
+            'is written after call(), but at one point the robot waits before it calls; let the '
+            'function wait',
         ),
     ],
 )

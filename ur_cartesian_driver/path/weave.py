@@ -39,7 +39,11 @@ def strokes(start: Pose, points: Sequence[PathPoint]) -> list[Stroke]:
             )
         stroke = _stroke(before, point)
         if stroke is None or stroke.length <= SAME_POSITION:
-            raise InvalidGoal(where, 'has a motion that is no line or arc', 'use line() or arc()')
+            raise InvalidGoal(
+                where,
+                'has a motion that is no line or arc',
+                'use line() or arc(), without `optimized` and `follow`',
+            )
         if found and not found[-1].is_smooth_into(stroke):
             raise InvalidGoal(
                 f'weave() at point {i - 1}', 'has a corner', 'weave each leg and join them'
