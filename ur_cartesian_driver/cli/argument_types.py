@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
+from os.path import samefile
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -126,3 +128,10 @@ def seconds(text: str) -> float:
     if not 0.0 <= number <= MAX_SECONDS:  # or NaN
         raise argparse.ArgumentTypeError(f'{number:g} s is not within 0 and {MAX_SECONDS:g} s')
     return number
+
+
+def is_same_file(one: str | None, other: str | None) -> bool:
+    """Return whether two options name one file that exists."""
+    with suppress(OSError):
+        return bool(one and other) and samefile(str(one), str(other))
+    return False

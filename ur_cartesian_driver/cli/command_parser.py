@@ -472,7 +472,9 @@ def _add_teach(command: CommandParser) -> None:
     from ur_cartesian_driver.cli import teach_command
 
     command.set_defaults(run=teach_command.teach_path)
-    command.add_argument('-o', '--output', default='path.yaml', help='goal file')
+    command.add_argument(
+        '-o', '--output', help='goal file; path.yaml by default, which must not exist yet'
+    )
     _add_own_driver(command)
     command.add_argument(
         '--speed', type=argument_types.factor, help="of lines and arcs [m/s]; else the driver's"
