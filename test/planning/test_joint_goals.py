@@ -163,6 +163,30 @@ def test_a_trajectory_that_is_too_fast_is_slowed_as_a_whole(cell):
         planned(cell, goal, max_tool_speed=0.2, on_too_fast='slow', max_segment_time=0.6)
 
 
+def test_the_acceleration_where_a_cubic_begins_counts(cell):
+    """The joint starts off from a point with 3 d / T^2, and arrives at the next one with 0."""
+    d, T = 0.2, 0.2
+    rows = [np.zeros(6), *(np.array([0.0, 0.0, 0.0, 0.0, 0.0, by]) for by in (d, d + 0.75))]
+    speeds = (0.0, 1.5 * d / T, 0.0)
+    points = tuple(
+        JointPoint(
+            time=time, positions=np.add(cell.state.actual_q, row), velocities=(*ZERO[:5], speed)
+        )
+        for time, row, speed in zip((1.0, 1.0 + T, 2.0 + T), rows, speeds, strict=True)
+    )
+    goal, most = JointGoal(joint_names=JOINT_NAMES, points=points), 3.0 * d / T**2
+    text = (
+        r'points\[1\]\.time_from_start gives too little time: at 0 % of it wrist_3_joint needs '
+        rf'{most:.3f} rad/s\^2, more than max_joint_acceleration = {0.99 * most:.3f}'
+    )
+    planned(cell, goal, max_joint_acceleration=1.01 * most)
+    with pytest.raises(TooFast, match=text):
+        planned(cell, goal, max_joint_acceleration=0.99 * most)
+    slow = planned(cell, goal, max_joint_acceleration=0.5 * most, on_too_fast='slow')
+    q, dt = spline_of(slow).rows(np.linspace(0.0, slow.duration, 20_001))[0], slow.duration / 20e3
+    assert np.abs(np.diff(q, 2, axis=0) / dt**2).max() == pytest.approx(0.5 * most, rel=1e-3)
+
+
 def test_points_may_be_a_millisecond_apart(cell):
     times = [0.5 + 0.001 * k for k in range(200)]  # as sums of decimals are
     points = tuple(JointPoint(positions=cell.state.actual_q, time=time) for time in times)

@@ -544,6 +544,38 @@ def test_accelerations_are_slowed_to_their_limit_and_no_further(cell, linear):
     assert most == pytest.approx(limit, rel=0.05)
 
 
+@pytest.mark.parametrize('linear', [True, False], ids=['tool', 'joints'])
+def test_the_acceleration_where_a_cubic_begins_is_slowed_to_its_limit(cell, linear):
+    """
+    The tool starts off from point 0 with 3 d / T^2, and arrives at point 1 with 0.
+
+    Judged by second differences of places and joints, a millisecond apart.
+    """
+    d, T = 0.02, 0.2
+    goal = Goal(
+        waypoints=(
+            cell.point(0.0, 0.01, time=1.0),
+            cell.point(0.0, 0.01 + d, time=1.0 + T, twist=(0.0, 1.5 * d / T, 0, 0, 0, 0)),
+            cell.point(0.0, 0.01 + 3.0 * d, time=2.0 + T),
+        ),
+        execution=SPLINE,
+    )
+    bounds: dict[str, Any] = {}
+    for factor in (1.0, 0.25):
+        options = replace(OPTIONS, on_too_fast='slow', **bounds)
+        made = plan(goal, cell.state, cell.arm, options)
+        q = joints_of(made).rows(np.arange(0.0, made.duration, 1e-3))[0]
+        x = tcp_rows(cell.arm, cell.T_flange_tcp, q)[:, :3] if linear else q
+        needed = np.diff(x, 2, axis=0) / 1e-3**2
+        most = np.linalg.norm(needed, axis=1).max() if linear else np.abs(needed).max()
+        if not bounds:
+            assert most == pytest.approx(3.0 * d / T**2, rel=0.02) or not linear
+            bounds = {f'max_{"linear" if linear else "joint"}_acceleration': 0.25 * most}
+            needed_before = most
+        # The joint pieces have a little more or less than the spline of the tool.
+        assert most == pytest.approx(factor * needed_before, rel=0.02)
+
+
 def test_a_workspace_plane_is_kept_between_the_points_too(cell):
     low = cell.home.position[2] - 0.03
     plane = replace(OPTIONS, workspace_planes=(f'table 0 0 {low} 0 0 1',))

@@ -18,8 +18,8 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded, NotAvailable
-from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
-from ur_cartesian_driver.motion.geometry.polynomials import evaluate, MotionRows
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
+from ur_cartesian_driver.motion.geometry.polynomials import evaluate, MotionRows, values
 from ur_cartesian_driver.motion.geometry.pose_rows import keep_hemisphere
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import ContactEnd, Press, START_OF_MOTION
@@ -47,6 +47,7 @@ from ur_cartesian_driver.planning.spline.joint_polynomials import JointKnots, pi
 from ur_cartesian_driver.planning.spline.spline_limits import (
     RateSamples,
     stretch_remark,
+    with_begins,
     worst_excess_of,
 )
 from ur_cartesian_driver.planning.spline.spline_path import coarse_samples, sample_count
@@ -79,11 +80,15 @@ class _Trajectory(JointKnots):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Samples(RateSamples):
+class _Samples:
     """Joints and tool along a trajectory; row 0 is the start."""
 
+    #: (m,) the point to which each sample's piece leads.
+    points: Int32s
     #: (m,) the piece of each sample.
     piece: Indices
+    #: (m,) the fraction of the piece's time at each sample.
+    u: Floats
     #: (m, 6) joint positions [rad].
     q: Floats
     #: (m, 7) poses of the TCP in base.
@@ -111,7 +116,8 @@ def plan_joint_goal(
     given = _trajectory(checked, state, options)
     samples = _sampled(given, state, arm)
     _check_ranges(samples, arm)
-    trajectory, remark = _fit_to_limits(given, samples, arm, options)
+    rates = _rates(given, samples, state, arm)
+    trajectory, remark = _fit_to_limits(given, rates, arm, options)
     path = JointSamples(samples.points[1:], samples.u[1:], samples.q[1:])
     clearance = clearance_lines(arm, (state.T_flange_tcp,), options, path, state.actual_q)
     poses = samples.poses.copy()
@@ -271,19 +277,29 @@ def _sampled(trajectory: _Trajectory, state: RobotState, arm: Arm) -> _Samples:
     )
     piece, number = (np.concatenate([[0], rows]) for rows in counted(count))
     u = number / count[piece]
-    t = u * np.diff(times)[piece]
-    q, qd, qdd = evaluate(spline.coefficients[piece], t)
-    twists, accelerations = tool_rates(arm, state.T_flange_tcp, q, qd, qdd)
+    q = values(spline.coefficients[piece], u * np.diff(times)[piece])
     return _Samples(
+        points=(trajectory.first + piece).astype(np.int32),
         piece=piece,
         u=u,
         q=q,
-        qd=qd,
-        qdd=qdd,
         poses=tcp_rows(arm, state.T_flange_tcp, q),
+    )
+
+
+def _rates(trajectory: _Trajectory, samples: _Samples, state: RobotState, arm: Arm) -> RateSamples:
+    """Return the rates of joints and tool at the samples, and where later pieces begin."""
+    piece, u = with_begins(samples.piece, samples.u)
+    t = u * np.diff(trajectory.times)[piece]
+    q, qd, qdd = evaluate(trajectory.spline.coefficients[piece], t)
+    twists, accelerations = tool_rates(arm, state.T_flange_tcp, q, qd, qdd)
+    return RateSamples(
+        points=(trajectory.first + piece).astype(np.int32),
+        u=u,
         twists=twists,
         accelerations=accelerations,
-        points=(trajectory.first + piece).astype(np.int32),
+        qd=qd,
+        qdd=qdd,
     )
 
 
@@ -303,10 +319,10 @@ def _check_ranges(samples: _Samples, arm: Arm) -> None:
 
 
 def _fit_to_limits(
-    trajectory: _Trajectory, samples: _Samples, arm: Arm, options: PlanningOptions
+    trajectory: _Trajectory, rates: RateSamples, arm: Arm, options: PlanningOptions
 ) -> tuple[_Trajectory, tuple[str, ...]]:
     """Return the trajectory, slowed if the limits require it, and a remark on the slowing."""
-    found = worst_excess_of(samples, arm.model, options)
+    found = worst_excess_of(rates, arm.model, options)
     if found is None:
         return trajectory, ()
     if options.on_too_fast != 'slow':

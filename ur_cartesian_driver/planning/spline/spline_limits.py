@@ -19,7 +19,7 @@ import numpy as np
 from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
-from ur_cartesian_driver.motion.geometry.arrays import Floats, Int32s
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
@@ -128,18 +128,29 @@ def worst_excess(
     kinematics: TcpKinematics, path: SplinePath, options: PlanningOptions
 ) -> LimitExcess | None:
     """Return the quantity along a path that exceeds its limit most; None if none does."""
-    begin, end = path.spline.times[path.piece], path.spline.times[path.piece + 1]
-    twists, accelerations = path.spline.rates(path.piece, path.u * (end - begin))
-    qd, qdd = joint_rates(kinematics.arm, kinematics.T_flange_tcp, path.q, twists, accelerations)
+    piece, u = with_begins(path.piece, path.u)
+    q = np.concatenate([path.q, path.q[np.flatnonzero(np.diff(path.piece))]])
+    twists, accelerations = path.spline.rates(piece, u * np.diff(path.spline.times)[piece])
+    qd, qdd = joint_rates(kinematics.arm, kinematics.T_flange_tcp, q, twists, accelerations)
     samples = RateSamples(
-        points=path.points,
-        u=path.fractions,
+        points=(path.first + piece).astype(np.int32),
+        u=u,
         twists=twists,
         accelerations=accelerations,
         qd=qd,
         qdd=qdd,
     )
     return worst_excess_of(samples, kinematics.arm.model, options)
+
+
+def with_begins(piece: Indices, u: Floats) -> tuple[Indices, Floats]:
+    """
+    Return samples (m,), and after them the begin of each piece but the first.
+
+    Where pieces meet, the accelerations of cubics jump; the samples have those before the jump.
+    """
+    later = np.arange(1, piece[-1] + 1)
+    return np.append(piece, later), np.append(u, np.zeros(len(later)))
 
 
 def worst_excess_of(
