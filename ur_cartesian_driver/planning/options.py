@@ -217,8 +217,8 @@ class PlanningOptions:
     #: Time after the last live target at which the session ends [s].
     live_target_timeout: Annotated[float, Range(0.1, 3600.0)] = 2.0
 
-    #: Largest acceleration of the tool that the times of a goal, or the arcs in which PROCESS
-    #: rounds its corners, may need [m/s^2].
+    #: Largest acceleration of the tool that the times of a goal, or the speed on its arcs, may
+    #: need [m/s^2]: CIRCULAR ones, and those in which PROCESS rounds corners.
     max_linear_acceleration: Annotated[float, Range(0.1, 100.0)] = 10.0
     #: Largest angular acceleration of the tool that the times of a goal may need [rad/s^2].
     max_angular_acceleration: Annotated[float, Range(0.1, 1000.0)] = 40.0
