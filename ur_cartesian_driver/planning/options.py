@@ -232,6 +232,7 @@ class PlanningOptions:
     #: pieces on the wire.
     spline_tolerance: Annotated[float, Range(1e-6, 0.01)] = 0.00005
     #: Deceleration of the fastest joint when a goal with keep_open runs out of points [rad/s^2].
+    #: Near the end of a range, the arm brakes with up to max_joint_acceleration.
     keep_open_deceleration: Annotated[float, Range(0.1, 100.0)] = 4.0
     #: Longest duration of one segment [s]; the default is the largest that the robot accepts.
     max_segment_time: Annotated[float, Range(0.1, NEWEST_DIALECT.max_duration)] = (

@@ -425,7 +425,7 @@ class _PartPlanner:
 
     def _stop(self, end: SplineState) -> tuple[PlannedSegment, ReferencePath]:
         """Return the piece that stops the arm after the last point, and the path of the piece."""
-        piece = plan_stop(end, self._arm, self._options.keep_open_deceleration)
+        piece = plan_stop(end, self._arm, self._options, self._points - 1)
         times = np.linspace(0.0, piece.duration, _STOP_ROWS + 1)
         q, _, _ = rows_along(piece, end, len(times))
         return unreported_segment(piece, self._points - 1), ReferencePath(
