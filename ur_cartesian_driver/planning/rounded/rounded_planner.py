@@ -32,7 +32,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
-from ur_cartesian_driver.planning.geometry.samples import sample_parameters
+from ur_cartesian_driver.planning.geometry.samples import check_sample_count, sample_parameters
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
@@ -53,7 +53,6 @@ from ur_cartesian_driver.planning.spline.joint_polynomials import (
     JointPolynomials,
 )
 from ur_cartesian_driver.planning.spline.spline_path import (
-    check_sample_count,
     solve_spline_path,
     spline_pieces,
     SplinePath,
