@@ -12,7 +12,12 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.motion.plan.slow_stretch import name_points
-from ur_cartesian_driver.planning.request.goal_fields import is_timed, TAKES_TOOL_SPEED, type_table
+from ur_cartesian_driver.planning.request.goal_fields import (
+    is_rounded,
+    is_timed,
+    TAKES_TOOL_SPEED,
+    type_table,
+)
 
 #: Types of segments that, if the goal has times, are sent with a time and ignore acceleration.
 _IS_TIMED = type_table((SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT))
@@ -34,7 +39,12 @@ def ignored_remarks(goal: GoalTable, first: int = 0) -> list[str]:
         )
     add(
         points.accelerations.any(axis=1),
-        'acceleration is ignored: UR motion commands cannot meet it',
+        'acceleration is ignored: '
+        + (
+            'corners are rounded with those of the segments'
+            if is_rounded(goal)
+            else 'UR motion commands cannot meet it'
+        ),
     )
     add(points.jerks.any(axis=1), 'jerk is ignored: no robot motion takes it')
     if timed:
