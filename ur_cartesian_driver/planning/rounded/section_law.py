@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
-from ur_cartesian_driver.planning.rounded.path_joints import path_joints, ToolPeaks
+from ur_cartesian_driver.planning.rounded.joint_derivatives import joint_derivatives, ToolPeaks
 from ur_cartesian_driver.planning.rounded.programmed_path import ProgrammedSection
 from ur_cartesian_driver.planning.rounded.rounded_path import PathRows, RoundedPath
 from ur_cartesian_driver.planning.rounded.time_law import (
@@ -169,7 +169,7 @@ class SectionLaw:
         #: By name of a limit: the greatest ds/dt that it allows at each place (m,).
         self.caps = self._tool_caps()
         derivatives = np.concatenate([x1, w1], axis=1), np.concatenate([x2, w2], axis=1)
-        self._joints = path_joints(
+        self._joints = joint_derivatives(
             kinematics, q_start, s, poses, derivatives, self._tool_peaks(), options
         )
         #: The configuration at the end of the section [rad].
