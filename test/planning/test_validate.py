@@ -751,7 +751,7 @@ REFUSALS = [
             presses=(GRIND,),
         ),
         InvalidGoal,
-        'segments[2].type is CIRCULAR, but it begins where presses[0] has brought the tool',
+        'segments[2].type is CIRCULAR, but presses[0] may have displaced the tool at its start',
     ),
     (
         with_fields(PLAIN, presses=(GRIND,), keep_open=True),

@@ -333,7 +333,12 @@ class SectionLaw:
         return excess
 
     def _excess_at(self, law: PathTimes, jerk: Floats, at: Indices) -> Floats:
-        """Return the greatest such ratio (b,) of a law at some times; ``at`` = places before."""
+        """
+        Return the greatest ratio (b,) of a quantity to its limit at b times.
+
+        :param law: the law at these times; ``jerk``: (b,) its third derivative there.
+        :param at: (b,) the numbers of the places before these times.
+        """
         samples, tool, joints = self.samples, self._tool, self._joints
         part = ((law.s - samples.s[at]) / (samples.s[at + 1] - samples.s[at]))[:, None]
         row = self._rows_between[at]
