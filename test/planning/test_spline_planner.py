@@ -577,6 +577,25 @@ def test_the_acceleration_where_a_cubic_begins_is_slowed_to_its_limit(cell, line
         assert most == pytest.approx(factor * needed_before, rel=0.02)
 
 
+@pytest.mark.parametrize('T', [0.004, 0.02])
+def test_the_acceleration_within_a_short_piece_is_found(cell, T):
+    """From rest to rest, a quintic needs 10 / sqrt(3) of the turn / T^2."""
+    most, options = 35.0, replace(OPTIONS, max_joint_acceleration=1000.0)
+    turn = most * T**2 * 3.0**0.5 / 10.0
+    goal = Goal(
+        waypoints=(
+            cell.point(0.001, time=1.0, acceleration=(1e-9, 0, 0, 0, 0, 0)),
+            cell.point(0.001, time=1.0 + T, turn=(0.0, 0.0, turn)),
+        ),
+        execution=SPLINE,
+    )
+    plan(goal, cell.state, cell.arm, replace(options, max_angular_acceleration=1.003 * most))
+    low = replace(options, max_angular_acceleration=0.997 * most)
+    text = refused(TooFast, cell, goal, low)
+    found = float(text.split('the tool needs ')[1].split(' rad/s^2')[0])
+    assert found == pytest.approx(most, rel=0.002)
+
+
 def test_a_workspace_plane_is_kept_between_the_points_too(cell):
     low = cell.home.position[2] - 0.03
     plane = replace(OPTIONS, workspace_planes=(f'table 0 0 {low} 0 0 1',))

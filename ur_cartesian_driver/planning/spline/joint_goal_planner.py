@@ -16,6 +16,7 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
+from ur_cartesian_driver.kinematics.inverse import format_distinct
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded, NotAvailable
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
@@ -47,8 +48,7 @@ from ur_cartesian_driver.planning.spline.joint_polynomials import JointKnots, pi
 from ur_cartesian_driver.planning.spline.spline_limits import (
     RateSamples,
     stretch_remark,
-    with_begins,
-    worst_excess_of,
+    worst_excess_between,
 )
 from ur_cartesian_driver.planning.spline.spline_path import coarse_samples, sample_count
 from ur_cartesian_driver.planning.spline.spline_planner import stretch_times
@@ -59,6 +59,9 @@ from ur_cartesian_driver.planning.stop_prediction import at_set_point
 _MAX_MONOTONE = 3.0
 # Rounding of a joint position [rad].
 _ROUNDING = 1e-9
+# A joint may leave its range between samples if it comes closer than this at samples [rad]; its
+# positions on such a piece are computed at this many steps.
+_NEAR, _DENSE = 0.02, 256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -115,9 +118,8 @@ def plan_joint_goal(
     check_approach(state, table.waypoints.pose(0), options)
     given = _trajectory(checked, state, options)
     samples = _sampled(given, state, arm)
-    _check_ranges(samples, arm)
-    rates = _rates(given, samples, state, arm)
-    trajectory, remark = _fit_to_limits(given, rates, arm, options)
+    _check_ranges(given, samples, arm)
+    trajectory, remark = _fit_to_limits(given, samples, state, arm, options)
     path = JointSamples(samples.points[1:], samples.u[1:], samples.q[1:])
     clearance = clearance_lines(arm, (state.T_flange_tcp,), options, path, state.actual_q)
     poses = samples.poses.copy()
@@ -287,42 +289,53 @@ def _sampled(trajectory: _Trajectory, state: RobotState, arm: Arm) -> _Samples:
     )
 
 
-def _rates(trajectory: _Trajectory, samples: _Samples, state: RobotState, arm: Arm) -> RateSamples:
-    """Return the rates of joints and tool at the samples, and where later pieces begin."""
-    piece, u = with_begins(samples.piece, samples.u)
-    t = u * np.diff(trajectory.times)[piece]
-    q, qd, qdd = evaluate(trajectory.spline.coefficients[piece], t)
-    twists, accelerations = tool_rates(arm, state.T_flange_tcp, q, qd, qdd)
-    return RateSamples(
-        points=(trajectory.first + piece).astype(np.int32),
-        u=u,
-        twists=twists,
-        accelerations=accelerations,
-        qd=qd,
-        qdd=qdd,
-    )
-
-
-def _check_ranges(samples: _Samples, arm: Arm) -> None:
+def _check_ranges(trajectory: _Trajectory, samples: _Samples, arm: Arm) -> None:
     low, high = np.array(arm.model.position_limits).T
+    # A joint that turns back between two samples gets a little farther than at these.
     q = samples.q
+    close = ((q < low + _NEAR) | (q > high - _NEAR)).any(axis=1)
+    if not close.any():
+        return
+    pieces, u = np.unique(samples.piece[close]), np.linspace(0.0, 1.0, _DENSE + 1)
+    piece, u = np.repeat(pieces, len(u)), np.tile(u, len(pieces))
+    q = values(trajectory.spline.coefficients[piece], u * np.diff(trajectory.times)[piece])
     outside = (q < low - _ROUNDING) | (q > high + _ROUNDING)
     if not outside.any():
         return
     row = int(np.flatnonzero(outside.any(axis=1))[0])
     k = int(np.argmax(outside[row]))
+    bound = float(low[k] if q[row, k] < low[k] else high[k])
     raise JointLimitExceeded(
-        f'{point_field(int(samples.points[row]), "positions")}, at '
-        f'{100.0 * samples.u[row]:.1f} % of its segment: {JOINT_NAMES[k]} turns to '
-        f'{q[row, k]:.4f} rad, its range is {arm.model.range_text(k)}; keep it within.'
+        f'{point_field(trajectory.first + int(piece[row]), "positions")}, at '
+        f'{100.0 * u[row]:.1f} % of its segment: {JOINT_NAMES[k]} turns to '
+        f'{format_distinct(float(q[row, k]), bound)[0]} rad, its range is '
+        f'{arm.model.range_text(k)}; keep it within.'
     )
 
 
 def _fit_to_limits(
-    trajectory: _Trajectory, rates: RateSamples, arm: Arm, options: PlanningOptions
+    trajectory: _Trajectory,
+    samples: _Samples,
+    state: RobotState,
+    arm: Arm,
+    options: PlanningOptions,
 ) -> tuple[_Trajectory, tuple[str, ...]]:
     """Return the trajectory, slowed if the limits require it, and a remark on the slowing."""
-    found = worst_excess_of(rates, arm.model, options)
+
+    def rates(piece: Indices, u: Floats) -> RateSamples:
+        t = u * np.diff(trajectory.times)[piece]
+        q, qd, qdd = evaluate(trajectory.spline.coefficients[piece], t)
+        twists, accelerations = tool_rates(arm, state.T_flange_tcp, q, qd, qdd)
+        return RateSamples(
+            points=(trajectory.first + piece).astype(np.int32),
+            u=u,
+            twists=twists,
+            accelerations=accelerations,
+            qd=qd,
+            qdd=qdd,
+        )
+
+    found = worst_excess_between(rates, samples.piece, samples.u, arm.model, options)
     if found is None:
         return trajectory, ()
     if options.on_too_fast != 'slow':

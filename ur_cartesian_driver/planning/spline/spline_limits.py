@@ -9,7 +9,7 @@ speeds and 1/f^2 of the accelerations.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import ceil
 from typing import TypeAlias
@@ -21,12 +21,18 @@ from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
+from ur_cartesian_driver.planning.geometry.samples import MIN_SAMPLES
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 
 _ROUNDING = 1e-6
+# Fractions of a short piece at which its rates are computed, beside those at its samples.
+_QUARTERS = (0.25, 0.5, 0.75)
+# The rates of a piece are computed at this many steps if a quantity may exceed the known greatest
+# excess by this factor between samples; so many pieces at a time, to save memory.
+_DENSE, _HIGHER, _BLOCK = 64, 1.001, 1024
 
 
 #: A quantity along a spline: name of the tool or joint to which it belongs, values (m,), limit,
@@ -128,29 +134,75 @@ def worst_excess(
     kinematics: TcpKinematics, path: SplinePath, options: PlanningOptions
 ) -> LimitExcess | None:
     """Return the quantity along a path that exceeds its limit most; None if none does."""
-    piece, u = with_begins(path.piece, path.u)
-    q = np.concatenate([path.q, path.q[np.flatnonzero(np.diff(path.piece))]])
-    twists, accelerations = path.spline.rates(piece, u * np.diff(path.spline.times)[piece])
-    qd, qdd = joint_rates(kinematics.arm, kinematics.T_flange_tcp, q, twists, accelerations)
-    samples = RateSamples(
-        points=(path.first + piece).astype(np.int32),
-        u=u,
-        twists=twists,
-        accelerations=accelerations,
-        qd=qd,
-        qdd=qdd,
-    )
-    return worst_excess_of(samples, kinematics.arm.model, options)
+    sampled = path.piece + path.u
+
+    def rates(piece: Indices, u: Floats) -> RateSamples:
+        q = np.stack([np.interp(piece + u, sampled, joint) for joint in path.q.T], axis=1)
+        twists, accelerations = path.spline.rates(piece, u * np.diff(path.spline.times)[piece])
+        qd, qdd = joint_rates(kinematics.arm, kinematics.T_flange_tcp, q, twists, accelerations)
+        return RateSamples(
+            points=(path.first + piece).astype(np.int32),
+            u=u,
+            twists=twists,
+            accelerations=accelerations,
+            qd=qd,
+            qdd=qdd,
+        )
+
+    return worst_excess_between(rates, path.piece, path.u, kinematics.arm.model, options)
 
 
-def with_begins(piece: Indices, u: Floats) -> tuple[Indices, Floats]:
+def worst_excess_between(
+    rates: Callable[[Indices, Floats], RateSamples],
+    piece: Indices,
+    u: Floats,
+    model: RobotModel,
+    options: PlanningOptions,
+) -> LimitExcess | None:
     """
-    Return samples (m,), and after them the begin of each piece but the first.
+    Return the quantity that exceeds its limit most, also between samples; None if none does.
 
-    Where pieces meet, the accelerations of cubics jump; the samples have those before the jump.
+    :param rates: returns the samples (m,) at fractions of pieces, both (m,).
+    :param piece: (n,) pieces of samples that follow the path closely; ``u``: (n,) the fractions.
     """
-    later = np.arange(1, piece[-1] + 1)
-    return np.append(piece, later), np.append(u, np.zeros(len(later)))
+    count = np.bincount(piece)
+    short = np.flatnonzero(count < MIN_SAMPLES)
+    # Accelerations of cubics jump where pieces meet; those of quintics peak near the quarters.
+    later, inner = np.arange(1, len(count)), np.array(_QUARTERS)
+    piece = np.concatenate([piece, later, np.repeat(short, len(inner))])
+    u = np.concatenate([u, np.zeros(len(later)), np.tile(inner, len(short))])
+    order = np.lexsort((u, piece))
+    piece, u = piece[order], u[order]
+    samples = rates(piece, u)
+    found = worst_excess_of(samples, model, options)
+    possible = np.zeros(len(piece))
+    for _, values, limit, power, *_ in _quantities(samples, model, options):
+        factors = (_possible_peaks(values, piece) / limit) ** (1.0 / power)
+        possible = np.maximum(possible, factors)
+    high = np.unique(piece[possible > _HIGHER * (found.factor if found else 1.0)])
+    dense = np.linspace(0.0, 1.0, _DENSE + 1)
+    for begin in range(0, len(high), _BLOCK):
+        block = high[begin : begin + _BLOCK]
+        every = rates(np.repeat(block, len(dense)), np.tile(dense, len(block)))
+        between = worst_excess_of(every, model, options)
+        if between and (not found or between.factor > found.factor):
+            found = between
+    return found
+
+
+def _possible_peaks(values: Floats, piece: Indices) -> Floats:
+    """
+    Return how high a quantity (n,) may get beside each sample of pieces (n,).
+
+    A parabola through three samples is higher than these by up to an eighth of their second
+    difference; twice as much is allowed for.
+    """
+    bend = np.zeros(len(values))
+    bend[1:-1] = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
+    bend[1:-1][piece[2:] != piece[:-2]] = 0.0
+    around = np.maximum(bend, np.maximum(np.append(bend[1:], 0.0), np.append(0.0, bend[:-1])))
+    peaks: Floats = values + 0.25 * around
+    return peaks
 
 
 def worst_excess_of(
