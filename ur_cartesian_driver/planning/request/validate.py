@@ -169,6 +169,12 @@ def _supported(goal: GoalTable, options: PlanningOptions) -> None:
             'limits nothing, so that the arm is never off its path; on_path_tolerance is STALL',
             'set a limit, or on_path_tolerance to ABORT',
         )
+    if goal.stall_timeout and goal.on_path_tolerance != OnPathTolerance.STALL:
+        raise InvalidGoal(
+            'stall_timeout',
+            f'is {goal.stall_timeout:g} s, but on_path_tolerance is ABORT, which waits for no arm',
+            'set on_path_tolerance to STALL, or stall_timeout to 0',
+        )
     check_outputs(goal, options)
     known = ('', options.tf_prefix + 'tool0_controller')
     if goal.T_flange_controlled is None and goal.controlled_frame not in known:
