@@ -289,7 +289,9 @@ def test_a_joint_that_turns_back_between_samples_keeps_its_range(cell, beyond):
         )
     )
     goal = JointGoal(joint_names=JOINT_NAMES, points=points)
-    text = r'points\[1\]\.positions, at 4\d\.\d % of its segment: wrist_3_joint turns to 6\.283\d+ rad'
+    text = (
+        r'points\[1\]\.positions, at 4\d\.\d % of its segment: wrist_3_joint turns to 6\.283\d+ '
+    )
     with pytest.raises(JointLimitExceeded, match=text):
         planned(cell, goal, max_joint_acceleration=100.0)
     nearer = tuple(
@@ -328,6 +330,17 @@ def test_accelerations_of_some_points_are_ignored_and_the_report_says_so(cell):
     assert all(piece.accelerations == SIX for piece in full.rows.primitives)
     assert all(piece.accelerations is None for piece in partly.rows.primitives)
     assert any('accelerations are ignored' in line for line in partly.remarks)
+
+
+def test_accelerations_of_a_point_where_the_arm_rests_are_ignored_and_the_report_says_so(cell):
+    rates = {'velocities': ZERO, 'accelerations': SIX}
+    home = JointPoint(positions=cell.state.actual_q, time=0.0, **rates)
+    (point,) = goal_through(cell, SIX).points
+    goal = JointGoal(joint_names=JOINT_NAMES, points=(home, replace(point, **rates)))
+    text = 'point 0: accelerations are ignored, because the arm rests there'
+    assert text in planned(cell, goal).remarks
+    still = replace(goal, points=(replace(home, accelerations=ZERO), *goal.points[1:]))
+    assert text not in planned(cell, still).remarks
 
 
 @given(

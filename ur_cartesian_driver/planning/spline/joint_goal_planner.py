@@ -46,7 +46,7 @@ from ur_cartesian_driver.planning.request.program_features import check_program
 from ur_cartesian_driver.planning.request.validate import check_measurable_tolerances
 from ur_cartesian_driver.planning.spline.joint_polynomials import JointKnots, piece_rows, to_ticks
 from ur_cartesian_driver.planning.spline.spline_limits import (
-    RateSamples,
+    Rates,
     stretch_remark,
     worst_excess_between,
 )
@@ -201,6 +201,8 @@ def _trajectory(
     if times[0] == 0.0:
         _check_start(checked, state, options)
         remarks.append('point 0: the robot is there at time 0, so nothing is sent for it')
+        if np.nan_to_num(joints.a[0]).any():
+            remarks.append('point 0: accelerations are ignored, because the arm rests there')
         times, first = times[1:], 1
         joints = MotionRows(*(rows[1:] for rows in joints))
     rest = np.zeros((1, 6))
@@ -321,21 +323,15 @@ def _fit_to_limits(
     options: PlanningOptions,
 ) -> tuple[_Trajectory, tuple[str, ...]]:
     """Return the trajectory, slowed if the limits require it, and a remark on the slowing."""
+    coefficients, durations = trajectory.spline.coefficients, np.diff(trajectory.times)
 
-    def rates(piece: Indices, u: Floats) -> RateSamples:
-        t = u * np.diff(trajectory.times)[piece]
-        q, qd, qdd = evaluate(trajectory.spline.coefficients[piece], t)
-        twists, accelerations = tool_rates(arm, state.T_flange_tcp, q, qd, qdd)
-        return RateSamples(
-            points=(trajectory.first + piece).astype(np.int32),
-            u=u,
-            twists=twists,
-            accelerations=accelerations,
-            qd=qd,
-            qdd=qdd,
-        )
+    def rates(piece: Indices, u: Floats) -> Rates:
+        q, qd, qdd = evaluate(coefficients[piece], u * durations[piece])
+        return Rates(*tool_rates(arm, state.T_flange_tcp, q, qd, qdd), qd, qdd)
 
-    found = worst_excess_between(rates, samples.piece, samples.u, arm.model, options)
+    found = worst_excess_between(
+        rates, samples.piece, samples.u, trajectory.first, arm.model, options
+    )
     if found is None:
         return trajectory, ()
     if options.on_too_fast != 'slow':
