@@ -157,6 +157,20 @@ def test_speeds_are_slowed_to_the_largest_tool_speed_and_it_is_said(cell, kind):
     assert free[0].primitive.velocity == 0.6
 
 
+@pytest.mark.parametrize(
+    ('x', 'turn', 'twist', 'ignored'),
+    [
+        (0.1, 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.3), True),
+        (0.1, 0.0, (0.1, 0.0, 0.0, 0.0, 0.0, 0.3), False),
+        (0.0, 0.5, (0.1, 0.0, 0.0, 0.0, 0.0, 0.0), True),
+        (0.0, 0.5, (0.0, 0.0, 0.0, 0.0, 0.0, 0.3), False),
+    ],
+)
+def test_a_twist_without_the_part_that_sets_the_speed_is_told(cell, x, turn, twist, ignored):
+    _, remarks = one(cell, x=x, turn=(0.0, 0.0, turn), twist=twist)
+    assert any('point 0: twist is ignored' in line for line in remarks) is ignored
+
+
 def test_joint_moves_keep_to_the_speed_of_the_joints(cell):
     options = PlanningOptions(max_tool_speed=0.0)
     segment, remarks = one(cell, options, x=0.1, segment=Segment(type=TYPE.JOINT, velocity=9.0))

@@ -209,8 +209,9 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     find_slow_stretches = cache(
         partial(slow_move_stretches, geometries, timings, motion, slower_by(goal))
     )
+    limits = timings.requests.limits
     remarks = [
-        *ignored_remarks(goal),
+        *ignored_remarks(goal, translates=None if planner.timed else limits.translates),
         *motion_version_remarks(options),
         *(remark for _, remark in sorted(timings.requests.remarks.items())),
         *twin_remarks(options, timings),
