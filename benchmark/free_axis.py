@@ -20,7 +20,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.motion.goal.goal import FreeAxis
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable, WaypointRows
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, WaypointRows
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 Floats = NDArray[np.float64]

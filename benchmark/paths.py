@@ -14,7 +14,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.motion.goal.goal import Goal, Segment, Waypoint
-from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import goal_table, GoalTable
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.sim.simulator_config import HOME
 

@@ -23,7 +23,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal, Segment, Waypoint
-from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import goal_table, GoalTable
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.simulator_config import HOME
 

@@ -18,7 +18,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.goal.goal import Goal, SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import (
+from ur_cartesian_driver.motion.goal.goal_columns import (
     goal_table,
     GoalTable,
     SegmentRows,

@@ -24,7 +24,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
-from ur_cartesian_driver.motion.goal.goal_table import goal_table
+from ur_cartesian_driver.motion.goal.goal_columns import goal_table
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline

@@ -47,6 +47,17 @@ def test_validate_prints_the_plan_of_an_example(example, capsys):
     assert 'MOVE' in lines
 
 
+@pytest.mark.parametrize('given', ['2000', '2000mm', '-1mm', 'near'])
+def test_send_refuses_a_length_that_must_be_a_mistake(given, capsys):
+    """With such a length nothing could be resumed, and the note of a stop would be removed."""
+    for option in ('--overlap', '--approach'):
+        with pytest.raises(SystemExit):
+            parser().parse_args(['send', 'seam', '--resume', option, given])
+        assert option in capsys.readouterr().err
+    arguments = parser().parse_args(['send', 'seam', '--resume', '--overlap', '8mm'])
+    assert (arguments.overlap, arguments.approach) == (0.008, 0.03)
+
+
 def test_validate_refuses_with_a_sentence_and_a_status(tmp_path, capsys):
     goal = yaml.safe_load(goal_file('square').read_text())
     goal['trajectory']['points'][2]['pose']['position']['x'] = 5.0

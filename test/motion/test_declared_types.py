@@ -11,7 +11,7 @@ import pytest
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.declared_types import with_declared_types, WrongType
 from ur_cartesian_driver.motion.goal.goal import Goal, Posture, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.goal.goal_table import goal_table
+from ur_cartesian_driver.motion.goal.goal_columns import goal_table
 
 GOAL = Goal(
     waypoints=(Waypoint(time=1.0, pose=Pose((0.1, 0.2, 0.3))),),

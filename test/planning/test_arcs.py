@@ -18,7 +18,7 @@ from ur_cartesian_driver.motion.geometry.pose import (
     quaternion_from_rotation_vector,
 )
 from ur_cartesian_driver.motion.goal.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.goal.goal_table import goal_table
+from ur_cartesian_driver.motion.goal.goal_columns import goal_table
 from ur_cartesian_driver.planning.geometry.blended_path import curves_of
 from ur_cartesian_driver.planning.geometry.curves import arc_faults, goal_arcs
 

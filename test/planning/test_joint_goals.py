@@ -295,7 +295,7 @@ def test_a_joint_that_turns_back_between_samples_keeps_its_range(cell, beyond):
     with pytest.raises(JointLimitExceeded, match=text):
         planned(cell, goal, max_joint_acceleration=100.0)
     nearer = tuple(
-        replace(each, positions=np.subtract(each.positions, (*ZERO[:5], 1.01 * beyond)))
+        replace(each, positions=(*each.positions[:5], each.positions[5] - 1.01 * beyond))
         for each in points
     )
     planned(cell, replace(goal, points=nearer), max_joint_acceleration=100.0)

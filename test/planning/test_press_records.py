@@ -10,7 +10,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import NotAvailable
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.goal.goal import ContactEnd, Goal, Press, PressFrame, Waypoint
-from ur_cartesian_driver.motion.goal.goal_table import goal_table
+from ur_cartesian_driver.motion.goal.goal_columns import goal_table
 from ur_cartesian_driver.planning.request.point_events.presses import press_records, Presses
 
 PRESS = Press(first_waypoint=0, last_waypoint=1, axes=('rx', 'z'), forces=(0.5, 20.0))

@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows
 from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal, Posture, Segment, Waypoint
-from ur_cartesian_driver.motion.goal.goal_table import goal_table
+from ur_cartesian_driver.motion.goal.goal_columns import goal_table
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.primitive import Spline
 from ur_cartesian_driver.motion.state.rtde_state import RobotState

@@ -17,7 +17,7 @@ from ur_cartesian_driver.motion.geometry.pose import (
     rotate,
 )
 from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
-from ur_cartesian_driver.motion.goal.goal_table import goal_table
+from ur_cartesian_driver.motion.goal.goal_columns import goal_table
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.spline.spline_points import tool_points
 

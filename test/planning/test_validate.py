@@ -41,7 +41,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     Tolerance,
     Waypoint,
 )
-from ur_cartesian_driver.motion.goal.goal_table import goal_table
+from ur_cartesian_driver.motion.goal.goal_columns import goal_table
 from ur_cartesian_driver.motion.goal.leads import Lead
 from ur_cartesian_driver.planning import check, PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode

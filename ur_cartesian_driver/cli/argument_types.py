@@ -33,6 +33,16 @@ def length(text: str) -> float:
     return parsed(parse_length, text)
 
 
+def resume_length(text: str) -> float:
+    """Return a length [m] by which a goal is resumed before its stop, or approached."""
+    from ur_cartesian_driver.path.resumption import MAX_RESUME_LENGTH
+
+    number = length(text)
+    if number > MAX_RESUME_LENGTH:
+        raise argparse.ArgumentTypeError(f'{text} is not within 0 and {MAX_RESUME_LENGTH:g} m')
+    return number
+
+
 def code_output(text: str) -> tuple[str, CodeOutput]:
     """Return a code of a G-code file, and the output that it sets."""
     from ur_cartesian_driver.importing import parse_code_output

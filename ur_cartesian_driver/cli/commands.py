@@ -129,8 +129,7 @@ def _resumed(goal: Any, place: PathPlace, arguments: argparse.Namespace) -> tupl
     """
     from ur_cartesian_driver.ros import client
 
-    overlap, approach = 1e-3 * arguments.overlap, 1e-3 * arguments.approach
-    return client.resumed_goal(goal, place, overlap=overlap, approach=approach)
+    return client.resumed_goal(goal, place, overlap=arguments.overlap, approach=arguments.approach)
 
 
 def _note_place(

@@ -137,9 +137,9 @@ def dead_times(
         time = shift / difference
         if not time >= -_MAX_NEGATIVE * uncertainty:  # or NaN
             raise ValueError(
-                f'the fast bead {verb} {1e3 * abs(shift):.3g} mm before the slow one, as if the '
-                'valve knew of its output beforehand; measure behind the slow bead, in the '
-                'direction of the motion'
+                f'the fast bead {verb} {1e3 * abs(shift):.3g} mm before the slow one, although a '
+                'valve can only be late; measure from the slow bead to the fast one, positive in '
+                'the direction of the motion'
             )
         times.append(max(time, 0.0))
     return DeadTimes(open=times[0], close=times[1], uncertainty=uncertainty)

@@ -27,8 +27,8 @@ from ur_cartesian_driver.sim.command_line.simulator_options import fields_from
 
 QUESTIONS = ('begin', 'end')
 WARNING = (
-    'The arm will move, and the valve will open. A hand on the emergency stop, nobody in reach, '
-    'the nozzle as high above a test piece as above the work.'
+    'The arm will move, and the valve will open. Keep a hand on the emergency stop and everybody '
+    'out of reach. The nozzle has to be as high above a test piece as it will be above the work.'
 )
 HOW_TO_READ = (
     'Read where the beads have their full width: the slow one is thicker, and its round ends '

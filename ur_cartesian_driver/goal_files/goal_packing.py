@@ -16,9 +16,9 @@ import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY
-from ur_cartesian_driver.motion.goal.field_table import Form, in_order_of_files
+from ur_cartesian_driver.motion.goal.field_annotations import Form, in_order_of_files
 from ur_cartesian_driver.motion.goal.goal import Posture
-from ur_cartesian_driver.motion.goal.goal_table import SegmentRows, WaypointRows
+from ur_cartesian_driver.motion.goal.goal_columns import SegmentRows, WaypointRows
 
 
 def packed_fields(points: WaypointRows, segments: SegmentRows) -> dict[str, Any] | None:

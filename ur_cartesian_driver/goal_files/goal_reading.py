@@ -24,9 +24,14 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6
-from ur_cartesian_driver.motion.goal.field_table import Form, goal_fields, GoalColumn, GoalField
+from ur_cartesian_driver.motion.goal.field_annotations import (
+    Form,
+    goal_fields,
+    GoalColumn,
+    GoalField,
+)
 from ur_cartesian_driver.motion.goal.goal import Goal, IOCommand, Posture, SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import (
+from ur_cartesian_driver.motion.goal.goal_columns import (
     GoalRows,
     GoalTable,
     rows_where,

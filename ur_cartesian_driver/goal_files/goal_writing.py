@@ -9,14 +9,14 @@ from dataclasses import replace
 from typing import Any, TypeAlias
 
 from ur_cartesian_driver.goal_files.goal_packing import packed_fields
-from ur_cartesian_driver.motion.goal.field_table import (
+from ur_cartesian_driver.motion.goal.field_annotations import (
     Form,
     goal_fields,
     GoalField,
     in_order_of_files,
 )
 from ur_cartesian_driver.motion.goal.goal import Goal
-from ur_cartesian_driver.motion.goal.goal_table import (
+from ur_cartesian_driver.motion.goal.goal_columns import (
     goal_table,
     GoalRows,
     SegmentRows,

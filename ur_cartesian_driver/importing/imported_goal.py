@@ -34,7 +34,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     transform_rows,
 )
 from ur_cartesian_driver.motion.goal.goal import CORNER_DEVIATION, SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import (
+from ur_cartesian_driver.motion.goal.goal_columns import (
     GoalTable,
     rows_where,
     SegmentRows,

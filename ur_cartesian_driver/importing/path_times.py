@@ -21,7 +21,7 @@ from ur_cartesian_driver.importing.imported_path import (
     TYPES_WITH_SPEED,
 )
 from ur_cartesian_driver.motion.geometry.arrays import Floats
-from ur_cartesian_driver.motion.goal.goal_table import rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import rows_where
 
 #: Shortest standstill [s] that becomes a dwell; in a shorter one the tool may be moving slowly, by
 #: less than 5 um.

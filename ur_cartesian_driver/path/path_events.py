@@ -24,17 +24,18 @@ from ur_cartesian_driver.motion.goal.goal import (
     PulseTrain,
     ScriptCall,
 )
-from ur_cartesian_driver.motion.goal.output_names import output_name
 from ur_cartesian_driver.path.outputs import Input, Output
 from ur_cartesian_driver.path.path_motions import PathOfMotions
 from ur_cartesian_driver.path.path_numbers import (
     amount,
     any_number,
+    many_numbers,
     NANOSECONDS,
+    numbers,
     to_nanoseconds,
     vector,
 )
-from ur_cartesian_driver.path.path_points import PathPoint
+from ur_cartesian_driver.path.path_points import PathPoint, with_fields
 from ur_cartesian_driver.planning.request.point_events.payload_changes import MAX_OFFSET
 from ur_cartesian_driver.planning.request.point_events.registry import check_event
 
@@ -156,13 +157,16 @@ class PathWithEvents(PathOfMotions):
             last_waypoint=1,
             pin=output.pin,
             domain=output.domain,
-            gain=float(gain),
-            offset=float(offset),
-            minimum=float(minimum),
-            maximum=float(maximum),
-            filter_time=float(filter_time),
-            begin_lead=float(lead),
-            idle=float(idle),
+            begin_lead=any_number(where, 'lead', lead),
+            **numbers(
+                where,
+                gain=gain,
+                offset=offset,
+                minimum=minimum,
+                maximum=maximum,
+                filter_time=filter_time,
+                idle=idle,
+            ),
         )
         return self._happening(where, self._points[-1], proportional)
 
@@ -174,17 +178,21 @@ class PathWithEvents(PathOfMotions):
         :raises InvalidGoal: the output does not follow the speed from an earlier point on, or
             ``lead`` is out of its range.
         """
+        where = f'end_follow_speed() at point {len(self) - 1}'
+        if output.kind is not OutputKind.STANDARD_ANALOG:
+            raise InvalidGoal(where, f'names {output}', 'use analog()')
         begun = self._begun(
             lambda one: isinstance(one, ProportionalOutput) and one.pin == output.pin
         )
         if begun is None:
             raise InvalidGoal(
-                f'end_follow_speed() at point {len(self) - 1}',
-                f'has no begin for analog output {output.pin} at a point before',
-                'call follow_speed() there',
+                where,
+                f'ends follow_speed({output}), which has not begun',
+                'call it at an earlier point',
             )
-        check_event('end_follow_speed()', replace(begun[1], end_lead=float(lead), last_waypoint=1))
-        return self._ended(*begun, end_lead=float(lead))
+        end_lead = any_number(where, 'lead', lead)
+        check_event(where, replace(begun[1], end_lead=end_lead, last_waypoint=1))
+        return self._ended(*begun, end_lead=end_lead)
 
     def pulses(
         self,
@@ -213,10 +221,8 @@ class PathWithEvents(PathOfMotions):
             last_waypoint=1,
             output=output.kind,
             pin=output.pin,
-            distance=any_number(where, 'distance', distance),
-            phase=any_number(where, 'phase', phase),
-            width=any_number(where, 'width', width),
             count=count,
+            **numbers(where, distance=distance, phase=phase, width=width),
         )
         return self._happening(where, self._points[-1], train)
 
@@ -234,8 +240,8 @@ class PathWithEvents(PathOfMotions):
         if begun is None:
             raise InvalidGoal(
                 f'end_pulses() at point {len(self) - 1}',
-                f'has no begin for {output_name(output.kind, output.pin)} at a point before',
-                'call pulses() there',
+                f'ends pulses({output}), which has not begun',
+                'call it at an earlier point',
             )
         return self._ended(*begun)
 
@@ -271,6 +277,11 @@ class PathWithEvents(PathOfMotions):
         :raises InvalidGoal: as for :meth:`dwell`, or a number is out of its range.
         """
         where, point = self._stop('press')
+        for what, given in (('forces', forces), ('speed_limits', speed_limits or {})):
+            if not isinstance(given, Mapping):
+                raise InvalidGoal(
+                    where, f'has the {what} {given!r:.60}', "name the axes, like {'z': 20.0}"
+                )
         limits = speed_limits or {}
         axes = tuple(forces)
         if limits and set(limits) != set(axes):
@@ -282,16 +293,21 @@ class PathWithEvents(PathOfMotions):
             last_waypoint=1,
             frame=frame,
             axes=axes,
-            forces=tuple(float(forces[axis]) for axis in axes),
-            speed_limits=tuple(float(limits[axis]) for axis in axes if limits),
-            max_yield=float(max_yield),
-            max_yield_angle=float(max_yield_angle),
-            max_deviation=float(max_deviation),
-            max_deviation_angle=float(max_deviation_angle),
-            damping=float(damping),
-            gain_scaling=float(gain_scaling),
+            forces=tuple(any_number(where, f'force {each}', forces[each]) for each in axes),
+            speed_limits=tuple(
+                any_number(where, f'speed limit {each}', limits[each]) for each in axes if limits
+            ),
             zero_sensor=zero_sensor,
             contact=contact,
+            **numbers(
+                where,
+                max_yield=max_yield,
+                max_yield_angle=max_yield_angle,
+                max_deviation=max_deviation,
+                max_deviation_angle=max_deviation_angle,
+                damping=damping,
+                gain_scaling=gain_scaling,
+            ),
         )
         return self._happening(where, point, press)
 
@@ -306,7 +322,9 @@ class PathWithEvents(PathOfMotions):
         where, point = self._stop('end_press')
         begun = self._begun(lambda one: isinstance(one, Press))
         if begun is None:
-            raise InvalidGoal(where, 'has no begin at a point before', 'call press() there')
+            raise InvalidGoal(
+                where, 'ends press(), which has not begun', 'call it at an earlier point'
+            )
         return self._with_point(-1, point)._ended(*begun)
 
     def dwell(self, time: float) -> Self:
@@ -333,8 +351,12 @@ class PathWithEvents(PathOfMotions):
         :raises InvalidGoal: as for :meth:`dwell`, or a number is out of its range.
         """
         where, point = self._stop('call')
-        numbers = tuple(float(argument) for argument in arguments)
-        call = ScriptCall(waypoint=0, function=function, arguments=numbers, timeout=float(timeout))
+        call = ScriptCall(
+            waypoint=0,
+            function=function,
+            arguments=many_numbers(where, 'argument', arguments),
+            timeout=any_number(where, 'timeout', timeout),
+        )
         return self._happening(where, point, call)
 
     def wait_for(
@@ -359,7 +381,8 @@ class PathWithEvents(PathOfMotions):
             already has a wait or a call.
         """
         where, point = self._stop('wait_for')
-        wait = what.wait(float(value), timeout, below, go_on)
+        given = numbers(where, value=value, timeout=timeout)
+        wait = what.wait(**given, below=below, go_on=go_on)
         path = self._happening(where, point, wait)
         if any(isinstance(other, InputWait) for other in point.events):
             raise InvalidGoal(where, 'waits for a second input', 'add a point for it')
@@ -391,10 +414,10 @@ class PathWithEvents(PathOfMotions):
         cog = vector(where, center_of_gravity, MAX_OFFSET)
         change = PayloadChange(
             waypoint=0,
-            mass=float(mass),
+            mass=any_number(where, 'mass', mass),
             center_of_gravity=cog,
-            inertia=tuple(float(each) for each in inertia),
-            transition_time=float(transition),
+            inertia=many_numbers(where, 'inertia', inertia),
+            transition_time=any_number(where, 'transition', transition),
         )
         return self._happening(where, point, change)
 
@@ -414,6 +437,7 @@ class PathWithEvents(PathOfMotions):
         :param event: the event, numbered as if the last point were point 0. If it needs an end,
             the end is point 1 for the check, and is removed afterwards.
         """
+        event = with_fields(where, event, {})
         check_event(where, event)
         if type(event) in _METHODS:
             event = replace(event, last_waypoint=0)

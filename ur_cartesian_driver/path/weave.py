@@ -14,8 +14,8 @@ from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
 from ur_cartesian_driver.path.centre_line import arc, CentreLine, line, RestToRest, Stroke
 from ur_cartesian_driver.path.path_points import PathPoint, SAME_POSITION
 
-#: Number of points on each wave; time step of the differences that give their twists [s].
 _POINTS_PER_WAVE = 8
+#: Time step of the finite differences for the twists of points [s].
 _STEP = 1e-5
 
 
@@ -35,7 +35,7 @@ def strokes(start: Pose, points: Sequence[PathPoint]) -> list[Stroke]:
             raise InvalidGoal(
                 where,
                 'has outputs or inputs, a duration, a posture or a dwell',
-                'give them to the result',
+                'add them to the path that weave() returns',
             )
         stroke = _stroke(before, point)
         if stroke is None or stroke.length <= SAME_POSITION:

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Protocol
 
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes
-from ur_cartesian_driver.motion.goal.field_table import Range
+from ur_cartesian_driver.motion.goal.field_annotations import Range
 from ur_cartesian_driver.motion.goal.goal import IOCommand
 from ur_cartesian_driver.motion.goal.leads import Lead, with_lead_times
 from ur_cartesian_driver.motion.goal.output_names import parse_safe_outputs

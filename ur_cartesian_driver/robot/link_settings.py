@@ -9,7 +9,7 @@ import ipaddress
 from typing import Annotated, TypeAlias
 
 from ur_cartesian_driver.kinematics.robot_models import MODELS
-from ur_cartesian_driver.motion.goal.field_table import Range
+from ur_cartesian_driver.motion.goal.field_annotations import Range
 from ur_cartesian_driver.motion.goal.parameter_fields import check_parameters, Detected, OneOf
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, DIALECTS, NEWEST_DIALECT

@@ -209,6 +209,18 @@ def test_points_that_repeat_are_passed_once(cell):
     assert again.duration == pytest.approx(once.duration, abs=1e-6)
 
 
+@pytest.mark.parametrize('bounds', [(5e-3, 1e-3), (1e-3, 5e-3)])
+def test_a_corner_that_is_given_twice_keeps_the_tighter_bound(cell, bounds):
+    places = [(0.06, 0, 0), (0.06, 0, 0), (0.06, 0.06, 0)]
+    goal = Goal(
+        waypoints=tuple(cell.point(*each) for each in places),
+        segments=tuple(Segment(corner_deviation=bound) for bound in (*bounds, 0.0)),
+    )
+    _, rows = tool_rows(cell, plan(goal, cell.state, cell.arm, OPTIONS), 0.004)
+    corner = np.array(goal.waypoints[0].pose.position)
+    assert 0.75e-3 < np.linalg.norm(rows - corner, axis=1).min() < 1.1e-3
+
+
 def test_arcs_that_turn_with_their_tangent_and_turns_on_the_spot_are_led_through(cell):
     goal = Goal(
         waypoints=(

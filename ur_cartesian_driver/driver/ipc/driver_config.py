@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from ur_cartesian_driver.execution.goal.goal_monitor import MAX_PLAN_DEVIATION
 from ur_cartesian_driver.execution.offsets.feed_input import parse_feed_input
-from ur_cartesian_driver.motion.goal.field_table import Range
+from ur_cartesian_driver.motion.goal.field_annotations import Range
 from ur_cartesian_driver.robot.link_settings import LinkSettings, Port
 
 
@@ -64,7 +64,7 @@ class DriverConfig(LinkSettings):
     #: planned and executed path, joints, speeds, lag, outputs, events. Empty: no recordings.
     record_directory: str = ''
     #: Largest size of all recordings together [MB]; the oldest ones are removed. A motion takes
-    #: 0.24 MB a second at 500 Hz; a single recording ends at half of this size.
+    #: 0.27 MB a second at 500 Hz; a single recording ends at half of this size.
     record_max_size: Annotated[float, Range(1.0, 1000000.0)] = 2000.0
     #: Where the robot loop, which holds the connections to the robot, runs: in a process of its
     #: own, or in a thread (for tests; large goals then disturb it).

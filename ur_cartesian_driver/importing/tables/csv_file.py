@@ -34,7 +34,7 @@ from ur_cartesian_driver.importing.text_file import file_lines, file_text
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose_rows import multiply_rows, normalized_rows
 from ur_cartesian_driver.motion.geometry.rotation_rows import exp_rows
-from ur_cartesian_driver.motion.goal.goal_table import rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import rows_where
 
 #: A larger angle [rad] must be meant in degrees.
 _MAX_TURN = 4.0 * np.pi

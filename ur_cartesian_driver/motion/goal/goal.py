@@ -7,15 +7,17 @@ Many parts of the driver handle the fields of a goal: messages, YAML files, flat
 checks, the builder of paths, the resumption after a stop. When each part listed the fields
 itself, a new field took two dozen edits, and a forgotten edit raised no error: the field
 was lost in a file or after a stop. So the dataclasses below declare everything about a field, and
-all other code iterates over them (:func:`~.field_table.goal_fields`).
+all other code iterates over them (:func:`~.field_annotations.goal_fields`).
 
-A field has a type, a unit in its comment, a default, and annotations: :class:`~.field_table.Sent`
-if messages name or represent it differently, :class:`~.field_table.Range` if not every number is
-allowed, :class:`~.field_table.Mark` for other properties. Schema, reading, writing, conversion of
+A field has a type, a unit in its comment, a default, and annotations:
+:class:`~.field_annotations.Sent` if messages name or represent it differently,
+:class:`~.field_annotations.Range` if not every number is allowed,
+:class:`~.field_annotations.Mark` for other properties. Schema, reading, writing, conversion of
 users' values to the declared types, and checks of ranges and enumerations follow from these. Goals
 can have thousands of points, so the driver stores points and segments in columns
-(:mod:`~.goal_table`); ``WaypointColumns`` and ``SegmentColumns`` declare a column for each field,
-and its flat array in messages. Rules that concern more than one field are in ``planning.request``.
+(:mod:`~.goal_columns`); ``WaypointColumns`` and ``SegmentColumns`` declare a column for each
+field, and its flat array in messages. Rules that concern more than one field are in
+``planning.request``.
 
 To add a number to segments, declare it in MotionSegment.msg and PackedPoints.msg, in ``Segment``
 and ``SegmentColumns``, and use it where the motion is planned. Paths accept it by name, as in
@@ -44,7 +46,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int64s
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3, ZERO6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal.field_table import ColumnOf, Form, Mark, Range, Sent
+from ur_cartesian_driver.motion.goal.field_annotations import ColumnOf, Form, Mark, Range, Sent
 from ur_cartesian_driver.motion.goal.inertia import MAX_TRANSITION_TIME
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 

@@ -28,7 +28,7 @@ from typing import (
 )
 
 from ur_cartesian_driver.motion.goal.declared_types import declare_types, declared_hints
-from ur_cartesian_driver.motion.goal.field_table import Mark, Range
+from ur_cartesian_driver.motion.goal.field_annotations import Mark, Range
 
 T = TypeVar('T')
 

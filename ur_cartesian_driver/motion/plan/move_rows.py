@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int64s
 from ur_cartesian_driver.motion.geometry.pose import pose_from_row
 from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.goal.goal import ArcMode
-from ur_cartesian_driver.motion.goal.goal_table import Rows
+from ur_cartesian_driver.motion.goal.goal_columns import Rows
 from ur_cartesian_driver.motion.plan.primitive import (
     MoveC,
     MoveJ,

@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal
-from ur_cartesian_driver.motion.goal.goal_table import Rows
+from ur_cartesian_driver.motion.goal.goal_columns import Rows
 from ur_cartesian_driver.motion.goal.joint_goal import JointTolerances
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.move_rows import classes

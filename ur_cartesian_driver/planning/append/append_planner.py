@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.errors import GoalRefused, TooFast
 from ur_cartesian_driver.motion.geometry.pose_rows import keep_hemisphere
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.motion.goal.goal import IOCommand, Segment
-from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable, WaypointRows
+from ur_cartesian_driver.motion.goal.goal_columns import goal_table, GoalTable, WaypointRows
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline, SAME_TIME
 from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import Spline, SwitchOutput

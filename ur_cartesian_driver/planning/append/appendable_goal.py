@@ -13,9 +13,9 @@ import numpy as np
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints
-from ur_cartesian_driver.motion.goal.field_table import shifted
+from ur_cartesian_driver.motion.goal.field_annotations import shifted
 from ur_cartesian_driver.motion.goal.goal import FreeAxis, Goal, IOCommand, Segment, Waypoint
-from ur_cartesian_driver.motion.goal.goal_table import (
+from ur_cartesian_driver.motion.goal.goal_columns import (
     goal_table,
     rows_where,
     SegmentRows,

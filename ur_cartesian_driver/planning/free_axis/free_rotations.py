@@ -38,7 +38,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
 )
 from ur_cartesian_driver.motion.geometry.vectors import cross, dot, Vector3, vector6
 from ur_cartesian_driver.motion.goal.goal import FreeAxis, Posture
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable, SegmentRows
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, SegmentRows
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.free_axis.rotation_lattice import (
     Layer,

@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     distance_rows,
     interpolate_rows,
 )
-from ur_cartesian_driver.motion.goal.goal_table import rows_where, SegmentRows
+from ur_cartesian_driver.motion.goal.goal_columns import rows_where, SegmentRows
 from ur_cartesian_driver.planning.geometry.blend_shapes import (
     BlendShapes,
     crossfade,

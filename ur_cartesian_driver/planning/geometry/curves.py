@@ -30,7 +30,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
 )
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import rows_where, SegmentRows
+from ur_cartesian_driver.motion.goal.goal_columns import rows_where, SegmentRows
 
 #: If a line turns the tool by half a turn, to within this angle [rad], rounding on the wire and
 #: the arm's actual pose decide the direction of the turn.

@@ -29,7 +29,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6, ZERO6
 from ur_cartesian_driver.motion.goal.goal import Posture, Segment, SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import (
+from ur_cartesian_driver.motion.goal.goal_columns import (
     GoalTable,
     rows_where,
     SegmentRows,

@@ -18,7 +18,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.pose_rows import distance_rows
 from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, rows_where
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, CurveRows, curves_of
 from ur_cartesian_driver.planning.geometry.curves import (
     goal_arcs,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int64s
-from ur_cartesian_driver.motion.goal.goal_table import SegmentRows, WaypointRows
+from ur_cartesian_driver.motion.goal.goal_columns import SegmentRows, WaypointRows
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath
 from ur_cartesian_driver.planning.moves.path_samples import JointSpeedBounds
 from ur_cartesian_driver.planning.preflight.tightest_margins import TightestMargins

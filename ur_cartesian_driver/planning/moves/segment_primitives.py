@@ -19,7 +19,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.pose_rows import transform_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6, ZERO6
 from ur_cartesian_driver.motion.goal.goal import SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import rows_where
 from ur_cartesian_driver.motion.plan.move_rows import MoveRows, MOVES
 from ur_cartesian_driver.motion.plan.primitive import (
     MoveC,

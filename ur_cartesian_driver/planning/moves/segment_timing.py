@@ -19,7 +19,7 @@ from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.goal.goal import SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import rows_where
 from ur_cartesian_driver.motion.plan.plan import PlannedSegment
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
 from ur_cartesian_driver.planning.moves.move_chain import MoveChain, Moves, ramp_rate

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
-from ur_cartesian_driver.motion.goal.goal_table import Rows, rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import Rows, rows_where
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SLOWER_BY, SlowStretch
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries

@@ -17,7 +17,7 @@ import numpy as np
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import rows_where
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
 from ur_cartesian_driver.planning.geometry.blended_path import CurveRows
 from ur_cartesian_driver.planning.geometry.curves import SAME_POSITION

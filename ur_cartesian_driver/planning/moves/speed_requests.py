@@ -16,7 +16,7 @@ from ur_cartesian_driver.kinematics.robot_models import RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.goal.goal import SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import rows_where
 from ur_cartesian_driver.motion.plan.plan import PlannedSegment
 from ur_cartesian_driver.motion.plan.primitive import Spline, Stop
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit

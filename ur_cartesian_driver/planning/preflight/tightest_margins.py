@@ -23,7 +23,7 @@ from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import GoalRefused, JointLimitExceeded, NearSingularity
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices, Int32s
-from ur_cartesian_driver.motion.goal.goal_table import Rows
+from ur_cartesian_driver.motion.goal.goal_columns import Rows
 from ur_cartesian_driver.planning.geometry.samples import first_least
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.joint_path_solver import describe_location, JointPath

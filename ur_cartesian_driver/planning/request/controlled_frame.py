@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, cross_rows, normalized_rows
 from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, rows_where
 from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions

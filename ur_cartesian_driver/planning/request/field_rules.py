@@ -19,9 +19,9 @@ import numpy as np
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose, Quaternion
-from ur_cartesian_driver.motion.goal.field_table import Form, goal_fields, GoalField
+from ur_cartesian_driver.motion.goal.field_annotations import Form, goal_fields, GoalField
 from ur_cartesian_driver.motion.goal.goal import Goal
-from ur_cartesian_driver.motion.goal.goal_table import GoalRows, GoalTable, rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import GoalRows, GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     gives_joints,

@@ -12,7 +12,7 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 
 
 def type_table(types: Collection[SegmentType]) -> Flags:

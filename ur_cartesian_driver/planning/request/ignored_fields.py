@@ -10,7 +10,7 @@ import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags
 from ur_cartesian_driver.motion.goal.goal import SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, rows_where
 from ur_cartesian_driver.motion.plan.slow_stretch import name_points
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_rounded,

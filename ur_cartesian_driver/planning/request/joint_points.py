@@ -22,7 +22,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import Goal, Posture
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     gives_joints,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from ur_cartesian_driver.motion.errors import NotAvailable
 from ur_cartesian_driver.motion.goal.execution_modes import EXECUTION_MODES, ModeTraits
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
 
 

@@ -14,7 +14,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     Segment,
     SegmentType,
 )
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_rounded,

@@ -10,7 +10,7 @@ import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.goal.goal import Segment, SegmentType
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, rows_where
 from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (

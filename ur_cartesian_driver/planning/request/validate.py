@@ -36,7 +36,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     Segment,
     SegmentType,
 )
-from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable, rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import goal_table, GoalTable, rows_where
 from ur_cartesian_driver.planning.geometry.curves import (
     goal_arcs,
     is_same_pose,

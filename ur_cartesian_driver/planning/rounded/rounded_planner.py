@@ -29,7 +29,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     length_rows,
 )
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.planning.geometry.samples import check_sample_count, sample_parameters

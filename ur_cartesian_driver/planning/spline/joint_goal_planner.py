@@ -24,7 +24,7 @@ from ur_cartesian_driver.motion.geometry.polynomials import evaluate, MotionRows
 from ur_cartesian_driver.motion.geometry.pose_rows import keep_hemisphere
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import ContactEnd, Press, START_OF_MOTION
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable, WaypointRows, zeros
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, WaypointRows, zeros
 from ur_cartesian_driver.motion.goal.joint_goal import JointGoal
 from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.state.rtde_state import RobotState

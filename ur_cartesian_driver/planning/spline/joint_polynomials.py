@@ -33,7 +33,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     distance_rows,
     length_rows,
 )
-from ur_cartesian_driver.motion.goal.goal_table import zeros
+from ur_cartesian_driver.motion.goal.goal_columns import zeros
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.move_rows import SplineRows
 from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows, ReferencePath

@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.geometry.polynomials import MotionRows
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector6, vector6, ZERO6
 from ur_cartesian_driver.motion.goal.goal import PIECES_PER_HORIZON
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import Spline

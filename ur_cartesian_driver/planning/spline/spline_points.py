@@ -23,7 +23,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     normalized_rows,
 )
 from ur_cartesian_driver.motion.geometry.rotation_rows import log_rows, rotation_rates
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints
 from ur_cartesian_driver.planning.request.ignored_fields import add_remark
 

@@ -13,7 +13,7 @@ from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.goal_files.goal_packing import packed_fields
 from ur_cartesian_driver.goal_files.goal_reading import is_packed, point_rows, segment_rows
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal.goal_table import SegmentRows, WaypointRows
+from ur_cartesian_driver.motion.goal.goal_columns import SegmentRows, WaypointRows
 from ur_cartesian_driver.msg import CartesianTrajectory, PackedPoints
 
 #: Clients send goals with at least this many points in flat arrays.

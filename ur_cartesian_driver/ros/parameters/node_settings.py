@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from ur_cartesian_driver.motion.goal.field_table import Range
+from ur_cartesian_driver.motion.goal.field_annotations import Range
 from ur_cartesian_driver.motion.goal.parameter_fields import check_parameters
 
 

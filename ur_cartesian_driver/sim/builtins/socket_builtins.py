@@ -19,15 +19,14 @@ from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets, SocketState
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
-from ur_cartesian_driver.urscript.script_values import to_text, Value
+from ur_cartesian_driver.urscript.script_values import INT_MAX, INT_MIN, to_text, Value
 
 CONNECT_TIMEOUT = 2.0
 #: Largest number of reads of one socket in a cycle; a further read waits for the next
-#: cycle. With TCP's flow control, this bound holds back a peer that writes without a pause, so
-#: that the program can do its other work. The bound of a real controller is not published.
+#: cycle. Without it, a peer that never stops writing would keep the program reading for ever; with
+#: it, TCP's flow control slows the peer down. The bound of a real controller is not published.
 READS_PER_CYCLE = 32
-#: Largest number of values in one read of numbers, and of characters in one string that is read
-#: without a suffix.
+#: Most values in one read of numbers; most characters in one string that is read without a suffix.
 MAX_NUMBERS, MAX_CHARACTERS = 30, 1023
 MAX_PORT = 65_535
 
@@ -153,13 +152,14 @@ class SocketBuiltins(BuiltinGroup):
     def socket_get_var(
         self, name: Value, socket_name: Value = 'socket_0'
     ) -> Generator[None, None, int]:
-        """Send `GET name`; return the value in the answer `name value`; on failure 0."""
+        """Send `GET name`; return the integer in the answer `name value`; on failure 0."""
         self._send(f'GET {text(name, "name")}\n'.encode('latin-1'), socket_name)
         answer = yield from self.socket_read_line(socket_name)
         try:
-            return int(float(answer.split()[1]))
-        except (IndexError, ValueError):
+            value = int(float(answer.split()[1]))
+        except (IndexError, ValueError, OverflowError):
             return 0
+        return value if INT_MIN <= value <= INT_MAX else 0
 
     def socket_set_var(self, name: Value, value: Value, socket_name: Value = 'socket_0') -> None:
         """Send `SET name value`."""

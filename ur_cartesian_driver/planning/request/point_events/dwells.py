@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.goal.goal import MAX_STOP_TIME, Segment
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where, SegmentRows
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, rows_where, SegmentRows
 from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 from ur_cartesian_driver.motion.plan.primitive import Wait
 from ur_cartesian_driver.planning.options import PlanningOptions

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from ur_cartesian_driver.motion.goal.field_table import points_of, renumbered
+from ur_cartesian_driver.motion.goal.field_annotations import points_of, renumbered
 
 E = TypeVar('E')
 

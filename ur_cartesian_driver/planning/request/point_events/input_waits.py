@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal.goal import InputKind, InputWait
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.plan.primitive import AwaitInput
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest

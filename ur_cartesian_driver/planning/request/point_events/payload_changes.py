@@ -10,7 +10,7 @@ from math import isfinite
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
 from ur_cartesian_driver.motion.goal.goal import PayloadChange
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.goal.inertia import inertia_problem
 from ur_cartesian_driver.motion.plan.primitive import ChangePayload
 from ur_cartesian_driver.planning.options import PlanningOptions

@@ -17,9 +17,9 @@ from typing import ClassVar, Generic, TypeVar
 from ur_cartesian_driver.kinematics.robot_models import RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.goal.field_table import points_of
+from ur_cartesian_driver.motion.goal.field_annotations import points_of
 from ur_cartesian_driver.motion.goal.goal import Goal
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.plan.primitive import Stop
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.mode_rules import ModeRule

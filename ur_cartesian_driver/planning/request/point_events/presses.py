@@ -24,7 +24,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     SegmentType,
     START_OF_MOTION,
 )
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.plan.primitive import BeginPress, EndPress, PressLaw
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import segment_field

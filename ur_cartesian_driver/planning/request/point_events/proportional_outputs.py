@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.goal.goal import OutputKind, ProportionalOutput
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.plan.primitive import SpeedLaw, SwitchOutput
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest

@@ -10,7 +10,7 @@ from math import ceil, floor
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.goal.goal import OutputKind, PulseTrain
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.goal.output_names import output_fault, output_name, pulse_outputs
 from ur_cartesian_driver.motion.plan.primitive import PulseLaw, SwitchOutput
 from ur_cartesian_driver.planning.options import PlanningOptions

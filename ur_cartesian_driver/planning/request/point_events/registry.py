@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.goal.field_table import goal_fields, index_fields
+from ur_cartesian_driver.motion.goal.field_annotations import goal_fields, index_fields
 from ur_cartesian_driver.motion.goal.goal import Goal
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.field_rules import check_record
 from ur_cartesian_driver.planning.request.goal_fields import is_spline, is_timed

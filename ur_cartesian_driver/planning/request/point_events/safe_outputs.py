@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal.goal import OutputKind, SafeOutput
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.goal.output_names import (
     output_name,
     parse_safe_outputs,

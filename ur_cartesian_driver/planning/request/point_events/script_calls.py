@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
-from ur_cartesian_driver.motion.goal.field_table import renumbered
+from ur_cartesian_driver.motion.goal.field_annotations import renumbered
 from ur_cartesian_driver.motion.goal.goal import ScriptCall
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.plan.primitive import CallFunction
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest, NO_FRACTION

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Floats
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import Spline, still_spline, Wait
 from ur_cartesian_driver.planning.options import PlanningOptions

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind, SafeOutput
-from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.goal.output_names import output_fault, output_name
 from ur_cartesian_driver.motion.plan.primitive import SwitchOutput
 from ur_cartesian_driver.planning.options import PlanningOptions

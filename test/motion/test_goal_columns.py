@@ -13,7 +13,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import Goal, Posture, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.goal.goal_table import goal_table, SegmentRows, WaypointRows
+from ur_cartesian_driver.motion.goal.goal_columns import goal_table, SegmentRows, WaypointRows
 
 ARM = Arm(robot_model('ur5e'))
 ELBOW = Posture(names=('elbow_joint',), values=(1.5,))
