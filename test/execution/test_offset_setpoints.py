@@ -20,7 +20,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.goal.goal import StaleOffset
 from ur_cartesian_driver.motion.plan.offset_band import OffsetBand
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
-from ur_cartesian_driver.planning.preflight.offset_bands import fade_time
+from ur_cartesian_driver.planning.preflight.offset_band_check import fade_time
 
 #: How many random streams; 10,000 take two minutes.
 STREAMS = int(os.environ.get('OFFSET_STREAMS', '25'))
