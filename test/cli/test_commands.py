@@ -12,6 +12,7 @@ from pathlib import Path
 import signal
 import subprocess
 import sys
+from typing import Any
 from unittest.mock import Mock
 
 import pytest
@@ -321,7 +322,7 @@ def test_the_demo_can_move_no_arm_of_others(monkeypatch):
     environment = demo._environment()
     assert environment['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
     assert environment['ROS_DOMAIN_ID'] != '77'
-    fields = {'goal': Path('a'), 'model': 'ur5e', 'drawing': Path('b')}
+    fields: dict[str, Any] = {'goal': Path('a'), 'model': 'ur5e', 'drawing': Path('b')}
     spaces = [demo.DemoArm(name=name, **fields).namespace for name in ('', 'left', 'right')]
     assert len(set(spaces)) == 3
     assert all(str(os.getpid()) in space for space in spaces)
