@@ -3,6 +3,8 @@
 """The experiments tell the laws apart by which a controller may move."""
 
 from dataclasses import replace
+from pathlib import Path
+import re
 
 import numpy as np
 import pytest
@@ -168,6 +170,15 @@ def test_programs_are_indented_and_move_slowly():
         assert all(line.startswith('  ') for line in body)
     assert experiments.JOINT_SPEED <= 0.2
     assert experiments.TOOL_SPEED <= 0.05
+
+
+def test_programs_use_no_name_of_a_function_for_a_variable():
+    page = Path(__file__).parents[2] / 'doc' / 'script_functions.md'
+    functions = set(re.findall(r'^\| `(\w+)\(', page.read_text('utf-8'), re.MULTILINE))
+    assert {'size', 'norm', 'movej'} <= functions
+    for experiment in EXPERIMENTS:
+        assigned = set(re.findall(r'^\s*(\w+) = ', experiment.script, re.MULTILINE))
+        assert not assigned & functions, experiment.check
 
 
 def rests(*heights, off=0.0):
