@@ -228,7 +228,8 @@ def _gap(before: Profile, after: Profile) -> Measured:
     )
 
 
-_STOPS = {
+#: The endings whose ramps have a law -> the event, and the experiment that shows it.
+STOPS = {
     Ending.PROGRAM_STOP: (
         'program was stopped',
         'stop a program while a long move cruises, and record runtime_state',
@@ -246,9 +247,12 @@ _STOPS = {
 
 def stop_ramp(moves: Sequence[FoundMove], ending: Ending) -> Result:
     """Find the time from full speed to rest of one kind of stop."""
-    ramps, odd, unsteady = [], 0, 0
+    ramps, odd, unsteady, slowed = [], 0, 0, 0
     for move in moves:
         if move.piece.ending is not ending or move.leading is None:
+            continue
+        if move.piece.slowed:
+            slowed += 1
             continue
         time, rows = move.rows
         ramp = find_ramp(time, move.leading, rows)
@@ -256,12 +260,14 @@ def stop_ramp(moves: Sequence[FoundMove], ending: Ending) -> Result:
         unsteady += ramp is None
         if isinstance(ramp, Measured):
             ramps.append(ramp)
-    event, experiment = _STOPS[ending]
+    event, experiment = STOPS[ending]
     reason = f'no {event} in motion'
     if odd:
         reason = f'{_plural(odd, "stop")} followed no even ramp'
     elif unsteady:
         reason = f'{_plural(unsteady, "stop")} came while the arm did not move at constant speed'
+    elif slowed:
+        reason = f'{_plural(slowed, "stop")} came while the speed slider was below 100 %'
     return _result(
         ending.value, ramps, _plural(len(ramps), 'stop') + ' at constant speed', reason, experiment
     )
