@@ -367,6 +367,23 @@ def test_who_interrupts_an_experiment_stops_the_arm_and_gets_the_slider_back(ur_
     assert ur_sim.state().speed_slider == 1.0
 
 
+@pytest.mark.ur_sim(frequency=125.0)
+def test_who_interrupts_before_the_slider_is_confirmed_gets_it_back(ur_sim):
+    slider = next(experiment for experiment in EXPERIMENTS if experiment.check == 'slider')
+
+    async def interrupted():
+        running = asyncio.create_task(run_experiment(address(ur_sim), slider))
+        ur_sim.inject('delay rtde 0.06 s')
+        await asyncio.to_thread(wait_for, lambda: ur_sim.state().speed_slider == 0.5)
+        running.cancel()
+        ur_sim.clear_faults()
+        with pytest.raises(asyncio.CancelledError):
+            await running
+
+    asyncio.run(asyncio.wait_for(interrupted(), 20.0))
+    assert ur_sim.state().speed_slider == 1.0
+
+
 # ---- what rounded corners assume of the robot -------------------------------------------------
 
 CORNER = {experiment.check: experiment for experiment in EXPERIMENTS}

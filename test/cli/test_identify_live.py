@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """``ur-cartesian identify --robot-ip``: from a simulated arm with hidden laws to its twin."""
 
+import asyncio
 from dataclasses import replace
 from io import StringIO
 from random import Random
@@ -17,11 +18,13 @@ from ur_cartesian_driver.identification.law_experiments import (
     LAW_EXPERIMENTS,
     MotionBounds,
 )
+from ur_cartesian_driver.identification.live_run import ready_state, record_experiment
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.motion.twin.twin import ArmIdentity, Estimate, Twin
 from ur_cartesian_driver.motion.twin.twin_file import read_twin
-from ur_cartesian_driver.robot.check.finding import Finding, Verdict
+from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, Verdict
+from ur_cartesian_driver.robot.check.program_run import Surprise
 
 HOME = (0.0, -1.2, 1.4, -1.6, -1.5, 0.2)
 NAMES = [each.name for each in LAW_EXPERIMENTS]
@@ -167,6 +170,62 @@ def test_a_cut_connection_leaves_a_resting_arm(identify, ur_sim, name, cut):
     assert 'RTDE' in outcomes[name]
     assert 'start_time' in printed  # the first experiment is evaluated
     rests(ur_sim)
+
+
+@pytest.mark.slow
+@hidden_arm
+def test_a_lost_primary_connection_ends_the_experiments(identify, ur_sim):
+    ur_sim.inject('drop primary at 0.01 m')
+    status, printed, outcomes = identify('--only', 'line,stop')
+    assert status == 1, printed
+    assert outcomes['line'].startswith('ended: primary interface: ')
+    assert 'may move' not in outcomes['line']  # the client connects again, and stops the program
+    assert outcomes['stop'] == 'not begun'
+    rests(ur_sim)
+
+
+@pytest.mark.slow
+@hidden_arm
+def test_an_arm_that_nobody_can_stop_is_said_to_move(identify, ur_sim):
+    ur_sim.inject(*(f'drop {each} at 0.01 m for 1000 s' for each in ('rtde', 'primary')))
+    status, printed, outcomes = identify('--only', 'movel_without_speed')
+    assert status == 1
+    said = '; nobody can stop the program, so the arm may move for up to 10 s more'
+    assert outcomes['movel_without_speed'].endswith(said)
+    assert said in printed
+    rests(ur_sim)
+
+
+@pytest.mark.slow
+@hidden_arm
+def test_the_way_back_of_a_stop_keeps_its_speed(identify, ur_sim):
+    begin = ur_sim.state().T_base_tcp
+    status, printed, outcomes = identify('--only', 'stop', speed='0.041')
+    assert (status, outcomes) == (0, {'stop': 'done'}), printed
+    assert begin.distance_to(ur_sim.state().T_base_tcp) < 1e-4
+
+
+@pytest.mark.slow
+@hidden_arm
+def test_a_recording_that_cannot_be_written_hides_no_surprise(ur_sim, tmp_path):
+    address = RobotAddress(
+        host='127.0.0.1', rtde_port=ur_sim.ports.rtde, primary_port=ur_sim.ports.primary
+    )
+    bounds = MotionBounds(low=(-1.0, -1.0, 0.0), high=(1.0, 1.0, 1.0), max_speed=0.3)
+    line = next(each for each in LAW_EXPERIMENTS if each.name == 'line')
+
+    async def carry_out():
+        state = await ready_state(address, None)
+        with pytest.raises(Surprise) as caught:
+            await record_experiment(address, line, state, bounds, tmp_path / 'gone' / 'line.csv')
+        assert asyncio.all_tasks() == {asyncio.current_task()}  # both connections are closed
+        return caught.value
+
+    ur_sim.inject('slider 0.5 at 0.01 m')
+    surprise = asyncio.run(carry_out())
+    assert str(surprise) == 'the speed slider was moved'
+    (note,) = surprise.__notes__
+    assert note.endswith('line.csv cannot be written: No such file or directory')
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.program.render import has_feature
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.resources import share_path
-from ur_cartesian_driver.robot.check.experiment_runner import motion_refusal, run_experiment
+from ur_cartesian_driver.robot.check.experiment_runner import run_experiment
 from ur_cartesian_driver.robot.check.experiments import Experiment, EXPERIMENTS
 from ur_cartesian_driver.robot.check.finding import (
     Finding,
@@ -29,6 +29,7 @@ from ur_cartesian_driver.robot.check.finding import (
 )
 from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 from ur_cartesian_driver.robot.check.observations import observe
+from ur_cartesian_driver.robot.check.program_run import motion_refusal, Surprise
 from ur_cartesian_driver.sim.command_line.simulator_options import fields_from
 
 #: Exit status: nothing answers at the address; something keeps the driver from working.
@@ -120,7 +121,7 @@ def _experiment(
         if refusal := asyncio.run(motion_refusal(address)):  # again, after the person's answer
             return [skipped(experiment.check, f'No motion: {refusal}')]
         samples = asyncio.run(run_experiment(address, experiment))
-    except (OSError, DriverError) as error:
+    except (OSError, DriverError, Surprise) as error:
         return [problem(experiment.check, f'Not finished: {error}')]
     recordings[experiment.check] = samples
     return [analyse(samples) for analyse in experiment.analyses]

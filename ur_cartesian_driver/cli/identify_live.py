@@ -19,17 +19,14 @@ from ur_cartesian_driver.identification.law_experiments import (
     LawExperiment,
     MotionBounds,
 )
-from ur_cartesian_driver.identification.live_run import (
-    ready_state,
-    record_experiment,
-    Surprise,
-)
+from ur_cartesian_driver.identification.live_run import ready_state, record_experiment
 from ur_cartesian_driver.identification.moves import find_moves, join_commands
 from ur_cartesian_driver.identification.recorded_calls import MotionCommand, read_commands
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.twin.twin import ArmIdentity
 from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, Verdict
+from ur_cartesian_driver.robot.check.program_run import Surprise
 
 #: The file that says how far the experiments came, and the one with the calls behind the moves.
 PROGRESS, CALLS = 'experiments.txt', 'calls.script'
@@ -103,7 +100,7 @@ def arm_of(findings: list[Finding]) -> ArmIdentity:
 
 
 def _answers(yes: bool) -> Callable[[LawExperiment], bool]:
-    """Return who answers: --yes only for moves that nothing stops or pauses."""
+    """Return the function that answers; --yes covers only uninterrupted moves."""
 
     def agrees(experiment: LawExperiment) -> bool:
         if yes and experiment.interruption is Interruption.NONE:
@@ -134,7 +131,8 @@ class _Series:
             try:
                 outcome, start = self._one(experiment, start)
             except (OSError, DriverError, Surprise) as error:
-                self.surprise = str(error).rstrip('.')
+                clauses = [str(error).rstrip('.'), *getattr(error, '__notes__', ())]
+                self.surprise = '; '.join(clauses)
             except KeyboardInterrupt:
                 self.surprise = 'interrupted from the keyboard'
             if self.surprise:

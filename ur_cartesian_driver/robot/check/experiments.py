@@ -347,11 +347,12 @@ def program(name: str, body: str) -> bytes:
     return f'def ur_check_{name}():\n{lines}\nend\n'.encode()
 
 
-def return_program(pose: Sequence[float]) -> bytes:
+def return_program(pose: Sequence[float], speed: str = _SLOW) -> bytes:
     """
     Return a program that moves straight to a pose.
 
     :param pose: ``x y z rx ry rz`` of the TCP in the base [m, rad].
+    :param speed: arguments of ``movel``, such as ``a=0.5, v=0.05``.
     """
     numbers = ', '.join(f'{value:.6f}' for value in pose)
-    return program('return', f'movel(p[{numbers}], {_SLOW})')
+    return program('return', f'movel(p[{numbers}], {speed})')
