@@ -72,18 +72,18 @@ class Terminal(StringIO):
 def identify(ur_sim, tmp_path, monkeypatch, capsys):
     """Run the command; return its status, its output, and the outcome of each experiment."""
 
-    def run(*words, answer='y', terminal=True, box=BOX, speed='0.3'):
-        answers = (Terminal if terminal else StringIO)(f'{answer}\n' * 20)
-        monkeypatch.setattr(sys, 'stdin', answers)
+    def run(*words, answer='y', answers='', terminal=True, box=BOX, speed='0.3'):
+        typed = (Terminal if terminal else StringIO)(answers or f'{answer}\n' * 20)
+        monkeypatch.setattr(sys, 'stdin', typed)
         ports = ur_sim.ports
         arguments = ['--robot-ip', '127.0.0.1', '--folder', str(tmp_path / 'found')]
         for name in ('rtde', 'primary', 'dashboard', 'robot_api'):
             arguments += [f'--{name.replace("_", "-")}-port', str(getattr(ports, name))]
         arguments += [f'--box={box}', '--max-speed', speed, '-o', str(tmp_path / 'twin.yaml')]
         status = main(['identify', *arguments, *words])
-        printed = capsys.readouterr()
         lines = (tmp_path / 'found' / PROGRESS).read_text().splitlines()
         outcomes = dict(line.split(': ', 1) for line in lines)
+        printed = capsys.readouterr()
         return status, printed.out + printed.err, outcomes
 
     return run
@@ -338,7 +338,45 @@ def test_a_folder_with_recordings_is_not_written_over(monkeypatch, capsys, tmp_p
 def test_a_robot_with_a_problem_is_not_moved():
     problem = Finding(check='rtde', verdict=Verdict.PROBLEM, text='Nothing answers.')
     with pytest.raises(ValueError, match=r'no motion, because of rtde: Nothing answers\.'):
-        arm_of([problem])
+        arm_of([problem], ArmIdentity())
+
+
+def observed(*models):
+    """Return the findings about a robot whose type has some models."""
+    return [
+        Finding(check=check, verdict=Verdict.OK, text='', data=data)
+        for check, data in (
+            ('software', {'version': '5.21.0.0'}),
+            ('model', {'models': list(models)}),
+            ('motion_version', {'motion_version': 1}),
+        )
+    ]
+
+
+@pytest.mark.parametrize(('asked', 'model'), [('', 'ur5e'), ('ur5e', 'ur5e'), ('ur7e', 'ur7e')])
+def test_the_option_chooses_among_models_of_one_type(asked, model):
+    arm = arm_of(observed('ur5e', 'ur7e'), ArmIdentity(model=asked))
+    assert arm == ArmIdentity(model=model, software='5.21.0', motion_version=1)
+
+
+@pytest.mark.slow
+@hidden_arm
+def test_another_arm_than_the_option_names_is_not_moved(identify, ur_sim, tmp_path, capsys):
+    begin = ur_sim.state().q
+    with pytest.raises(FileNotFoundError):  # nothing was begun
+        identify('--model', 'ur10e')
+    said = 'the robot is another arm: model ur5e, not ur10e; correct the options'
+    assert said in capsys.readouterr().err
+    assert ur_sim.state().q == begin
+
+
+@pytest.mark.slow
+@hidden_arm
+def test_the_end_of_the_input_means_no(identify, tmp_path):
+    status, printed, outcomes = identify('--only', 'wrist_slow,turn', answers='y\n')
+    assert status == 0, printed
+    assert outcomes == {'wrist_slow': 'done', 'turn': 'skipped: not wanted'}
+    assert 'start_time' in printed
 
 
 def test_experiments_are_slow_first_and_interrupted_last():

@@ -52,11 +52,12 @@ class LiveRecordings:
     surprise: str
 
 
-def record(arguments: argparse.Namespace) -> LiveRecordings:
+def record(arguments: argparse.Namespace, asked: ArmIdentity) -> LiveRecordings:
     """
     Run the experiments that are wanted, and return their recordings.
 
-    :raises ValueError: an option is missing, or the robot cannot be used.
+    :param asked: the arm that the options name.
+    :raises ValueError: an option is missing, or the robot cannot be used or is another arm.
     """
     if arguments.box is None or arguments.max_speed is None:
         raise ValueError('the arm moves: add --box and --max-speed, within which it has to stay')
@@ -72,7 +73,7 @@ def record(arguments: argparse.Namespace) -> LiveRecordings:
     if (folder / PROGRESS).exists():
         raise ValueError(f'{folder} has the recordings of another run; name another --folder')
     address = address_of(arguments)
-    arm = arm_of(asyncio.run(observe_and_show(address, _OBSERVED)))
+    arm = arm_of(asyncio.run(observe_and_show(address, _OBSERVED)), asked)
     print(f'\n{WARNING}')
     wanted = [
         each for each in LAW_EXPERIMENTS if not arguments.only or each.name in arguments.only
@@ -83,20 +84,25 @@ def record(arguments: argparse.Namespace) -> LiveRecordings:
     return LiveRecordings(arm=arm, samples=samples, commands=commands, surprise=series.surprise)
 
 
-def arm_of(findings: list[Finding]) -> ArmIdentity:
+def arm_of(findings: list[Finding], asked: ArmIdentity) -> ArmIdentity:
     """
     Return the arm that was observed.
 
-    :raises ValueError: the robot cannot be used.
+    :param asked: the arm that the options name; it chooses among models that report one type.
+    :raises ValueError: the robot cannot be used, or is another arm.
     """
     if problems := [each for each in findings if each.verdict is Verdict.PROBLEM]:
         raise ValueError(f'no motion, because of {problems[0].check}: {problems[0].text}')
     data = {each.check: each.data for each in findings}
-    return ArmIdentity(
-        model=data['model']['models'][0],
+    models = data['model']['models']
+    arm = ArmIdentity(
+        model=asked.model if asked.model in models else models[0],
         software='.'.join(str(data['software']['version']).split('.')[:3]),
         motion_version=data.get('motion_version', {}).get('motion_version', 0),
     )
+    if differences := arm.differences(asked):
+        raise ValueError(f'the robot is another arm: {differences}; correct the options')
+    return arm
 
 
 def _answers(yes: bool) -> Callable[[LawExperiment], bool]:
