@@ -34,6 +34,10 @@ ANALYSES = {experiment.check: experiment.analyses[0] for experiment in EXPERIMEN
 ANALYSES['steps_100'] = next(e for e in EXPERIMENTS if e.check == 'corner_100').analyses[1]
 
 
+#: Columns that few analyses read.
+UNUSED = ('target_distance', 'actual_distance', 'spline_time', 'pieces_begun', 'runtime_state')
+
+
 def trapezoid(distance, speed, acceleration, stretched=1.0):
     """Return the positions of a motion from 0 to a distance, one a cycle."""
     time = trapezoid_time(distance, speed, acceleration)
@@ -69,6 +73,7 @@ def samples(path, scaling=1.0, fraction=1.0, speed=None, stop_sent=float('nan'))
         scaling=np.full(len(path), scaling),
         fraction=np.full(len(path), fraction),
         stop_sent=stop_sent,
+        **dict.fromkeys(UNUSED, np.full(len(path), np.nan)),
     )
 
 
