@@ -30,7 +30,7 @@ from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 OnProgress = Callable[[Progress], None]
 
 
-#: The goal takes no signal; an input of the robot gives it.
+#: Why clients cannot slow a motion: it takes no signal; an input of the robot gives the signal.
 NO_FEED_OVERRIDE = (
     'feed_override',
     'is empty in the goal that runs',
