@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping
+import contextlib
 from math import dist
 from pathlib import Path
 from typing import Any
@@ -216,19 +217,25 @@ class _Run:
             raise Surprise('the program ended before the arm was there and back')
 
     async def _stop(self) -> bool:
-        """Stop the program; return whether that was possible, or the arm rests anyway."""
+        """Stop the program; return whether the arm rests, as far as the connections tell."""
         row = self._recorder.newest
         if row and row['safety_mode'] not in SAFE:
-            await self._rests()  # its ramp belongs to the recording
-        was_told = await self._run.stop()
-        if await self._rests():
-            return True
-        if was_told:
-            await asyncio.sleep(REST_TIMEOUT)  # without RTDE, wait as long as a stop may take
-        return was_told
+            with contextlib.suppress(OSError):
+                await self._rests()  # its ramp belongs to the recording
+        was_sent = await self._run.stop()
+        try:
+            return await self._rests()
+        except OSError:
+            if was_sent:
+                await asyncio.sleep(REST_TIMEOUT)  # without RTDE, wait as long as a stop may take
+            return was_sent
 
     async def _rests(self) -> bool:
-        """Wait until the target stands still; return whether RTDE shows that it does."""
+        """
+        Wait until the target stands still; return whether it does within :data:`REST_TIMEOUT`.
+
+        :raises OSError: RTDE is lost.
+        """
         recorder = self._recorder
         place = recorder.names.index('target_q') if recorder.names else 0
 
@@ -236,10 +243,7 @@ class _Run:
             rows = recorder.rows[-MIN_REST:]
             return len(rows) == MIN_REST and all(each[place] == row['target_q'] for each in rows)
 
-        try:
-            return await recorder.wait_for(still, REST_TIMEOUT)
-        except OSError:
-            return False
+        return await recorder.wait_for(still, REST_TIMEOUT)
 
     def write(self, path: Path) -> None:
         """Write the rows of the experiment."""

@@ -121,7 +121,7 @@ class ProgramRun:
 
     async def stop(self) -> bool:
         """
-        Stop the program; return whether the robot was told.
+        Stop the program; return whether a connection took the command.
 
         On a lost connection the command is sent again for up to :data:`REST_TIMEOUT`.
         """
