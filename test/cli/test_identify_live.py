@@ -159,6 +159,19 @@ def test_a_protective_stop_ends_the_experiments_and_stays(identify, ur_sim, name
 
 @pytest.mark.slow
 @hidden_arm
+@pytest.mark.parametrize('fault', ['emergency_stop', 'safeguard_stop'])
+def test_another_safety_stop_is_no_law_of_the_twin(identify, ur_sim, fault, tmp_path):
+    ur_sim.inject(f'{fault} at 0.02 m')
+    status, printed, outcomes = identify('--only', 'line')
+    assert status == 1
+    assert outcomes['line'].startswith('ended: the robot stopped, with safety mode '), printed
+    found = read_twin(tmp_path / 'twin.yaml')
+    for name in ('pause_time', 'stop_time', 'protective_stop_time'):
+        assert name in found.not_identified
+
+
+@pytest.mark.slow
+@hidden_arm
 @pytest.mark.parametrize('name', TRAVELS)
 @pytest.mark.parametrize('cut', [('rtde',), ('rtde', 'primary')], ids=['rtde', 'both'])
 def test_a_cut_connection_leaves_a_resting_arm(identify, ur_sim, name, cut):
