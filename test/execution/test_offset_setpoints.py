@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ur_cartesian_driver.execution.offsets.offset_requests import OffsetRequests
 from ur_cartesian_driver.execution.servo.offset_setpoints import (
     BoundedOffset,
     OffsetSetpoints,
@@ -49,6 +50,17 @@ def band(duration, *, limits=LIMITS, speed=SPEED, acceleration=ACCELERATION, **c
         }
         | changes
     )
+
+
+def test_a_second_stale_offset_is_said_when_a_warning_is_due_again():
+    requests = OffsetRequests(band(20.0))
+    warnings = []
+    for i in range(800):
+        now = 0.01 * i
+        if now < 1.0 or 1.5 < now < 1.6:
+            requests.set_offset((0.0, 0.001, 0.0), 0.0, now)
+        warnings += [now] * len(requests.age(now))
+    assert warnings == [pytest.approx(1.3, abs=0.02), pytest.approx(3.3, abs=0.02)]
 
 
 class Still:

@@ -500,7 +500,8 @@ def _add_valve(command: CommandParser) -> None:
         type=float,
         nargs=2,
         metavar=('BEGINS', 'ENDS'),
-        help='how far behind the slow bead the fast one begins and ends [mm]: lay no beads',
+        help='how far behind the slow bead the fast one begins and ends [mm]: lay no beads; '
+        '--slow and --fast are those of the beads',
     )
     _add_length(command, 'ruler', '0.5mm', 'uncertainty of one reading')
     for name, speed in (('slow', 0.02), ('fast', 0.2)):
