@@ -41,7 +41,7 @@ class WrongType(ValueError):
         self.problem, self.field = problem, field
 
     def inside(self, outer: str) -> WrongType:
-        """Return the same error, with the name of the containing value before its field."""
+        """Return this error with ``outer`` in front of its field."""
         separator = '.' if self.field and not self.field.startswith('[') else ''
         return WrongType(self.problem, f'{outer}{separator}{self.field}')
 
@@ -50,7 +50,7 @@ def with_declared_types(value: T, kind: type[T], name: str) -> T:
     """
     Return a value converted to exactly the type ``kind``; fields of dataclasses are converted too.
 
-    A number that an ``IntEnum`` does not have is kept.
+    An int that is no member of its ``IntEnum`` is kept, for later rules to refuse.
 
     :param name: the name of the value, with which an error text begins.
     :returns: the same object if nothing had to be converted.
@@ -193,7 +193,10 @@ def _member_of(kind: type[IntEnum]) -> Convert:
     def convert(value: Any) -> Any:
         if type(value) is kind:
             return value
-        number = _int(value)
+        try:
+            number = _int(value)
+        except WrongType:
+            raise _wrong(value, kind.__name__) from None
         try:
             return kind(number)
         except ValueError:

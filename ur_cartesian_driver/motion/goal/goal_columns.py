@@ -25,8 +25,8 @@ from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose, pose_from_r
 from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
 from ur_cartesian_driver.motion.goal.declared_types import with_declared_types
 from ur_cartesian_driver.motion.goal.field_annotations import (
+    declared_columns,
     Form,
-    goal_columns,
     goal_fields,
     GoalColumn,
     GoalField,
@@ -164,7 +164,7 @@ class GoalRows(Rows[T]):
     @classmethod
     def columns(cls) -> tuple[GoalColumn, ...]:
         """Return the columns, each with the field that it holds."""
-        return goal_columns(cls, cls.kind)
+        return declared_columns(cls, cls.kind)
 
     @classmethod
     def of(cls: type[G], objects: Iterable[T], name: str = '') -> G:

@@ -268,7 +268,7 @@ class PlannedRows(Rows[PlannedSegment]):
         for waypoint, kind in zip(self.waypoints.tolist(), classes(self.primitives), strict=True):
             if not issubclass(kind, Stop):
                 found |= dict.fromkeys(range(passed, waypoint + 1), kind.__name__)
-                passed = waypoint
+                passed = waypoint + 1
         return found
 
     def __len__(self) -> int:

@@ -23,7 +23,7 @@ import re
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.errors import GoalRefused
+from ur_cartesian_driver.motion.errors import GoalRefused, TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Int32s
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import IOCommand, Segment
@@ -53,6 +53,7 @@ from ur_cartesian_driver.planning.options import MAX_POINTS, PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.planner import plan as plan_goal
 from ur_cartesian_driver.planning.request.controlled_frame import retarget_to_tcp, tool_tips
+from ur_cartesian_driver.planning.request.field_rules import check_record
 from ur_cartesian_driver.planning.request.ignored_fields import ignored_remarks
 from ur_cartesian_driver.planning.request.joint_points import check_for_arm
 from ur_cartesian_driver.planning.spline.spline_planner import (
@@ -136,6 +137,8 @@ def plan_append(
     :param from_rest: whether the ending was sent, so that the arm is or will be at rest.
     :raises GoalRefused: the points are wrong; the text numbers points from the goal's start.
     """
+    for i, command in enumerate(appended.io_commands):
+        check_record(f'io_commands[{i}]', command)
     appended = replace(appended, io_commands=options.lead_times(appended.io_commands))
     before, cut = appendable, None
     appendable = cut_tail(before, cut_time(before, appended), arm)
@@ -160,7 +163,7 @@ def plan_append(
             return planner.append_spline(
                 rest, records_before, time + delay - appendable.last_client_time
             )
-        except GoalRefused as refusal:
+        except TooFast as refusal:  # more time changes nothing about other refusals
             last_refusal = refusal
     raise last_refusal
 
@@ -430,7 +433,7 @@ class _PartPlanner:
 
     def _stop(self, end: SplineState) -> tuple[PlannedRows, ReferencePath]:
         """Return the piece that stops the arm after the last point, and the path of the piece."""
-        piece = plan_stop(end, self._arm, self._options.keep_open_deceleration)
+        piece = plan_stop(end, self._arm, self._options, self._points - 1)
         times = np.linspace(0.0, piece.duration, _STOP_ROWS + 1)
         q, _, _ = rows_along(piece, end, len(times))
         return unreported_piece(piece, self._points - 1), ReferencePath(

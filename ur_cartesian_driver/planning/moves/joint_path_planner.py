@@ -36,7 +36,11 @@ from ur_cartesian_driver.motion.goal.goal_columns import (
     WaypointRows,
 )
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SAME_ANGLE, SAME_POSITION
-from ur_cartesian_driver.planning.geometry.samples import CurvePieces, joined_columns
+from ur_cartesian_driver.planning.geometry.samples import (
+    check_sample_count,
+    CurvePieces,
+    joined_columns,
+)
 from ur_cartesian_driver.planning.moves.path_samples import BlendSamples, PathSamples, speed_bounds
 from ur_cartesian_driver.planning.moves.segment_drafts import SegmentDrafts
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
@@ -78,6 +82,8 @@ _MAX_LINE_OFFSET = 0.05
 #: Maximum number of segments in the first run, if lines may become joint moves; the maximum
 #: doubles after each solved run, and is reset after a replacement.
 _FIRST_RUN = 8
+#: Maximum number of samples of a goal: a million short segments with blends need three million.
+_MAX_SAMPLES = 4_000_000
 
 _JOINT = SegmentType.JOINT
 #: Refusals after which a line or an arc can be replaced by a joint move.
@@ -125,6 +131,7 @@ class JointPathPlanner:
         """
         self.q_start = self._q = q
         self._parts: list[PathSamples] = []
+        self._sample_count = 0
         self._drafts = SegmentDrafts(
             self.goal, self.targets, begin, T_base_tcp, self.options, self.remarks
         )
@@ -181,6 +188,7 @@ class JointPathPlanner:
     def _add(self, joint_path: JointPath, measures: Floats) -> None:
         """Add the samples of a joint path; the next run begins in its last configuration."""
         self._parts.append(PathSamples.of(joint_path, measures))
+        self._sample_count += len(joint_path.q)
         if len(joint_path.q):
             self._q = vector6(joint_path.q[-1].tolist())
 
@@ -231,7 +239,15 @@ class JointPathPlanner:
     def _curve_pieces(self, pieces: Floats) -> CurvePieces:
         """Return the curve pieces of rows (n, 3): curve number, begin and end of each piece."""
         number, begin, end = pieces.T
-        return CurvePieces.of(self._path, self._drafts.begin, number.astype(np.intp), begin, end)
+        found = CurvePieces.of(self._path, self._drafts.begin, number.astype(np.intp), begin, end)
+        check_sample_count(
+            found.sample_count,
+            found.index,
+            'check the positions',
+            before=self._sample_count,
+            most=_MAX_SAMPLES,
+        )
+        return found
 
     def _arrivals(self, k: int, stop: int, joint_path: JointPath) -> Floats:
         """Return the configurations (n, 6) at the waypoints of solved segments."""

@@ -24,6 +24,7 @@ from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
 from ur_cartesian_driver.planning.moves.move_chain import MoveChain, Moves, ramp_rate
 from ur_cartesian_driver.planning.moves.path_samples import BlendSamples
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
+from ur_cartesian_driver.planning.moves.speed_limits import arc_limit
 from ur_cartesian_driver.planning.moves.speed_requests import RAMP_SHARE, SpeedRequests
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
@@ -271,11 +272,7 @@ class SegmentTimings:
         if self._arc_leads[sample]:
             point = samples.index[sample]
             radius = self._geometries.path.arc_radius[point - self._geometries.begin]
-            return SpeedLimit(
-                SlowCause.ACCELERATION_LIMIT,
-                f'max_linear_acceleration = {self.options.max_linear_acceleration:g} m/s^2 (in '
-                f'the blend at point {point}, an arc with a radius of {1e3 * radius:.3g} mm)',
-            )
+            return arc_limit(self.options, f'in the blend at point {point},', float(radius))
         if samples.joint_time[sample] < self._tool_time[sample]:
             text = f'max_tool_speed = {self.options.max_tool_speed:g} m/s'
             return SpeedLimit(SlowCause.TOOL_LIMIT, text)

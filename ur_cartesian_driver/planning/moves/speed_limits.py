@@ -58,10 +58,12 @@ class SpeedLimits:
         self._is_joint_move = IS_JOINT[kinds] & curves.is_joint_line
         if len(rows := np.flatnonzero(self._is_joint_move)):
             joint_speed[rows], self._joint[rows] = self._joint_moves(rows, curves)
-        tool_speed = self._tool_speed(curves)
-        self._is_joint_limit = joint_speed < tool_speed
+        tool_speed, self._arcs = self._tool_speed(curves), curves.arcs
+        arc_speed = self._arc_speed(curves)
+        self._is_arc_limit = arc_speed < np.minimum(joint_speed, tool_speed)
+        self._is_joint_limit = ~self._is_arc_limit & (joint_speed < tool_speed)
         #: Maximum speed of the leading quantity.
-        self.speed: Floats = np.minimum(joint_speed, tool_speed)
+        self.speed: Floats = np.minimum.reduce([joint_speed, tool_speed, arc_speed])
         #: Maximum acceleration of the leading quantity.
         self.acceleration = self._acceleration(curves)
         # Lower the limits, so that they hold even if the robot turns the tool at up to
@@ -84,6 +86,8 @@ class SpeedLimits:
 
     def limit(self, row: int) -> SpeedLimit:
         """Return the limit on the speed of a segment."""
+        if self._is_arc_limit[row]:
+            return arc_limit(self._options, 'on', float(self._arcs.radius[row]))
         if not self._is_joint_limit[row]:
             text = f'max_tool_speed = {self._options.max_tool_speed:g} m/s'
             return SpeedLimit(SlowCause.TOOL_LIMIT, text)
@@ -117,6 +121,17 @@ class SpeedLimits:
         speed = self._options.max_tool_speed / np.maximum(per_unit, 1e-300)
         return np.where(self.translates, speed, inf)
 
+    def _arc_speed(self, curves: CurveRows) -> Floats:
+        """
+        Return the greatest speeds (n,) of the leading quantities on arcs; inf on other curves.
+
+        A tool with the speed v on a circle of radius r has the acceleration v^2 / r.
+        """
+        speed, at = np.full(len(self.length), inf), np.flatnonzero(curves.is_arc)
+        fastest = np.sqrt(self._options.max_linear_acceleration * curves.arcs.radius[at])
+        speed[at] = fastest * self.length[at] / np.maximum(curves.length[at], 1e-300)
+        return speed
+
     def _acceleration(self, curves: CurveRows) -> Floats:
         options, length = self._options, self.length
         # Translation and turn of the tool per unit of the leading quantity.
@@ -127,3 +142,12 @@ class SpeedLimits:
             options.max_angular_acceleration / np.maximum(angular, 1e-300),
         )
         return np.where(self._is_joint_move, options.max_joint_acceleration, bound)
+
+
+def arc_limit(options: PlanningOptions, where: str, radius: float) -> SpeedLimit:
+    """Return the limit on the speed on an arc; ``where``: its place, before 'an arc'."""
+    return SpeedLimit(
+        SlowCause.ACCELERATION_LIMIT,
+        f'max_linear_acceleration = {options.max_linear_acceleration:g} m/s^2 ({where} an arc '
+        f'with a radius of {1e3 * radius:.3g} mm)',
+    )

@@ -5,7 +5,7 @@ Derivatives of the joints along a rounded path, where a joint may come near one 
 
 Away from singularities, the tool's limits keep the joints far below theirs. A few configurations
 along the path show this: the inverse of the Jacobian bounds the joint rates by those of the tool.
-Only else are the joints found at all places.
+If these few do not show it, the joints are found at all places.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Peaks: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PathJoints:
+class JointDerivatives:
     """Derivatives by s of k joints at m places."""
 
     #: (m, k) the first derivative; k = 0 if no joint comes near a limit, or if the arm cannot
@@ -43,7 +43,7 @@ class PathJoints:
     end: Joints | None
 
 
-def path_joints(
+def joint_derivatives(
     kinematics: TcpKinematics,
     q_start: Joints,
     s: Floats,
@@ -51,7 +51,7 @@ def path_joints(
     derivatives: tuple[Floats, Floats],
     peaks: Peaks,
     options: PlanningOptions,
-) -> PathJoints:
+) -> JointDerivatives:
     """
     Return the joints along a path.
 
@@ -67,9 +67,9 @@ def path_joints(
         flange = compose_rows(poses[rows], kinematics.T_tcp_flange)
         path = solve_path(arm, flange, q_start, skip_gaps=False)
         if not path.found.all():
-            return PathJoints(q1=none, q2=none, end=None)
+            return JointDerivatives(q1=none, q2=none, end=None)
         end = vector6(path.q[-1].tolist())
         if rows is few and not may_near_limits(kinematics, path.q, *peaks, options):
-            return PathJoints(q1=none, q2=none, end=end)
+            return JointDerivatives(q1=none, q2=none, end=end)
     q1, q2 = joint_rates(arm, kinematics.T_flange_tcp, path.q, *derivatives)
-    return PathJoints(q1=q1, q2=q2, end=end)
+    return JointDerivatives(q1=q1, q2=q2, end=end)
