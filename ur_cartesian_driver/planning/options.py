@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Any, Literal, Protocol
 
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes
@@ -288,10 +288,11 @@ class PlanningOptions:
         """
         return with_lead_times(commands, self.leads, self.lead_file)
 
-    def for_program(self, settings: ProgramTraits) -> PlanningOptions:
-        """Return the options for the robot program of a driver."""
+    def for_program(self, settings: ProgramTraits, **detected: Any) -> PlanningOptions:
+        """Return the options for the robot program of a driver, with other fields replaced too."""
         return replace(
             self,
+            **detected,
             dialect=settings.dialect,
             prelude=settings.prelude,
             # An older program may ignore the command that sets the TCP; the wrong TCP would move.

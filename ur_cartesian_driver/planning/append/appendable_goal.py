@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.goal.goal_columns import (
     SegmentRows,
     WaypointRows,
 )
-from ur_cartesian_driver.motion.plan.plan import PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.plan.plan import PlannedRows, PlannedSegment, ReferencePath
 from ur_cartesian_driver.planning.append.planned_part import PlannedPart
 from ur_cartesian_driver.planning.geometry.curves import SAME_ANGLE, SAME_POSITION
 from ur_cartesian_driver.planning.options import PlanningOptions
@@ -116,7 +116,7 @@ class AppendableGoal:
     state: SplineState | None = None
     #: Pieces up to ``state``, with their path, that are sent (again) together with the next part,
     #: because outputs follow these pieces or a new tail begins in the middle of one of them.
-    replanned: tuple[tuple[PlannedSegment, ...], ReferencePath] | None = None
+    replanned: tuple[PlannedRows, ReferencePath] | None = None
     #: Commands that may not have been carried out, each with the motion time when it is due [s].
     outputs: tuple[tuple[float, IOCommand], ...] = ()
     #: The planned parts of a spline that are not passed, in the order of planning; each is valid

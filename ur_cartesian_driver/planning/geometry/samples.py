@@ -55,7 +55,9 @@ def counted(counts: Indices) -> tuple[Indices, Indices]:
 
 def group_begins(segments: Int32s) -> Indices:
     """Return the first row of each segment; ``segments`` (n,) must not decrease."""
-    return np.flatnonzero(np.diff(segments, prepend=segments[0] - 1))
+    changes = np.ones(len(segments), dtype=np.bool_)
+    np.not_equal(segments[1:], segments[:-1], out=changes[1:])
+    return np.flatnonzero(changes)
 
 
 def first_least(values: Floats, segments: Int32s) -> Indices:

@@ -65,6 +65,8 @@ from ur_cartesian_driver.planning.request.blend_limits import (
 )
 from ur_cartesian_driver.planning.request.goal_fields import (
     FOLLOWS_BLEND_LAWS,
+    IS_LINEAR,
+    IS_PROCESS,
     point_field,
     segment_field,
 )
@@ -83,7 +85,7 @@ _FIRST_RUN = 8
 #: Maximum number of samples of a goal: a million short segments with blends need three million.
 _MAX_SAMPLES = 4_000_000
 
-_JOINT, _LINEAR, _PROCESS = SegmentType.JOINT, SegmentType.LINEAR, SegmentType.PROCESS
+_JOINT = SegmentType.JOINT
 #: Refusals after which a line or an arc can be replaced by a joint move.
 _NO_STRAIGHT_PATH = (InvalidPosture, NearSingularity, JointLimitExceeded, Unreachable)
 
@@ -194,14 +196,16 @@ class JointPathPlanner:
         """Make the blends of a run and the blend into it; leave room for the blend after it."""
         drafts, path, first = self._drafts, self._path, max(k - 1, 0)
         path.remove_blends(first, stop)
+        if not drafts.is_blended[first:stop].any():
+            return
         rows = first + np.flatnonzero(drafts.is_blended[first:stop])
         by_laws = FOLLOWS_BLEND_LAWS[drafts.kinds]
         reach = drafts.radii * np.where(by_laws, self._laws.blend_begin, 1.0)
         path.leave(rows, reach[rows])
         made = rows[rows < stop - 1]
-        fillet = (drafts.kinds[made] == _PROCESS) & (drafts.kinds[made + 1] == _PROCESS)
+        fillet = IS_PROCESS[drafts.kinds[made]] & IS_PROCESS[drafts.kinds[made + 1]]
         path.make_blends(made, drafts.radii[made], reach[made], fillet)
-        is_line = drafts.kinds == _LINEAR
+        is_line = IS_LINEAR[drafts.kinds]
         measured = made[is_line[made] & is_line[made + 1]]
         path.blend_tolerance[measured] *= self._blend_uncertainty
         for row in rows_where(path.u_join[first:stop] > path.u_leave[first:stop]):
@@ -422,8 +426,8 @@ class JointPathPlanner:
         segment = SegmentRows.of([Segment(type=geometries.segments[0].type)])
         return replace(
             geometries,
-            waypoints=geometries.waypoints.with_first(waypoint),
-            segments=geometries.segments.with_first(segment),
+            waypoints=waypoint + geometries.waypoints[1:],
+            segments=segment + geometries.segments[1:],
             waits=waits,
         )
 

@@ -16,13 +16,14 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
-from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
+from ur_cartesian_driver.motion.goal.goal import ArcMode
 from ur_cartesian_driver.motion.goal.goal_columns import rows_where
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
 from ur_cartesian_driver.planning.geometry.blended_path import CurveRows
 from ur_cartesian_driver.planning.geometry.curves import SAME_POSITION
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.goal_fields import IS_ARC, IS_ARC_OR_PROCESS, IS_JOINT
 
 #: Lower bound of lengths, for a first segment that ends where the robot already is.
 _MIN_LENGTH = 1e-9
@@ -40,9 +41,7 @@ class SpeedLimits:
         #: Whether the tool's position changes; if not, the segment only turns the tool.
         self.translates: Flags = curves.length > SAME_POSITION
         self.is_optimized = geometries.is_optimized
-        turns_with_arc = (kinds == SegmentType.CIRCULAR) & (
-            geometries.segments.arc_modes == ArcMode.FIXED
-        )
+        turns_with_arc = IS_ARC[kinds] & (geometries.segments.arc_modes == int(ArcMode.FIXED))
         #: Whether the turn of the tool, or of a joint, leads.
         self.is_turn: Flags = ~self.is_optimized & (
             curves.is_joint_line | ((curves.length < curves.angle) & ~turns_with_arc)
@@ -56,7 +55,7 @@ class SpeedLimits:
         times = np.where(self.is_optimized, 0.0, self._bounds.times)
         joint_speed = np.where(times > 0.0, self.length / np.maximum(times, 1e-300), inf)
         self._joint = self._bounds.joints.copy()
-        self._is_joint_move = (kinds == SegmentType.JOINT) & curves.is_joint_line
+        self._is_joint_move = IS_JOINT[kinds] & curves.is_joint_line
         if len(rows := np.flatnonzero(self._is_joint_move)):
             joint_speed[rows], self._joint[rows] = self._joint_moves(rows, curves)
         tool_speed, self._arcs = self._tool_speed(curves), curves.arcs
@@ -72,7 +71,7 @@ class SpeedLimits:
         turn = np.minimum(curves.angle, self.length)  # a FIXED arc turns the tool by the arc angle
         ratio = max(options.turn_ratio, options.laws.turn_ratio)
         counted = np.maximum(curves.length, turn / ratio) / self.length
-        ahead = (kinds == SegmentType.CIRCULAR) | (kinds == SegmentType.PROCESS)
+        ahead = IS_ARC_OR_PROCESS[kinds]
         faster = np.where(ahead, np.minimum(1.0, counted), 1.0)
         self.speed *= faster
         self.acceleration *= faster

@@ -21,9 +21,8 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     is_timed,
     resolve_execution_mode,
     segment_field,
+    TAKES_TOOL_SPEED,
 )
-
-_TYPES = (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.PROCESS, SegmentType.CIRCULAR)
 
 
 def corner_bounds(goal: GoalTable) -> Floats:
@@ -67,7 +66,7 @@ def check_rounded(goal: GoalTable, options: PlanningOptions) -> None:
             'send the whole path',
         )
     segments = goal.segments
-    wrong = ~np.isin(segments.types, _TYPES) | (segments.blend_radii > 0.0)
+    wrong = ~TAKES_TOOL_SPEED[segments.types] | (segments.blend_radii > 0.0)
     wrong |= segments.free_axes != FreeAxis.NONE
     for i in rows_where(wrong)[:1]:
         _refuse_segment(i, segments[i])

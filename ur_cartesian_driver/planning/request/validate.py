@@ -57,6 +57,7 @@ from ur_cartesian_driver.planning.request.field_rules import (
 from ur_cartesian_driver.planning.request.free_axis_rules import check_free_axes
 from ur_cartesian_driver.planning.request.goal_fields import (
     gives_joints,
+    IS_ARC,
     IS_OPTIMIZED,
     is_rounded,
     is_spline,
@@ -93,7 +94,8 @@ def check(goal: Goal, options: PlanningOptions) -> GoalTable:
     with np.errstate(over='ignore', invalid='ignore'):  # a goal may contain any numbers
         for rule in FIELD_RULES:
             rule(table, options)
-        table = replace(table, io_commands=options.lead_times(table.io_commands))
+        if table.io_commands:
+            table = replace(table, io_commands=options.lead_times(table.io_commands))
         for rule in RULES:
             rule(table, options)
     return table
@@ -160,16 +162,17 @@ def _keep_open(goal: GoalTable, options: PlanningOptions) -> None:
 
 def _supported(goal: GoalTable, options: PlanningOptions) -> None:
     check_mode(goal, GOAL_RULES['on_path_tolerance'])
-    tolerance = apply_default_tolerances(goal, options).path_tolerance
-    limits = (*tolerance.position, *tolerance.orientation, *tolerance.twist)
-    is_limited = max((*limits, *tolerance.acceleration)) > 0.0
-    if goal.on_path_tolerance == OnPathTolerance.STALL and not is_limited:
-        raise InvalidGoal(
-            'path_tolerance',
-            'limits nothing, so that the arm is never off its path; on_path_tolerance is STALL',
-            'set a limit, or on_path_tolerance to ABORT',
-        )
-    if goal.stall_timeout and goal.on_path_tolerance != OnPathTolerance.STALL:
+    if goal.on_path_tolerance == OnPathTolerance.STALL:
+        tolerance = apply_default_tolerances(goal, options).path_tolerance
+        limits = (*tolerance.position, *tolerance.orientation, *tolerance.twist)
+        if max((*limits, *tolerance.acceleration)) <= 0.0:
+            raise InvalidGoal(
+                'path_tolerance',
+                'limits nothing, so that the arm is never off its path; on_path_tolerance is '
+                'STALL',
+                'set a limit, or on_path_tolerance to ABORT',
+            )
+    elif goal.stall_timeout:
         raise InvalidGoal(
             'stall_timeout',
             f'is {goal.stall_timeout:g} s, but on_path_tolerance is ABORT, which waits for no arm',
@@ -205,7 +208,7 @@ def _times(goal: GoalTable, options: PlanningOptions) -> None:
 def _segment_rules(goal: GoalTable, options: PlanningOptions) -> None:
     timed, segments = is_timed(goal), goal.segments
     is_fast = np.maximum(segments.velocities, segments.accelerations) > 1.0
-    is_arc = segments.types == SegmentType.CIRCULAR
+    is_arc = IS_ARC[segments.types]
     has_via_fields = segments.arc_modes != ArcMode.UNCONSTRAINED
     has_via_fields |= segments.has_via & (segments.vias != IDENTITY.row()).any(axis=1)
     has_via_fields[list(segments.via_postures)] = True
@@ -252,9 +255,9 @@ def _joint_points(goal: GoalTable, options: PlanningOptions) -> None:
 
 
 def _motions(goal: GoalTable, options: PlanningOptions) -> None:
-    if is_spline(goal):
-        return  # a spline can wait at a point
     points, segments = goal.waypoints, goal.motions
+    if len(points) < 2 or is_spline(goal):
+        return  # a spline can wait at a point
     lengths = np.linalg.norm(np.diff(points.poses[:, :3], axis=0), axis=1)
     suspect = IS_STRAIGHT[segments.types[1:]] & (lengths < 2.0 * SAME_POSITION)
     starts, ends = points.poses[:-1].copy(), points.poses[1:].copy()

@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
-from ur_cartesian_driver.planning.rounded.joint_derivatives import joint_derivatives, ToolPeaks
+from ur_cartesian_driver.planning.rounded.joint_derivatives import joint_derivatives, Peaks
 from ur_cartesian_driver.planning.rounded.programmed_path import ProgrammedSection
 from ur_cartesian_driver.planning.rounded.rounded_path import PathRows, RoundedPath
 from ur_cartesian_driver.planning.rounded.time_law import (
@@ -237,18 +237,15 @@ class SectionLaw:
             'turn': _corner_speed(samples.w1, samples.w2, tool.turn_accelerations),
         }
 
-    def _tool_peaks(self) -> ToolPeaks:
+    def _tool_peaks(self) -> Peaks:
         samples, fastest = self.samples, np.minimum.reduce(list(self.caps.values()))
         travel, turn = length_rows(samples.x1), length_rows(samples.w1)
         along = turn * self._ramp / np.maximum(travel, _TINY)
         across = length_rows(samples.w2) * fastest**2
-        return ToolPeaks(
-            speed=float((travel * fastest).max()),
-            turn_rate=float((turn * fastest).max()),
-            acceleration=float(self._tool.accelerations.max()),
-            turn_acceleration=float(
-                np.minimum(along + across, self._limits_at.turn_accelerations).max()
-            ),
+        turns = np.minimum(along + across, self._limits_at.turn_accelerations)
+        return (
+            (float((travel * fastest).max()), float((turn * fastest).max())),
+            (float(self._tool.accelerations.max()), float(turns.max())),
         )
 
     def _joint_caps(self) -> dict[str, Floats]:

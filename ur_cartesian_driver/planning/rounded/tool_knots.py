@@ -197,7 +197,7 @@ class _HalfSteps:
         return largest
 
     def _pieces(self, begin: Indices, end: Indices) -> _Pieces:
-        knots = np.unique(np.concatenate([begin, end]))
+        knots = np.flatnonzero(np.bincount(np.concatenate([begin, end])))
         # The spline also has pieces across the gaps between the given ones.
         spline = ToolSpline.through(self.points(2 * knots))
         return _Pieces(spline, np.searchsorted(knots, begin), begin, end)

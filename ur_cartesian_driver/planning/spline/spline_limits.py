@@ -16,10 +16,12 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
+from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates, largest_joint_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
+from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
+from ur_cartesian_driver.motion.goal.goal_columns import zeros
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
 from ur_cartesian_driver.planning.geometry.samples import MIN_SAMPLES
 from ur_cartesian_driver.planning.options import PlanningOptions
@@ -28,10 +30,13 @@ from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 
 _ROUNDING = 1e-6
+#: A joint is near a limit if the bound of its rate exceeds this part of the limit: the inverse of
+#: the Jacobian differs a little from place to place. It is computed at every so many samples.
+_NEAR, _FEW = 0.5, 3
 # Fractions of a short piece at which its rates are computed, beside those at its samples.
 _QUARTERS = (0.25, 0.5, 0.75)
 # The rates of a piece are computed at this many steps if a quantity may exceed the known greatest
-# excess by this factor between samples; so many pieces at a time, to save memory.
+# excess by this factor between samples. So many pieces or rows at a time, to stay in the cache.
 _DENSE, _HIGHER, _BLOCK = 64, 1.001, 1024
 
 
@@ -128,14 +133,48 @@ def worst_excess(
 ) -> LimitExcess | None:
     """Return the quantity along a path that exceeds its limit most; None if none does."""
     sampled, durations = path.piece + path.u, np.diff(path.spline.times)
+    arm = kinematics.arm
+    joint_speeds = np.abs(np.diff(path.q, axis=0)) / np.diff(path.times)[:, None]
+    is_near = bool((joint_speeds > _NEAR * np.array(arm.model.max_joint_speed)).any())
+    if not is_near:
+        speeds, accelerations = (
+            (float(length_rows(rows[:, :3]).max()), float(length_rows(rows[:, 3:]).max()))
+            for rows in path.spline.rates(path.piece, path.u * durations[path.piece])
+        )
+        is_near = may_near_limits(kinematics, path.q[::_FEW], speeds, accelerations, options)
 
     def rates(piece: Indices, u: Floats) -> Rates:
-        q = np.stack([np.interp(piece + u, sampled, joint) for joint in path.q.T], axis=1)
         tool = path.spline.rates(piece, u * durations[piece])
-        return Rates(*tool, *joint_rates(kinematics.arm, kinematics.T_flange_tcp, q, *tool))
+        if not is_near:
+            return Rates(*tool, zeros(len(u)), zeros(len(u)))
+        q = np.stack([np.interp(piece + u, sampled, joint) for joint in path.q.T], axis=1)
+        return Rates(*tool, *joint_rates(arm, kinematics.T_flange_tcp, q, *tool))
 
-    model = kinematics.arm.model
-    return worst_excess_between(rates, path.piece, path.u, path.first, model, options)
+    return worst_excess_between(rates, path.piece, path.u, path.first, arm.model, options)
+
+
+def may_near_limits(
+    kinematics: TcpKinematics,
+    q: Floats,
+    rates: tuple[float, float],
+    accelerations: tuple[float, float],
+    options: PlanningOptions,
+) -> bool:
+    """
+    Return whether a joint may come near a limit in one of the configurations (n, 6) [rad].
+
+    The inverse of the Jacobian bounds the joint rates by those of the tool.
+
+    :param rates: greatest speed and turn rate of the tool [m/s], [rad/s].
+    :param accelerations: likewise [m/s^2], [rad/s^2].
+    """
+    arm, T_flange_tcp = kinematics.arm, kinematics.T_flange_tcp
+    for k in range(0, len(q), _BLOCK):
+        qd, qdd = largest_joint_rates(arm, T_flange_tcp, q[k : k + _BLOCK], rates, accelerations)
+        speeds = qd / arm.model.max_joint_speed
+        if max(speeds.max(), qdd.max() / options.max_joint_acceleration) > _NEAR:
+            return True
+    return False
 
 
 def worst_excess_between(

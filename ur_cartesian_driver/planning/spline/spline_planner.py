@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from math import ceil, degrees, inf
 
 import numpy as np
@@ -212,6 +212,7 @@ def end_state(plan: Plan) -> SplineState:
     )
 
 
+@lru_cache(maxsize=8)  # it is checked, then sent
 def plan_stop(state: SplineState, arm: Arm, options: PlanningOptions, point: int) -> Spline:
     """
     Return the piece that brings a moving arm to rest, each joint in its direction of motion.
@@ -276,6 +277,7 @@ def _stop_fault(
     )
 
 
+@lru_cache(maxsize=8)
 def rows_along(piece: Spline, state: SplineState, samples: int) -> tuple[Floats, Floats, Floats]:
     """Return joint positions and their rates at times evenly along a piece that begins so."""
     spline = JointSpline.of(state.q, [piece], velocities=state.qd, accelerations=state.qdd)
