@@ -6,6 +6,7 @@ from contextlib import nullcontext
 from io import StringIO
 from math import hypot, sqrt
 import shlex
+from typing import cast, TYPE_CHECKING
 from unittest.mock import Mock
 
 import pytest
@@ -20,6 +21,9 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import OutputKind
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.path import digital
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.driver import Driver
 
 SPEEDS = {'slow': 0.02, 'fast': 0.2}
 
@@ -165,7 +169,7 @@ class TerseDriver:
 def test_a_bead_whose_speed_was_not_reported_tells_nothing():
     beads = Beads(slow=0.02, fast=0.2, length=0.1, beside=0.01, along='x')
     with pytest.raises(RobotNotReady, match='did not report its speed during a bead'):
-        lay_beads(TerseDriver(), beads, digital(2), lambda _: True)
+        lay_beads(cast('Driver', TerseDriver()), beads, digital(2), lambda _: True)
 
 
 def test_an_empty_name_is_refused_before_beads_are_laid(monkeypatch, capsys, tmp_path):
