@@ -62,7 +62,7 @@ class JointSpline:
         after = MotionRows(rows.targets, rows.velocities, reached)
         first = start, velocities or ZERO6, accelerations or ZERO6
         before = MotionRows(
-            *(np.concatenate([[a], b[:-1]]) for a, b in zip(first, after, strict=True))
+            *(np.concatenate([[a], b])[:-1] for a, b in zip(first, after, strict=True))
         )
         coefficients = np.where(
             rows.quintic[:, None, None],
