@@ -97,6 +97,35 @@ def test_mine(ros, private_ros_graph):
     assert other is None or re.search(REFUSED.format(other), shown)
 
 
+def test_the_lock_of_a_domain_is_no_file(run, tmp_path, monkeypatch):
+    """A file in a folder of all users could be one that another user may not open."""
+    monkeypatch.setenv('TMPDIR', str(tmp_path))
+    for domain in range(60, 101):
+        (tmp_path / f'ur_cartesian_driver_test_domain_{domain}').mkdir()
+    shown, counts = run("""
+def test_mine(private_ros_graph):
+    assert 60 <= private_ros_graph <= 100
+""")
+    assert counts == {'passed': 1}, shown
+
+
+def test_a_marker_whose_argument_has_no_name_fails_its_test(run):
+    shown, counts = run("""
+@pytest.mark.ur_sim('ur10e')
+def test_sim(ur_sim):
+    pass
+
+@pytest.mark.ur_sim(model='ur10e')
+def test_named(ur_sim):
+    assert ur_sim.config.model == 'ur10e'
+""")
+    assert counts == {'passed': 1, 'error': 1}, shown
+    assert (
+        "the marker ur_sim has the argument 'ur10e' without a name; write "
+        '@pytest.mark.ur_sim(NAME=VALUE)'
+    ) in shown
+
+
 def test_two_workers_have_two_domains(run, tmp_path):
     pytest.importorskip('xdist')
     shown, counts = run(

@@ -5,7 +5,7 @@
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 import csv
 from dataclasses import replace
-from math import pi
+from math import nan, pi
 import os
 
 import numpy as np
@@ -63,6 +63,34 @@ def test_each_variant_gets_its_verdict_in_order():
     assert results[2].code is ErrorCode.UNREACHABLE
     assert 'cannot be reached' in results[2].refusal
     assert results[0].duration == pytest.approx(1.2, abs=0.1)
+
+
+def test_offsets_of_offsets_add_up_and_so_do_their_coordinates():
+    """The coordinate of a place is its distance from the place of the first variant."""
+    twice = at_places(at_places(VARIANT, x=(0.0, 0.1), rz=(0.2,)), x=(0.01, 0.02), y=(0.3,))
+    assert [v.offset for v in twice] == [
+        pytest.approx((x, 0.3, 0.0, 0.2)) for x in (0.01, 0.02, 0.11, 0.12)
+    ]
+    assert [v.coordinates['x'] for v in twice] == [v.offset[0] for v in twice]
+    moved = at_places(at_places(VARIANT, x=(0.0, 0.1)), x=(0.05,))
+    assert [v.coordinates['x'] for v in moved] == pytest.approx([0.05, 0.15])
+    across = at_places(at_places(VARIANT, x=(0.0, 0.1)), y=(0.0, 0.2))
+    assert (
+        [(v.offset[0], v.offset[1]) for v in across]
+        == [(v.coordinates['x'], v.coordinates['y']) for v in across]
+        == [(0.0, 0.0), (0.0, 0.2), (0.1, 0.0), (0.1, 0.2)]
+    )
+
+
+def test_a_model_without_calibration_has_no_coordinate_of_one():
+    """A new model replaces the calibrated arm, so the seed of the calibration means nothing."""
+    (seeded,) = calibrated(at_places(VARIANT, x=(0.0, 0.1))[1], 1, seed=7)
+    assert seeded.coordinates == {'x': 0.1, 'calibration': 7.0}
+    (other,) = on_models(seeded, ['ur10e'])
+    assert not other.arm.calibrated
+    assert other.coordinates == {'x': 0.1, 'model': 'ur10e'}
+    (again,) = calibrated(other, 1, seed=3)
+    assert again.coordinates == {'x': 0.1, 'model': 'ur10e', 'calibration': 3.0}
 
 
 def test_the_margins_are_those_of_the_configurations_on_the_way():
@@ -161,3 +189,19 @@ def test_the_command_refuses_what_is_too_much_or_contradicts(capsys):
     assert main(['sweep', 'square', '--monte-carlo', '2', '--calibration-seed', '1']) == 1
     assert 'draws calibrations of its own' in capsys.readouterr().err
     assert PlanningOptions() == VARIANT.options
+
+
+def test_the_map_is_of_what_a_user_can_choose_and_of_what_all_variants_share():
+    """Calibrations are no axis beside places, and variants need not have the same coordinates."""
+    places = at_places(VARIANT, x=(0.0, 0.02), y=(0.0, 0.01))
+    results = sweep([each for place in places for each in calibrated(place, 3)], Inline())
+    assert heat_map(results).splitlines()[1].split() == ['x', '/', 'y', '0', '0.02']
+    mixed = sweep([VARIANT, *at_places(VARIANT, x=(0.0, 0.02))], Inline())
+    assert heat_map(mixed).splitlines()[1].split() == ['x', '0', '0.02']
+
+
+def test_the_smallest_margin_is_one_that_is_known():
+    first, second = sweep([VARIANT, VARIANT], Inline())
+    unknown = replace(first, margins=replace(first.margins, clearance=nan))
+    for results in ([unknown, second], [second, unknown]):
+        assert summary(results) == summary([second, second])

@@ -23,11 +23,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import contextlib
-import fcntl
+import errno
 import os
-from pathlib import Path
+import socket
 import sys
-import tempfile
 from typing import Any, TYPE_CHECKING
 
 import pytest
@@ -38,8 +37,8 @@ if TYPE_CHECKING:
     from ur_cartesian_driver.ros import CartesianDriverNode
     from ur_cartesian_driver.sim import SimulatedRobot
 
-#: ROS domains that users rarely choose; 0 to 101 are allowed on all systems.
-DOMAINS = range(60, 101)
+#: ROS domains that users rarely choose, the rarest first; 0 to 101 are allowed on all systems.
+DOMAINS = range(100, 59, -1)
 #: How long the driver may take to connect to the simulator [s].
 READY_TIMEOUT = 10.0
 
@@ -85,7 +84,7 @@ def private_ros_graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]
         domain = next((d for d in DOMAINS if _lock_domain(d, stack)), None)
         if domain is None:
             pytest.fail(
-                f'other test runs use all ROS domains from {DOMAINS[0]} to {DOMAINS[-1]}; wait '
+                f'other test runs use all ROS domains from {DOMAINS[-1]} to {DOMAINS[0]}; wait '
                 'for them to end',
                 pytrace=False,
             )
@@ -101,12 +100,15 @@ def private_ros_graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]
 
 def _lock_domain(domain: int, stack: contextlib.ExitStack) -> bool:
     """Lock a domain until the stack closes; return False if another run has locked it."""
-    path = Path(tempfile.gettempdir(), f'ur_cartesian_driver_test_domain_{domain}')
-    lock = stack.enter_context(path.open('w'))
+    # A name without a file, in Linux's abstract namespace: no user of the computer can leave a
+    # lock behind that another one may not open, and processes share it that share the network.
+    lock = stack.enter_context(socket.socket(socket.AF_UNIX))
     try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
+        lock.bind(f'\0ur_cartesian_driver_test_domain_{domain}')
+    except OSError as error:
+        if error.errno == errno.EADDRINUSE:
+            return False
+        raise
     return True
 
 

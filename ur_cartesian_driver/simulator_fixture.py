@@ -37,8 +37,18 @@ def simulated_robot(request: pytest.FixtureRequest, marker: str) -> Iterator[Sim
 
 
 def marker_values(request: pytest.FixtureRequest, name: str) -> dict[str, Any]:
-    """Return the merged arguments of a test's markers; the closest marker has priority."""
+    """
+    Return the merged arguments of a test's markers; the closest marker has priority.
+
+    The test fails if a marker has an argument without a name.
+    """
     values: dict[str, Any] = {}
     for marker in reversed(list(request.node.iter_markers(name))):
+        if marker.args:
+            pytest.fail(
+                f'the marker {name} has the argument {marker.args[0]!r:.60} without a name; write '
+                f'@pytest.mark.{name}(NAME=VALUE)',
+                pytrace=False,
+            )
         values |= marker.kwargs
     return values

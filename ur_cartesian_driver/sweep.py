@@ -5,8 +5,8 @@ Plan one goal in many variants: at other places, on other models, on arms that d
 
 ::
 
-    variants = calibrated(at_places(Variant(path), x=(-0.1, 0.0, 0.1), y=(0.0, 0.1)), 20, seed=1)
-    results = sweep(variants)
+    places = at_places(Variant(goal=path), x=(-0.1, 0.0, 0.1), y=(0.0, 0.1))
+    results = sweep(calibrated(places, 20, seed=1))
     print(table(results))
     print(heat_map(results))
 """
@@ -25,6 +25,7 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from math import inf, isfinite, nan
 import multiprocessing
+import operator
 import os
 from pathlib import Path as FilePath
 from typing import Any, TypeAlias
@@ -55,6 +56,7 @@ from ur_cartesian_driver.planning.preflight.tightest_margins import (
 )
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.preview import sample
+from ur_cartesian_driver.preview.pictures import pyplot
 from ur_cartesian_driver.sim.calibration import random_calibration
 from ur_cartesian_driver.sim.simulator_config import HOME
 
@@ -128,33 +130,42 @@ def at_places(
     rz: Sequence[float] = (0.0,),
 ) -> list[Variant]:
     """
-    Return each variant at all places of a grid.
+    Return each variant at all places of a grid around the place that it has already.
+
+    Coordinates are the sums of all offsets, for the axes that have several values.
 
     :param x: offsets of the goal's frame along the base's x [m]; ``y`` and ``z`` likewise.
     :param rz: turns about an axis through the frame's origin, parallel to the base's z [rad].
     """
     axes = {'x': x, 'y': y, 'z': z, 'rz': rz}
-    named = [name for name, values in axes.items() if len(values) > 1]
-    return [
-        replace(
-            variant,
-            offset=(place[0], place[1], place[2], place[3]),
-            coordinates={**variant.coordinates}
-            | {name: v for name, v in zip(axes, place, strict=True) if name in named},
-        )
-        for variant in _each(variants)
-        for place in product(*(map(float, values) for values in axes.values()))
-    ]
+    named = {name for name, values in axes.items() if len(values) > 1}
+    found = []
+    for variant in _each(variants):
+        shown = [name for name in axes if name in named | set(variant.coordinates)]
+        for step in product(*(map(float, values) for values in axes.values())):
+            place = dict(zip(axes, map(operator.add, variant.offset, step), strict=True))
+            found.append(
+                replace(
+                    variant,
+                    offset=(place['x'], place['y'], place['z'], place['rz']),
+                    coordinates={**variant.coordinates} | {name: place[name] for name in shown},
+                )
+            )
+    return found
 
 
 def on_models(variants: Variant | Iterable[Variant], names: Iterable[str]) -> list[Variant]:
     """Return each variant on arms of other models, in their nominal geometry."""
     arms = {name: Arm(robot_model(name)) for name in names}
     return [
-        replace(variant, arm=arm, coordinates={**variant.coordinates, 'model': name})
+        replace(variant, arm=arm, coordinates={**_without_calibration(variant), 'model': name})
         for variant in _each(variants)
         for name, arm in arms.items()
     ]
+
+
+def _without_calibration(variant: Variant) -> dict[str, Coordinate]:
+    return {name: v for name, v in variant.coordinates.items() if name != 'calibration'}
 
 
 def calibrated(variants: Variant | Iterable[Variant], count: int, seed: int = 0) -> list[Variant]:
@@ -360,13 +371,13 @@ def summary(results: Sequence[SweepResult]) -> str:
     text = f'{len(passed)} of {len(results)} variants pass'
     if not passed:
         return f'{text}.'
-    least = (
-        f'{title.split(" [")[0]} {_text(min(_value(r, name) for r in passed))} '
-        f'{title.split("[")[1].rstrip("]")}'
-        for name, title in COLUMNS.items()
-        if name != 'duration'
-    )
-    return f'{text}; smallest margins: {", ".join(least)}.'
+    margins = []
+    for name, title in COLUMNS.items():
+        if name != 'duration':
+            what, unit = title.rstrip(']').split(' [')
+            least = np.fmin.reduce([_value(r, name) for r in passed])  # NaN is not known
+            margins.append(f'{what} {_text(float(least))} {unit}')
+    return f'{text}; smallest margins: {", ".join(margins)}.'
 
 
 def _text(value: Coordinate) -> str:
@@ -381,7 +392,8 @@ def _axes(results: Sequence[SweepResult]) -> list[str]:
     for result in results:
         for name, value in result.variant.coordinates.items():
             values.setdefault(name, set()).add(value)
-    return sorted(values, key=lambda name: -len(values[name]))[:2]
+    # The arm's calibration only where there is nothing to choose.
+    return sorted(values, key=lambda name: (name == 'calibration', -len(values[name])))[:2]
 
 
 def _grid(
@@ -394,12 +406,13 @@ def _grid(
     """
     names = _axes(results)
     values: list[list[Coordinate]] = [
-        sorted({r.variant.coordinates[name] for r in results}, key=_order) for name in names
+        sorted({r.variant.coordinates.get(name, '') for r in results}, key=_order)
+        for name in names
     ]
     grid = np.full([len(each) for each in values], nan)
     for result in results:
         cell = tuple(
-            each.index(result.variant.coordinates[name])
+            each.index(result.variant.coordinates.get(name, ''))
             for name, each in zip(names, values, strict=True)
         )
         grid[cell] = np.fmin(grid[cell], _value(result, column) if result.passes else -inf)
@@ -440,14 +453,8 @@ def draw(results: Sequence[SweepResult], picture: FilePath) -> None:
 
     :raises OSError: matplotlib is not installed, or the file cannot be written.
     """
-    try:
-        import matplotlib
-    except ImportError:
-        raise OSError('no picture without matplotlib; install it (extra `plot`)') from None
-    matplotlib.use('Agg')
-    from matplotlib import pyplot
-
-    figure, charts = pyplot.subplots(2, 2, figsize=(11.0, 8.0), layout='constrained')
+    plt = pyplot()
+    figure, charts = plt.subplots(2, 2, figsize=(11.0, 8.0), layout='constrained')
     for chart, (column, title) in zip(charts.flat, COLUMNS.items(), strict=False):
         names, values, grid = _grid(results, column)
         chart.set_title(title)
@@ -463,7 +470,7 @@ def draw(results: Sequence[SweepResult], picture: FilePath) -> None:
             chart.set_yticks([])
     figure.suptitle(summary(results).split(';')[0].rstrip('.'))
     figure.savefig(picture, dpi=110)
-    pyplot.close(figure)
+    plt.close(figure)
 
 
 def _ticks(values: Sequence[Coordinate]) -> tuple[list[int], list[str]]:

@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 Result = FollowCartesianTrajectory.Result
 #: How long anything may take that is not a motion [s].
-TIMEOUT = 10.0
+TIMEOUT = 60.0
 
 
 class Client:

@@ -99,7 +99,7 @@ def test_outputs_of_every_kind_become_safe(end, execution):
             cell.robot.inject(end)
         await cell.until(lambda: motion.outcome)
         assert all_values(cell) == SAFE
-        assert 'is as it was' not in motion.outcome.text
+        assert 'may not have been set' not in motion.outcome.text
 
     run_cell(scenario)
 
@@ -193,7 +193,9 @@ def test_where_neither_way_works_result_and_status_say_so():
         await cell.until(lambda: motion.outcome)
         assert all_values(cell)[:3] == (True, False, False)
         assert motion.outcome.code is ErrorCode.PROTECTIVE_STOP
-        sentence = 'The standard digital output 3 and standard digital output 7 are as they were'
+        sentence = (
+            'The standard digital output 3 and standard digital output 7 may not have been set'
+        )
         assert sentence in motion.outcome.text
         assert sentence in cell.status.last_error
         assert 'configurable' not in motion.outcome.text

@@ -8,6 +8,7 @@ import pytest
 from synthetic_recording import only_file, outputs, packet, record
 
 from ur_cartesian_driver.cli import main
+from ur_cartesian_driver.driver.recordings.recording_folder import newest_recording
 from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 
 
@@ -48,6 +49,26 @@ def test_without_matplotlib_one_sentence_says_so(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err == (
         'ur-cartesian plot: no picture without matplotlib; install it (extra `plot`)\n'
     )
+
+
+def test_the_newest_recording_of_a_directory_has_the_name_of_one(tmp_path):
+    """A recording that was renamed to keep it is none of the newest."""
+    older = tmp_path / '20260102-030405-006_spline_12_points.npz'
+    newer = tmp_path / '20260302-030405-006_primitives_2_points_2.npz'
+    for file in (older, newer, tmp_path / 'seam_12_points.npz', tmp_path / 'z_points.part'):
+        file.touch()
+    assert newest_recording(tmp_path) == newer
+    assert newest_recording(older) == older
+    running = tmp_path / '20260402-030405-006_spline_3_points.part'
+    running.mkdir()
+    assert newest_recording(running) == running
+    newer.unlink()
+    assert newest_recording(tmp_path) == older
+    older.unlink()
+    assert newest_recording(tmp_path) == running
+    running.rmdir()
+    with pytest.raises(OSError, match='there is no recording in'):
+        newest_recording(tmp_path)
 
 
 def test_a_directory_without_recordings_is_named(tmp_path, capsys):

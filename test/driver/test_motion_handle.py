@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The handle of a motion, which its owner holds."""
 
+import logging
 from math import nan
 from threading import Event, Thread
 from types import SimpleNamespace
@@ -11,9 +12,13 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.driver.ipc.channel import SetFeedOverride, SetPathOffset
+from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.motion_handle import ActiveMotion
+from ur_cartesian_driver.driver.reported_robot import ReportedRobot
 from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
 from ur_cartesian_driver.motion.events import Outcome
+from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.robot.connection_status import ConnectionStatus
 
 
 class PlanWithReport:
@@ -44,7 +49,7 @@ def test_an_offset_is_sent_in_plain_numbers():
 @pytest.mark.parametrize(
     ('plan', 'values', 'text'),
     [
-        (PlanWithReport, {}, 'path_offset is empty in the goal that runs; set its limits'),
+        (PlanWithReport, {}, 'path_offset is not set in the running goal; set its limits'),
         (PlanWithBand, {'across': nan}, 'across is nan; it must be finite'),
         (PlanWithBand, {'normal': 'near'}, "normal is 'near'"),
         (PlanWithBand, {'age': -1}, 'age is -1.0; it must be finite, and at least 0'),
@@ -74,7 +79,7 @@ def test_a_feed_is_sent_even_if_it_is_an_invalid_signal():
 
 def test_a_goal_without_feed_override_takes_none():
     motion = ActiveMotion(7, cast('Any', PlanWithReport()), None, print).motion
-    with pytest.raises(InvalidGoal, match='feed_override is empty in the goal that runs; set its'):
+    with pytest.raises(InvalidGoal, match='feed_override is not set in the running goal; set its'):
         motion.set_feed_override(0.5)
 
 
@@ -85,6 +90,21 @@ def test_a_motion_can_be_cancelled_before_the_report_of_its_plan_is_made():
     active.motion.cancel()
     assert [request.motion for request in sent] == [7]
     assert plan.made == 0
+
+
+def test_an_error_of_a_callback_goes_to_the_log_of_its_driver(caplog):
+    log = logging.getLogger('left_arm')
+
+    def fail(progress):
+        raise KeyError('nothing here')
+
+    active = ActiveMotion(7, cast('Any', PlanWithReport()), fail, print, log)
+    active.report(cast('Any', None))
+    robot = ReportedRobot(DriverConfig(robot_ip='127.0.0.1'), PlanningOptions(), log)
+    robot.status_listeners.append(fail)
+    robot.set_status(ConnectionStatus())
+    assert [record.name for record in caplog.records] == ['left_arm', 'left_arm']
+    assert 'a callback of the driver failed with KeyError' in caplog.text
 
 
 def test_who_waits_for_the_outcome_makes_the_report_meanwhile_and_once():

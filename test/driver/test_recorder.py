@@ -2,15 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings on disk: of a whole motion, of half a motion, and on a full disk."""
 
+from collections.abc import Callable
 import contextlib
 import json
 import os
+import pathlib
 import pickle
 import resource
 import signal
 import subprocess
 import sys
+import threading
 import tracemalloc
+from typing import cast
 
 import numpy as np
 import pytest
@@ -35,6 +39,7 @@ from ur_cartesian_driver.driver.recordings import recording_format
 from ur_cartesian_driver.driver.recordings.recorder import (
     BUFFER_COUNT,
     BUFFER_ROWS,
+    MAX_PENDING_JOBS,
     motion_metadata,
     plan_metadata,
     Recorder,
@@ -48,6 +53,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.resources import share_path
 
 # ---- contents of a file -------------------------------------------------------------------------
 
@@ -218,6 +224,44 @@ def a_disk_of(size):
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
+def test_a_stalled_disk_costs_pieces_of_the_plan_with_a_warning_and_nothing_else(tmp_path):
+    warnings = Warnings()
+    recorder = Recorder(str(tmp_path), 100.0, warnings)
+    recorder._start_workers()
+    stalled = threading.Event()
+    recorder._writer.submit(cast('Callable[[], None]', stalled.wait))
+    for _ in range(MAX_PENDING_JOBS):
+        recorder._writer.submit(lambda: None)
+    recorder.start(JOB, dict(METADATA), packet(0))
+    for i in range(1, 10):
+        recorder.add_state(packet(i))
+    recorder.end(DONE)
+    stalled.set()
+    recorder.close(10.0)
+    found = Recording.load(only_file(tmp_path))
+    assert len(found.time) == 10
+    assert found.metadata['outcome']['name'] == 'SUCCESSFUL'
+    assert warnings == [found.metadata['trouble']]
+    assert 'Pieces of the plan are missing' in warnings[0]
+
+
+def test_the_metadata_of_a_recording_are_whole_at_every_moment(tmp_path, monkeypatch):
+    """A full disk at the second writing spoils nothing of the first."""
+    written = []
+
+    def write_text(self, text, encoding):
+        written.append(self)
+        if len(written) == 2:
+            self.touch()
+            raise OSError(28, 'No space left on device')
+        self.write_bytes(text.encode(encoding))
+
+    monkeypatch.setattr(pathlib.Path, 'write_text', write_text)
+    record(tmp_path, [packet(i) for i in range(10)])
+    (folder,) = tmp_path.iterdir()
+    assert Recording.load(folder).metadata['points'] == METADATA['points']
+
+
 def test_a_full_disk_ends_the_recording_with_one_sentence_and_keeps_what_was_written(tmp_path):
     with a_disk_of(200_000):
         warnings = record(tmp_path, [packet(i) for i in range(1000)])
@@ -367,6 +411,16 @@ def test_a_damaged_recording_is_refused_in_a_sentence_or_read(tmp_path):
     assert all(sentence.startswith(f'{file} is ') for sentence in sentences)
 
 
+def test_a_recording_whose_plan_has_another_type_is_refused(tmp_path):
+    record(tmp_path, [packet(i) for i in range(10)])
+    with np.load(only_file(tmp_path)) as file:
+        columns = {name: file[name] for name in file.files}
+    columns['planned_point'] = columns['planned_point'].astype(np.int64)
+    np.savez(tmp_path / 'other.npz', **columns)
+    with pytest.raises(ValueError, match='planned_point has rows of int64'):
+        Recording.load(tmp_path / 'other.npz')
+
+
 def test_a_recording_with_a_column_too_short_is_refused(tmp_path):
     record(tmp_path, [packet(i) for i in range(20)])
     file = only_file(tmp_path)
@@ -412,3 +466,10 @@ def test_the_metadata_have_what_only_the_planner_knew():
     assert metadata['parameters']['linear_velocity'] == 0.07
     assert metadata['parameters']['keepalive_period'] == 0.01
     json.dumps(metadata)
+
+
+def test_the_documented_size_is_that_of_the_packets():
+    """At 500 Hz, as the reader of a parameter sees it."""
+    size = f'{recording_format.EXECUTED_DTYPE.itemsize * 500 / 1e6:.2f} MB a second'
+    for page in ('doc/recordings.md', 'config/driver.yaml'):
+        assert size in (share_path() / page).read_text(encoding='utf-8'), page

@@ -333,3 +333,17 @@ def test_a_file_of_another_kind_and_no_place_to_write_are_named(recording, tmp_p
     assert 'is no recording' in refused(capsys, other)
     assert 'nowhere' in refused(capsys, recording, '-o', tmp_path / 'nowhere' / 'a.csv')
     assert 'there is no recording' in refused(capsys, tmp_path)
+
+
+def test_a_recording_without_packets_is_not_drawn(tmp_path, capsys):
+    record(tmp_path, [packet(0)])
+    file = only_file(tmp_path)
+    with np.load(file) as found:
+        columns = {name: found[name] for name in found.files}
+    empty = {
+        name: rows if name == 'metadata' or name.startswith(('planned_', 'event')) else rows[:0]
+        for name, rows in columns.items()
+    }
+    np.savez(file, **empty)
+    assert main(['plot', str(file)]) == 1
+    assert 'has no packets, so there is nothing to draw' in capsys.readouterr().err

@@ -117,7 +117,7 @@ def corners(cell, kinds, radius):
 def test_corners_and_blends_violate_nothing(cell, kinds, radius):
     made = cell.plan(*corners(cell, kinds, radius), path_tolerance=TIGHT)
     machine, answers = cell.run(made, disturb=lagging())
-    assert sent(answers) == [], machine._text
+    assert sent(answers) == [], machine.outcome.cause
 
 
 @pytest.mark.slow
@@ -128,7 +128,7 @@ def test_sliders_and_pauses_violate_nothing(cell, seed):
         path_tolerance=TIGHT,
     )
     machine, answers = cell.run(made, scale=slider(seed), disturb=lagging())
-    assert sent(answers) == [], machine._text
+    assert sent(answers) == [], machine.outcome.cause
 
 
 @pytest.mark.slow
@@ -162,7 +162,7 @@ def test_a_disturbance_violates_its_axis_in_the_same_cycle(cell, name, axis, sig
     first = next(k for k, t in enumerate(packets[1:]) if t >= 0.1)  # the 0th goes to start()
     assert sent(answers) == [first]
     assert machine.state is not GoalState.MOVING
-    assert f'point 0 {name} {"xyz"[axis]} is off by' in machine._text
+    assert f'point 0 {name} {"xyz"[axis]} is off by' in machine.outcome.cause
 
 
 def shifted(state, name, axis, value):
@@ -185,7 +185,7 @@ def shifted(state, name, axis, value):
 def test_an_arm_that_only_lags_is_not_off_its_path(cell):
     made = cell.plan([cell.pose(y=0.05)], path_tolerance=TIGHT, goal_tolerance=TIGHT)
     machine, answers = cell.run(made, disturb=lagging())
-    assert sent(answers) == [], machine._text
+    assert sent(answers) == [], machine.outcome.cause
 
 
 @pytest.mark.parametrize(
@@ -195,4 +195,4 @@ def test_another_motion_than_the_planned_one_is_stopped(cell, elsewhere):
     made = cell.plan([cell.pose(x=0.05)])
     machine, answers = cell.run(made, instead=cell.plan([cell.pose(**elsewhere)]))
     assert len(sent(answers)) == 1
-    assert 'the controller itself left the plan' in machine._text
+    assert 'the controller itself left the plan' in machine.outcome.cause

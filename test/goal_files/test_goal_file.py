@@ -28,6 +28,26 @@ def test_what_yaml_reads_otherwise_is_refused(text, sentence):
     assert str(refusal.value).startswith(sentence)
 
 
+@pytest.mark.parametrize(
+    ('text', 'sentence'),
+    [
+        (
+            f'goal_tolerance: {{position_error: {{x: {10**400}}}}}',
+            'goal_tolerance.position_error.x is 10000000000000000000..., which is too large for a '
+            'number.',
+        ),
+        (
+            f'io_commands: [{{pin: {10**400}}}]',
+            f'io_commands[0].pin is 1{"0" * 59}, but must be a whole number from 0 to 255.',
+        ),
+    ],
+)
+def test_an_integer_that_is_too_large_is_refused(text, sentence):
+    with pytest.raises(GoalFileError) as refusal:
+        read_goal_file(text)
+    assert str(refusal.value) == sentence
+
+
 def test_what_is_certain_is_read():
     text = (
         'trajectory:\n  controlled_frame: "010"\n  points:\n'

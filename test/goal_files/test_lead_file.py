@@ -79,6 +79,10 @@ def test_options_have_the_leads_of_the_file_that_they_name(file, tmp_path):
         (f'- {{{ONE}, close: 1:30}}', 'line 1: 1:30 is octal or sexagesimal in YAML; write it'),
         (f'- {{{ONE}, close: 0.03, shut: 0.03}}', 'lead 1: shut is not a field'),
         (f'- {{{ONE}, close: 35 ms}}', "lead 1: close is '35 ms', but must be a number of sec"),
+        (
+            f'- {{{ONE}, close: 1{"0" * 400}}}',
+            'lead 1: close is 10000000000000000000..., which is too large for a time.',
+        ),
         (f'- {{{ONE}, close: true}}', 'lead 1: close is True, but must be a number of seconds'),
         (f'- {{{ONE}, close: 35}}', "lead 1: close of 'valve_1' is 35 s, but a dead time is"),
         (f'- {{{ONE}, close: -0.03}}', "lead 1: close of 'valve_1' is -0.03 s"),

@@ -45,34 +45,46 @@ def test_a_point_has_the_line_of_the_subprogram(tmp_path):
     ('text', 'said'),
     [
         ('M98 P100\nM30\n', 'line 2: O100 is not in the file, and other files are not read'),
-        ('M98\nM30\n', 'line 2: M98 needs the number of a subprogram in P'),
-        ('M98 P100 H20\nM30\nO100\nM99\n', 'line 2: M98 needs the number of a subprogram in P'),
+        ('M98 P10000\nM30\n', 'line 2: O10000 is not in the file'),
+        ('M98\nM30\n', 'line 2: M98 takes P, the number of a subprogram, L'),
+        ('M98 P100 H20\nM30\nO100\nM99\n', 'line 2: M98 takes P, the number of a subprogram, L'),
         ('M98 P1.5\nM30\n', 'line 2: M98 needs a whole P of at least 1, and L from 0 to 9999'),
         ('M98 P-1\nM30\n', 'line 2: M98 needs a whole P of at least 1, and L from 0 to 9999'),
         (
             'M98 P1 L-1\nM30\nO1\nM99',
             'line 2: M98 needs a whole P of at least 1, and L from 0 to 9999',
         ),
-        ('M98 (a.g)\nM30\n', 'line 2: M98 needs the number of a subprogram in P'),
+        ('M98 (a.g)\nM30\n', 'line 2: M98 takes P, the number of a subprogram, L'),
         ('M98 P<a>\nM30\n', "line 2: 'M98 P<a>' is not read: other files are not read"),
         ('M198 P1\nM30\n', 'line 2: M198 is not read: other files are not read'),
         ('M97 P10\nM30\n', 'line 2: M97 is not read'),
         ('G65 P100\nM30\n', 'line 2: G65 is not read'),
         ('M98 P1\nM30\nO1\nX1\n', 'line 5: the subprogram O1 has no M99'),
-        ('M98 P1\nM30\nO1\nX1\nO2\nM99\n', 'line 6: the subprogram O1 has no M99 before'),
+        ('M98 P1\nM30\nO1\nX1\nO2\nM99\n', 'line 6: the subprogram O1 reaches O2 without M99'),
         ('M98 P1\nM30\nO1\nM99\nO1\nM99\n', 'line 2: O1 is there twice, in lines 4 and 6'),
-        ('M98 P1\nM30\nO1\nM99 P20\n', 'line 5: M99 with a place to go on at is not read'),
+        ('M98 P1\nM30\nO1\nM99 P20\n', 'line 5: M99 with a line to continue at (P) is not read'),
         ('M98 P1\nM30\nO1\nM98 P1\nM99\n', 'line 5: subprograms are nested more than 10 deep'),
-        ('X1\nO1\nX2\nM99\n', 'line 3: the program runs into O1; end it by M30 before'),
-        ('X1\nM99\nO5\nX2\nM30\n', 'line 3: M99 ends the main program; put it before'),
+        ('X1\nO1\nX2\nM99\n', 'line 3: the main program runs into O1; end it by M30 before'),
+        (
+            'X1\nM99\nO5\nX2\nM30\n',
+            'line 3: M99 ends the main program; put the main program first',
+        ),
         (
             'M98 P1 L9999\nM30\nO1\nM98 P2 L9999\nM99\nO2\nX0\nM99\n',
-            'subprograms have more than 200000 lines to execute',
+            'subprograms would execute more than 200000 lines',
         ),
     ],
 )
 def test_a_call_that_cannot_be_done_is_refused(tmp_path, text, said):
     assert said in refusal(tmp_path, BEGIN + text)
+
+
+@pytest.mark.parametrize(
+    'end', ['M30', 'M5 M30', 'G0 Z5 M30', '(end) M30', '/M30', 'N90 M02 ; over']
+)
+def test_a_subprogram_before_the_main_program_is_refused_however_that_ends(tmp_path, end):
+    text = f'O1000\n{BEGIN}X1\nM99\nO1\nM98 P1000\nX9\n{end}\n'
+    assert 'M99 ends the main program; put the main program first' in refusal(tmp_path, text)
 
 
 def test_the_end_of_an_endless_main_program_is_said(tmp_path):

@@ -104,3 +104,9 @@ def test_a_table_without_a_shape_is_refused(tmp_path, text, sentence):
     with pytest.raises(BrokenFile, match=f'^{pattern}') as caught:
         imported(tmp_path, text)
     assert '\n' not in str(caught.value)
+
+
+def test_a_header_counts_more_than_a_comment_before_a_title(tmp_path):
+    found = imported(tmp_path, '# x y z\nMy path\nx [mm];y [mm];z [mm]\n1;2.5;-3\n4;5;6\n')
+    assert np.array(found.goal.waypoints.poses)[:, :3] == pytest.approx(np.array(POINTS))
+    assert found.remarks[0].text() == 'line 2: text before the header: it is no part of the table'

@@ -301,7 +301,11 @@ def test_any_other_loop_without_an_end_is_refused(tmp_path, monkeypatch, text, l
     module = 'ur_cartesian_driver.importing.script.urscript_file'
     monkeypatch.setattr(f'{module}.MAX_CYCLES', 50)
     monkeypatch.setattr(f'{module}.MAX_NODES', 20_000)
-    reason = f': {why} has no robot or machine to ask here' * bool(why)
+    reason = (
+        f': the value of {why} is assumed, because no robot answers during an import'
+        if why
+        else ''
+    )
     assert refusal(tmp_path, text.format(a=A, b=B)) == (
         line,
         f'line {line}: the loop around this line does not end{reason}; take it out.',
@@ -312,8 +316,9 @@ def test_a_failure_names_what_had_nothing_to_read(tmp_path):
     text = f'r = socket_read_ascii_float(3)\nmovel({A})\nmovel(p[r[1], 0, 0.2, 0, 0, 0])\n'
     assert refusal(tmp_path, text) == (
         3,
-        'line 3: pose[0] is nan; it must be a finite number; socket_read_ascii_float() of line 1 '
-        'has no robot or machine to ask here.',
+        'line 3: pose[0] is nan; it must be a finite number; the value of '
+        'socket_read_ascii_float() of line 1 is assumed, because no robot answers during an '
+        'import.',
     )
 
 

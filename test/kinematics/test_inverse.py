@@ -482,3 +482,21 @@ def test_many_poses_of_many_calibrated_arms_come_back(name, calibrated_arm):
             assert dist(near, q) < 1e-4
     # Without a seed a branch may be missed next to two singularities; see solutions().
     assert missed <= 1
+
+
+@pytest.mark.parametrize('name', MODELS)
+def test_a_wrist_on_the_axis_of_the_base_is_out_of_reach(name, calibrated_arm):
+    tool_down = Pose((0.0, 0.0, 0.4), (1.0, 0.0, 0.0, 0.0))
+    for arm in (Arm(MODELS[name]), *(calibrated_arm(name, seed) for seed in range(4))):
+        assert solutions(arm, tool_down) == []
+        assert nearest(arm, tool_down, (0.0,) * 6) is None
+        assert 'the centre of the wrist would be' in explain_unreachable(arm, tool_down)
+
+
+@pytest.mark.parametrize('position', [(1e160, 0.0, 0.4), (0.3, float('nan'), 0.3)])
+def test_numbers_that_no_arm_can_have_are_out_of_reach(position, calibrated_arm):
+    for arm in (UR5E, calibrated_arm('ur5e')):
+        far = Pose(position, (1.0, 0.0, 0.0, 0.0))
+        assert solutions(arm, far) == []
+        assert nearest(arm, far, (0.0,) * 6) is None
+        assert explain_unreachable(arm, far) == 'it is more than 1000 m away'

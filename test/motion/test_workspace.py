@@ -24,6 +24,7 @@ def test_a_plane_is_a_name_a_point_a_normal_and_a_margin():
         ('table 0 0 up 0 0 1', '"table": could not convert'),
         ('table 0 0 nan 0 0 1', '"table" has a number that is not finite'),
         ('table 0 0 0 0 0 0', 'the normal of "table" is zero'),
+        ('table 0 0 0 1.7e308 1.7e308 0', 'the normal of "table" is too long'),
         ('table 0 0 0 0 0 1 -0.1', 'the margin -0.1 of "table" is negative'),
     ],
 )

@@ -24,6 +24,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     PulseTrain,
     SafeOutput,
     ScriptCall,
+    Segment,
     SegmentType,
 )
 from ur_cartesian_driver.path import (
@@ -57,6 +58,7 @@ TORCH = digital(2)
 #: A text where a number is meant, and a pose where a name is.
 TEXT: Any = 'abc'
 POSE: Any = HERE
+TWO: Any = (-550, -280)
 
 
 def positions(path):
@@ -323,15 +325,15 @@ def test_a_weave_swings_evenly_along_a_line_and_an_arc():
         (lambda: START.by(dx=0.1, speed=TEXT), "point 0 (line) has the speed 'abc'; give a"),
         (
             lambda: START.by(dx=0.1, duration=1).by(dx=0.1),
-            'point 1 (line) has no duration, but the points before have; give each one.',
+            'point 1 (line) has no duration, but the motions before have; give one to each ',
         ),
         (
             lambda: START.by(dx=0.1).by(dx=0.1, duration=1),
-            'point 1 (line) has a duration, but the points before have none',
+            'point 1 (line) has a duration, but the motions before have none; give one to each',
         ),
         (
             lambda: START.at(speed=0.1).by(dx=0.1, duration=1),
-            'point 0 (line) has a duration and a speed; give one of them',
+            'point 0 (line) has a duration and a speed; at(speed=0) before it unsets the speed.',
         ),
         (lambda: START.by(dx=0.1, duration=0), 'point 0 (line) has a duration of 0'),
         (lambda: START.set(TORCH, True), 'set() comes before the first point'),
@@ -342,11 +344,15 @@ def test_a_weave_swings_evenly_along_a_line_and_an_arc():
         (lambda: digital(9), 'the pin of standard digital output 9 is 9'),
         (
             lambda: START.by(dx=0.1).set(TORCH, True, before=0.1),
-            'set() at point 0 has before=0.1 s, but no motion with a duration',
+            'set() at point 0 has before=0.1 s, but the motion to this point has no duration',
+        ),
+        (
+            lambda: START.by(dx=0.1, duration=1).set(TORCH, True, before=0.1, after=0.2),
+            'set() at point 0 combines before with after; use one of them.',
         ),
         (
             lambda: START.by(dx=0.1, duration=1).set(TORCH, True, before=0.1, fraction=-0.5),
-            'set() at point 0 has before=0.1 s and a place beside the point',
+            'set() at point 0 combines before with distance or fraction',
         ),
         (
             lambda: START.by(dx=0.1).set(TORCH, True, distance='8mm'),  # type: ignore[arg-type]
@@ -424,6 +430,63 @@ def test_a_weave_swings_evenly_along_a_line_and_an_arc():
             'offset() at point 0 turns the tool on an arc',
         ),
         (lambda: Path(frame=POSE), 'frame is Pose('),
+        (lambda: Path((0, 0, 1)), 'start has no orientation; write Path(position, orientation).'),
+        (
+            lambda: START.at(joint_speed=1).joint((-0.5, 0, 0.5), duration=1),
+            'point 0 (joint) has a duration and a speed; at(joint_speed=0) before it unsets the',
+        ),
+        (
+            lambda: START.at(turn_speed=1).by(turn=axis_angle(Z, 1), duration=1),
+            'point 0 (line) has a duration and a speed; at(turn_speed=0) before it unsets the',
+        ),
+        (
+            lambda: START.by(dx=0.1, duration=1, speed=0.1),
+            'point 0 (line) has a duration and a speed; give one of them.',
+        ),
+        (
+            lambda: START.line((-0.4, 0, 0.5), duration=1, optimized=True),
+            'point 0 (line) has a duration, which an optimized motion cannot keep',
+        ),
+        (lambda: mm(*TWO), 'mm() has the two numbers -550 and -280; give one length, or x,'),
+        (lambda: START.steady(95), 'steady().min_speed_fraction is 95, but must be from 0'),
+        (lambda: START.keep_open(-1), 'keep_open().replace_horizon is -1 s, but must be 0 ('),
+        (
+            lambda: START.executed_as('SERVO'),  # type: ignore[arg-type]
+            "executed_as().execution is 'SERVO', which is no ExecutionMode.",
+        ),
+        (lambda: START.tolerances(time=nan), 'tolerances() has the time nan; give a finite'),
+        (lambda: START.tolerances(time=TEXT), "tolerances() has the time 'abc'; give a number."),
+        (lambda: START.tolerances(path=TEXT), "tolerances().path_tolerance is 'abc', which is no"),
+        (
+            lambda: START.path_offset(across=6),
+            'path_offset().path_offset.limits.y is 6 m, outside',
+        ),
+        (lambda: START.feed_override(30), 'feed_override().feed_override.minimum is 30, but must'),
+        (
+            lambda: START.asking(frame_id='part'),
+            'asking() names frame_id, which is no setting of a whole path; use one of path_tol',
+        ),
+        (lambda: START.asking(io_commands=()), 'asking() names io_commands, which is no setting'),
+        (lambda: START.asking(sped=1.0), 'asking() names sped, which is no setting'),
+        (
+            lambda: START.by(dx=0.1).set(TORCH, TEXT),
+            "standard digital output 2 has the value 'abc'",
+        ),
+        (lambda: START.safe(TORCH, TEXT), "standard digital output 2 has the value 'abc'; give a"),
+        (
+            lambda: START.safe(TORCH, False).safe(TORCH, True),
+            'safe() names standard digital output 2 a second time; name it once.',
+        ),
+        (lambda: digital(TEXT), "the pin of a standard digital output is 'abc'; give its number."),
+        (lambda: START.by(dx=10**400), 'point 0 (line) has the position (1000'),
+        (lambda: START.by(dx=0.1, speed=10**400), 'point 0 (line) has the speed 1000'),
+        (lambda: axis_angle(Z, TEXT), "axis_angle() has the angle 'abc'; give a number."),
+        (lambda: axis_angle(TEXT, 1), "axis is 'abc'; give three numbers"),
+        (lambda: START.by(dx=0.1).repeated(2.5), 'repeated() is asked for 2.5 times; use 1 or'),  # type: ignore[arg-type]
+        (
+            lambda: START.by(dx=0.1).dwell(0.5).reversed().goal(),
+            'reversed() has a dwell of 0.5 s at its start, where no goal can have one; call',
+        ),
         (
             lambda: Path.from_yaml('validate_only: true'),
             'trajectory.header.stamp or validate_only',
@@ -496,6 +559,69 @@ def test_a_dwell_stops_the_arm_and_delays_what_follows():
     assert spline.goal().waypoints[0].twist == (0.0,) * 6
 
 
+def test_a_dwell_stays_at_its_place_on_the_way_back():
+    """A dwell belongs to a place: there and back, the arm rests once where it turns round."""
+    there = Path(HERE).by(dy=0.1).by(dx=0.1).dwell(0.5)
+
+    def dwells(path):
+        return [(p.pose.position, s.dwell) for p, s in zip(*rows(path), strict=True) if s.dwell]
+
+    def rows(path):
+        goal = path.goal()
+        return goal.waypoints, goal.segments or [Segment()] * len(goal.waypoints)
+
+    end = there.end.position
+    assert dwells(there.then(there.reversed())) == [(end, 0.5)]
+    # Where the path turns back at a point of another one, that point gets the dwell.
+    assert dwells(Path(HERE).by(dy=0.1).by(dx=0.1).then(there.reversed())) == [(end, 0.5)]
+    assert dwells(there.reversed().reversed()) == [(end, 0.5)]
+    passes = there.repeated(3, dz=0.02, alternating=True)
+    assert [(round(place[2], 6), dwell) for place, dwell in dwells(passes)] == [
+        (0.5, 0.5),
+        (0.52, 0.5),
+        (0.54, 0.5),
+    ]
+    assert {round(place[0], 6) for place, _ in dwells(passes)} == {round(end[0], 6)}
+    assert dwells(there.dwell(0.0).reversed()) == []
+
+
+def test_a_moved_spline_keeps_the_rates_that_are_given():
+    """Judge: a velocity turns with its frame, and v + w x r holds at a point beside it."""
+    path = Path(HERE).spline((-0.4, 0.0, 0.5), duration=1.0, twist=(0.1, nan, 0.3))
+    path = path.spline((-0.3, 0.0, 0.5), duration=1.0, twist=ZERO6)
+    moved = path.offset(dx=0.1)._table().waypoints
+    np.testing.assert_array_equal(moved.twists[0], [0.1, nan, 0.3, nan, nan, nan])
+    quarter = path.transformed(Pose((0.0, 0.0, 0.0), axis_angle(Z, deg(90))))
+    twist = quarter._table().waypoints.twists[0]
+    np.testing.assert_allclose(twist, [nan, 0.1, 0.3, nan, nan, nan], atol=1e-12)
+    with pytest.raises(InvalidGoal, match=r'transformed\(\) at point 0 turns a twist of which'):
+        path.transformed(Pose((0.0, 0.0, 0.0), axis_angle(Z, 1.0)))
+    whole = Path(HERE).spline((-0.4, 0.0, 0.5), duration=1.0, twist=(0.1, 0.0, 0.0))
+    turned = whole.transformed(Pose((0.0, 0.0, 0.0), axis_angle(Z, 1.0)))
+    twist = turned._table().waypoints.twists[0]
+    np.testing.assert_allclose(twist[:3], 0.1 * np.array([np.cos(1.0), np.sin(1.0), 0.0]))
+    assert np.isnan(twist[3:]).all()
+
+
+def test_beside_a_spline_the_tool_has_the_speed_of_its_turn():
+    straight = Path(HERE).spline((-0.4, 0.0, 0.5), duration=1.0, twist=(0.1, 0.0, 0.0))
+    straight = straight.spline((-0.3, 0.0, 0.5), duration=1.0)
+    twist = straight.offset(dz=0.1, of_tool=True)._table().waypoints.twists[0]
+    np.testing.assert_array_equal(twist, [0.1, 0.0, 0.0, nan, nan, nan])
+    turning = Path(HERE).spline((-0.4, 0.0, 0.5), tilted(0.3), duration=1.0, twist=(0.1, 0.0, 0.0))
+    with pytest.raises(InvalidGoal, match=r'offset\(\) at point 0 has a linear twist, but the'):
+        turning.offset(dz=0.1, of_tool=True)
+    given = Path(HERE).spline(
+        (-0.4, 0.0, 0.5), tilted(0.3), duration=1.0, twist=(0.1, 0.0, 0.0, 0.0, 2.0, 0.0)
+    )
+    beside = given.offset(dz=0.1, of_tool=True)
+    arm = np.array(beside.end.position) - given.end.position
+    twist = beside._table().waypoints.twists[0]
+    np.testing.assert_allclose(twist[:3], np.array([0.1, 0, 0]) + np.cross([0, 2.0, 0], arm))
+    free = Path(HERE).spline((-0.4, 0.0, 0.5), tilted(0.3), duration=1.0)
+    assert np.isnan(free.offset(dz=0.1, of_tool=True)._table().waypoints.twists).all()
+
+
 @pytest.mark.parametrize(
     ('make', 'text'),
     [
@@ -504,9 +630,72 @@ def test_a_dwell_stops_the_arm_and_delays_what_follows():
         (lambda: Path(HERE).by(dy=0.1).dwell(-1.0), 'time -1, outside 0 to 600 s'),
         (lambda: Path(HERE).by(dy=0.1).call('f', 1e4), 'arguments[0] is 10000, outside -2147 to'),
         (lambda: Path(HERE).by(dy=0.1).call('f', timeout=0.0), 'timeout is 0 s; it must be more'),
+        (lambda: Path(HERE).by(dy=0.1).call('f', 'a'), "has the argument 'a'; give a number."),  # type: ignore[arg-type]
+        (lambda: Path(HERE).by(dy=0.1).call(3), 'function is 3, which is no text'),  # type: ignore[arg-type]
+        (
+            lambda: Path(HERE).by(dy=0.1).wait_for(digital_input(3), timeout='2s'),  # type: ignore[arg-type]
+            "wait_for() at point 0 has the timeout '2s'; give a number.",
+        ),
+        (
+            lambda: Path(HERE).by(dy=0.1).wait_for(digital_input(3), 'on', timeout=2),  # type: ignore[arg-type]
+            "wait_for() at point 0 has the value 'on'; give a number.",
+        ),
+        (
+            lambda: Path(HERE).by(dy=0.1).payload('1 kg'),  # type: ignore[arg-type]
+            "payload() at point 0 has the mass '1 kg'; give a number.",
+        ),
+        (
+            lambda: Path(HERE).by(dy=0.1).payload(1, inertia=0.1),  # type: ignore[arg-type]
+            'payload() at point 0 has the inertia 0.1; give a sequence of numbers.',
+        ),
+        (
+            lambda: Path(HERE).by(dy=0.1).press({'z': '20 N'}),  # type: ignore[dict-item]
+            "press() at point 0 has the force z '20 N'; give a number.",
+        ),
+        (
+            lambda: Path(HERE).by(dy=0.1).press(20),  # type: ignore[arg-type]
+            "press() at point 0 has the forces 20; name the axes, like {'z': 20.0}.",
+        ),
+        (
+            lambda: Path(HERE).by(dy=0.1).press({'z': 1}, max_yield='a bit'),  # type: ignore[arg-type]
+            "press() at point 0 has the max_yield 'a bit'; give a number.",
+        ),
+        (
+            lambda: Path(HERE).by(dy=0.1).press({'z': 1}, frame='tool'),  # type: ignore[arg-type]
+            "press() at point 0.frame is 'tool', which is no PressFrame.",
+        ),
+        (
+            lambda: Path(HERE).by(dy=0.1).follow_speed(analog(1), 'double'),  # type: ignore[arg-type]
+            "follow_speed() at point 0 has the gain 'double'; give a number.",
+        ),
+        (
+            lambda: (
+                Path(HERE)
+                .by(dy=0.1)
+                .follow_speed(analog(1), 2)
+                .by(dy=0.1)
+                .end_follow_speed(analog(1), lead='0.1s')  # type: ignore[arg-type]
+            ),
+            "end_follow_speed() at point 1 has the lead '0.1s'; give a number.",
+        ),
+        (
+            lambda: (
+                Path(HERE)
+                .by(dy=0.1)
+                .follow_speed(analog(1), 2)
+                .by(dy=0.1)
+                .end_follow_speed(digital(1))
+            ),
+            'end_follow_speed() at point 1 names standard digital output 1; use analog().',
+        ),
+        (
+            lambda: Path(HERE).by(dy=0.1).pulses(digital(1), 0.1, count=2.5),  # type: ignore[arg-type]
+            'pulses() at point 0.count is 2.5, which is no integer.',
+        ),
         (
             lambda: Path(HERE).by(dy=0.1).call('f').wait_for(digital_input(3), timeout=2.0),
-            'follows a call(), which comes after it; let the function wait',
+            'is written after call(), but at one point the robot waits before it calls; let the '
+            'function wait',
         ),
     ],
 )
@@ -539,7 +728,7 @@ def test_a_press_begins_and_ends_where_the_arm_stops():
     begun = Path(HERE).by(dz=-0.1).press({}, contact=ContactEnd.ENDS)
     with pytest.raises(InvalidGoal, match=r'press\(\) at point 0 has no end; call end_press'):
         begun.goal()
-    with pytest.raises(InvalidGoal, match=r'end_press\(\) at point 0 has no begin'):
+    with pytest.raises(InvalidGoal, match=r'at point 0 ends press\(\), which has not begun'):
         begun.end_press()
     with pytest.raises(InvalidGoal, match='has speed_limits for y; name the axes of forces'):
         Path(HERE).by(dz=-0.1).press({'z': 1.0}, speed_limits={'y': 0.1})
@@ -575,7 +764,7 @@ def test_what_happens_at_points_is_that_of_a_goal():
     for open_path in (Path(HERE).by(dy=0.1).follow_speed(pump, 1.0),):
         with pytest.raises(InvalidGoal, match='has no end for analog output 1'):
             open_path.goal()
-    with pytest.raises(InvalidGoal, match='has no begin for analog output 1'):
+    with pytest.raises(InvalidGoal, match=r'ends follow_speed\(standard analog output 1\), which'):
         Path(HERE).by(dy=0.1).end_follow_speed(pump)
 
 
@@ -601,7 +790,7 @@ def test_pulses_begin_and_end_at_points():
     begun = Path(HERE).by(dy=0.1).pulses(camera, mm(2))
     with pytest.raises(InvalidGoal, match=r'pulses\(\) at point 0 has no end for pin 1'):
         begun.by(dy=0.1).goal()
-    with pytest.raises(InvalidGoal, match='has no begin for standard digital output 1'):
+    with pytest.raises(InvalidGoal, match=r'ends pulses\(standard digital output 1\), which'):
         begun.by(dy=0.1).end_pulses(digital(1))
     with pytest.raises(InvalidGoal, match='gives no pulses'):
         Path(HERE).by(dy=0.1).pulses(analog(0), mm(2))

@@ -187,7 +187,8 @@ def test_offsets_add_up_and_go_back(path, first, second):
     try:
         beside = path.offset(*first, of_tool=True)
     except InvalidGoal as refused:
-        assert 'turns the tool on an arc' in str(refused)  # noqa: PT017
+        lost = ('turns the tool on an arc', 'the driver chooses how the tool turns')
+        assert any(words in str(refused) for words in lost)  # noqa: PT017
         return
     for pose, old in zip(beside.poses, path.poses, strict=True):
         assert pose.position == pytest.approx(old.apply(first), abs=1e-12)

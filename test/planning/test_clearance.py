@@ -146,6 +146,18 @@ def test_meshes_let_pass_what_only_cylinders_refuse():
     assert 0 < passed < len(q)
 
 
+def test_a_warning_and_the_report_have_the_distance_of_the_meshes():
+    need_meshes('ur5e')
+    q = way(HOME, (0.0, -H, 2.6, -1.8, -H, 0.0))
+    clear = check(q, self_collision='warn', min_clearance=0.2)
+    meshes = CollisionMeshes(Arm(MODELS['ur5e']))
+    pairs = CollisionBodies(Arm(MODELS['ur5e'])).pairs
+    least = min(meshes.distances(pair, q).min() for pair in pairs)
+    assert least > 0.0
+    assert clear.warning is not None
+    assert clear.margin == pytest.approx(least, abs=1e-9)
+
+
 def test_min_clearance_is_how_near_it_may_come():
     q = way(HOME, FOLDED)
     rows = [
@@ -214,7 +226,7 @@ def test_the_margin_of_a_plane_is_kept():
     wider = (f'table 0 0 {z - 0.03} 0 0 1 0.04',)
     found = check(q, start=(0, -H, 0, -H, 0, 0), tcp=TOOL, workspace_planes=wider).violation
     assert found.text == (
-        'the TCP comes within 0.0300 m of the workspace plane "table", its margin is 0.0400 m'
+        'the TCP comes within 0.0300 m of the workspace plane "table", whose margin is 0.0400 m'
     )
     assert 'workspace_planes' in found.remedy
 

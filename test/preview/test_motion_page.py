@@ -7,7 +7,7 @@ from dataclasses import replace
 from html import escape
 from importlib import import_module
 import json
-from math import pi
+from math import nan, pi
 import re
 import sys
 
@@ -21,6 +21,7 @@ from ur_cartesian_driver.kinematics.link_shapes import LinkFrames
 from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.motion.errors import GoalRefused, Unreachable
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.workspace import Plane
 from ur_cartesian_driver.motion.goal.goal import Goal, Segment, Waypoint
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
@@ -119,6 +120,20 @@ def test_a_refused_goal_shows_the_place_in_red():
     (place,) = positions(scene, '/refused')
     assert np.allclose(place, start + fraction * (end - start), atol=1e-6)
     assert ball['props']['color'][0] > 200
+
+
+def test_a_refused_goal_has_a_page_whatever_is_wrong_with_it():
+    """An orientation of zeros, a point that is given by joints, and planes."""
+    arm = Arm(MODELS['ur5e'])
+    no_turn = Pose((0.3, 0.2, 0.4), (0.0, 0.0, 0.0, 0.0))
+    joints = Pose((nan,) * 3, (nan,) * 4)
+    goal = Goal(waypoints=(Waypoint(pose=joints), Waypoint(pose=no_turn)))
+    table = Plane('table', (0.0, 0.0, -0.1), (0.0, 0.0, 1.0))
+    page = refusal_page(goal, Unreachable('points[1] is wrong.'), arm, HOME, TCP, (table,))
+    scene = scenes_of(page)['type']
+    assert not any('points/0' in m.get('name', '') for _, m in scene)
+    assert any(m.get('name') == '/planes/table' for _, m in scene)
+    assert np.allclose(positions(scene, '/points/1'), no_turn.position)
 
 
 def test_where_joints_are_unknown_the_arm_stays(planned, monkeypatch):

@@ -11,12 +11,13 @@ from typing import Any
 
 import pytest
 
+from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RobotState, RuntimeState
 from ur_cartesian_driver.protocol.rtde.rtde_packages import RtdeTextMessage
 from ur_cartesian_driver.robot.connection_status import ConnectionStatus, required_action
 from ur_cartesian_driver.robot.lifecycle import ConnectionEvent, ConnectionState
-from ur_cartesian_driver.robot.link import LinkCallbacks, model_names, RobotLink
+from ur_cartesian_driver.robot.link import CAUSE_TIMEOUT, LinkCallbacks, model_names, RobotLink
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.link_status import LOG_DELAY
 from ur_cartesian_driver.robot.program.tcp_setter import TemporaryTcpSetter
@@ -152,6 +153,34 @@ def test_a_type_that_no_model_has_is_no_fault_of_ur_type(ur_sim):
             status = ear.link.status
         assert status.state is ConnectionState.REFUSED
         assert 'reports the type 12, which this driver does not know' in status.message
+
+    asyncio.run(run())
+
+
+def test_the_geometry_of_a_refused_robot_is_not_taken(ur_sim):
+    async def run():
+        async with listening(ur_sim) as ear:
+            await ear.ready()
+            ear.link._status.apply(ConnectionEvent.ROBOT_LOST, calibration_known=False)
+            ear.link._status.apply(ConnectionEvent.ROBOT_ANSWERED)
+            other: Any = SimpleNamespace(robot_type=3)
+            ear.link._on_configuration(other)
+            ear.link._on_kinematics(MODELS['ur10e'].geometry)
+            status = ear.link.status
+        assert status.state is ConnectionState.REFUSED
+        assert not status.calibration_known
+
+    asyncio.run(run())
+
+
+def test_a_robot_that_is_lost_with_its_program_is_the_headline(ur_sim):
+    async def run():
+        async with listening(ur_sim) as ear:
+            await ear.ready()
+            ear.link._on_program_lost('the program is gone')
+            ear.link._on_robot_lost('RTDE is gone', 'RTDE: it is gone')
+            await asyncio.sleep(3.0 * CAUSE_TIMEOUT)
+            assert 'The robot is gone. ' in ear.link.status.last_error
 
     asyncio.run(run())
 

@@ -3,6 +3,7 @@
 """A cell to test in: a simulated robot, the node, a client, one executor for both."""
 
 import contextlib
+import os
 import threading
 from time import monotonic
 
@@ -22,6 +23,9 @@ from ur_cartesian_driver.ros.message_fields import duration_message, pose_messag
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 EXECUTORS = {'single': SingleThreadedExecutor, 'multi': MultiThreadedExecutor}
+#: A participant of DDS has ten threads. It lives until all of its actions are destroyed, and where
+#: 32 live, nodes do not find each other.
+PARTICIPANT_THREADS = 10
 #: One thread, which makes no wait set of hundreds of entities for each callback.
 EVENTS = {'events': EventsExecutor}
 
@@ -33,13 +37,19 @@ def private_graph(private_ros_graph):
 
 @pytest.fixture
 def no_thread_left():
-    """See to it that a test ends all threads that it starts."""
-    before = set(threading.enumerate())
+    """See to it that a test ends all threads and participants that it starts."""
+    before, native = set(threading.enumerate()), native_threads()
     yield
     deadline = monotonic() + 5.0
     for thread in ours(before):
         thread.join(max(0.0, deadline - monotonic()))
     assert not ours(before)
+    assert native_threads() < native + PARTICIPANT_THREADS
+
+
+def native_threads():
+    """Return the number of threads of this process that Python has not started."""
+    return len(os.listdir('/proc/self/task')) - threading.active_count()
 
 
 def ours(before):

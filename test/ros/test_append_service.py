@@ -179,7 +179,9 @@ def test_a_shell_appends_to_the_goal_of_another_client(single_cell, tmp_path, ca
         for place in ('--replace-from-time', '--replace-from-point'):
             status, _, said = append(str(tail), place, '0')
             assert status == 1
-            assert said.startswith('What is to be replaced has been sent to the robot; replace')
+            assert said.startswith(
+                'The points to be replaced have been sent to the robot already; replace'
+            )
         status, said, _ = append(str(tail), '--last')
         assert status == 0
         assert said.startswith('1 point appended, the goal has 2')

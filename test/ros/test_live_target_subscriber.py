@@ -99,7 +99,7 @@ def test_a_frame_on_the_arm_needs_the_arm():
 
 def test_what_is_far_away_is_refused_with_the_distance():
     far = Pose((HERE.position[0], HERE.position[1] + 0.6, HERE.position[2]), HERE.quaternion)
-    with pytest.raises(InvalidGoal, match=r'is 0\.6 m away.*max_approach_distance is 0\.5 m'):
+    with pytest.raises(InvalidGoal, match=r'is 0\.6 m away.*max_approach_distance = 0\.5 m'):
         check_target(far, STATE, PlanningOptions())
     check_target(far, STATE, PlanningOptions(max_approach_distance=0.0))
 

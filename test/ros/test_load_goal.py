@@ -103,6 +103,10 @@ def test_an_empty_text_is_an_empty_goal(text):
         ),
         ('execution: 300', 'execution is 300, but must be a whole number from 0 to 255.'),
         (
+            'execution: servo',
+            "execution is 'servo', but must be a whole number from 0 to 255; SERVO is 3.",
+        ),
+        (
             'goal_time_tolerance: {sec: 0.5}',
             'goal_time_tolerance.sec is 0.5, but must be a whole number from -2147483648 to '
             '2147483647.',

@@ -11,6 +11,8 @@ import inspect
 import json
 from pathlib import Path
 import re
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from tracked_files import tracked_files
@@ -19,6 +21,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotat
 from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import RawMessage
 from ur_cartesian_driver.sim.builtins import controller_builtins
+from ur_cartesian_driver.sim.builtins.socket_builtins import READS_PER_CYCLE, SocketBuiltins
 from ur_cartesian_driver.sim.programs.timed_function_guard import refuse_timed_functions
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 from ur_cartesian_driver.urscript.script_values import ScriptPose
@@ -203,3 +206,17 @@ def test_pose_arithmetic_agrees_with_independent_values(bench, case):
         assert list(result) == pytest.approx(expected, abs=tolerance)
     else:
         assert result == pytest.approx(expected, abs=tolerance)
+
+
+def test_the_threads_of_a_program_share_the_reads_of_a_cycle():
+    """A peer that never stops is read 32 times a cycle, however many threads read."""
+    controller: Any = SimpleNamespace(cycles=0)
+    group, waiting = SocketBuiltins(controller), 0
+    for controller.cycles in range(10):
+        reads, ready, waiting = waiting, 2, 0
+        while ready:
+            if group._count_read('socket_0'):
+                ready, waiting = ready - 1, waiting + 1
+            else:
+                reads += 1
+        assert reads == READS_PER_CYCLE

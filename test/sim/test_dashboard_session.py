@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import re
 from typing import Any
 
@@ -78,6 +79,11 @@ class DashboardUser:
     def ask(self, line: str) -> str:
         try:
             answer = self.session.feed(line.encode() + b'\n').decode()
+            for _ in range(100):
+                if answer:
+                    break
+                self.controller.step()
+                answer = self.session.feed(b'').decode()
         except HangUp as hangup:
             answer = hangup.farewell.decode()
         assert answer.count('\n') == 1
@@ -213,6 +219,41 @@ def test_what_clients_poll_for_comes_true():
         assert user.ask('running') == f'Program running: {str(state != "STOPPED").lower()}'
     user.ask('power off')
     assert user.ask('robotmode') == 'Robotmode: POWER_OFF'
+
+
+@pytest.mark.parametrize(
+    ('command', 'answer'), [('stop', 'Stopped\nSTOPPED'), ('pause', 'Pausing program\nPAUSED')]
+)
+def test_a_stop_and_a_pause_are_answered_when_they_are_completed(command, answer):
+    """The next command waits for its turn."""
+    user = DashboardUser(5, 21)
+    user.ask('play')
+    user.wait(0.1)
+    assert user.session.feed(f'{command}\nprogramState\nrobotmode\n'.encode()) == b''
+    user.wait(0.1)
+    done = f'{answer} a.urp\nRobotmode: RUNNING\n'
+    assert user.session.feed(b'').decode() == done
+    assert user.session.feed(b'') == b''
+
+
+def test_a_program_is_loaded_when_it_has_been_compiled_beside_the_cycles():
+    user = DashboardUser(5, 21)
+    jobs: list[Callable[[], None]] = []
+
+    def aside(work, then):
+        jobs.append(lambda: then(work()))
+
+    user.controller.programs.compile_aside = aside
+    assert user.session.feed(b'load b.urp\nload a.urp\nget loaded program\n') == (
+        b'File not found: b.urp\n'
+    )
+    user.wait(0.1)
+    assert user.session.feed(b'') == b''
+    (job,) = jobs
+    job()
+    assert user.session.feed(b'').decode() == (
+        'Loading program: a.urp\nLoaded program: /programs/a.urp\n'
+    )
 
 
 def test_a_protective_stop_is_unlocked_after_five_seconds_and_leaves_the_program_paused():

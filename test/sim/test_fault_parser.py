@@ -88,6 +88,10 @@ from ur_cartesian_driver.sim.faults.fault_values import (
         ),
         ('garbage rtde', GarbageFault(interface='rtde')),
         ('garbage rtde 8 at 1 s', GarbageFault(interface='rtde', size=8, trigger=AfterTime(1.0))),
+        (
+            'silence rtde for 2 s at 1 s',
+            SilenceFault(interface='rtde', trigger=AfterTime(1.0), duration=2.0),
+        ),
     ],
 )
 def test_a_fault_can_be_written_in_words(text, fault):
@@ -114,6 +118,10 @@ def test_a_fault_can_be_written_in_words(text, fault):
         ('drop rtde for 2 m', 'm', "'s'"),
         ('delay rtde soon', 'soon', 'a time'),
         ('drop rtde at 2 s & stop', '&', "'for'"),
+        ('drop at 2 s', 'at', 'an interface'),
+        ('drop rtde at 1 s for -2 s', '-2', 'greater than 0'),
+        ('drop rtde for 2 s at 1 s at 3 s', 'at', 'expected the end'),
+        ('garbage rtde 10.9', '10.9', 'a whole number'),
     ],
 )
 def test_a_word_that_is_not_understood_is_named(text, word, expected):
@@ -130,6 +138,13 @@ def test_a_word_that_is_not_understood_is_named(text, word, expected):
 def test_an_impossible_amount_is_refused(text):
     with pytest.raises(ValueError, match='; use '):
         parse_fault(text)
+
+
+def test_one_wrong_fault_sets_none_of_those_with_it():
+    robot = SimulatedRobot()
+    with pytest.raises(ValueError, match='nowhere'):
+        robot.inject('silence rtde at 5 s', 'drop nowhere at 1 s')
+    assert not robot._faults.active
 
 
 def test_an_unknown_interface_is_refused_with_those_that_there_are():

@@ -44,6 +44,15 @@ def client(bench):
     return Client(bench)
 
 
+def test_a_character_is_a_byte_as_on_the_other_script_ports(bench, client):
+    """The manual of URScript: (extended) ASCII."""
+    statement = 'textmsg("Düse 1 µm")\n'.encode('latin-1')
+    answers = client.session.feed(statement)
+    bench.step()
+    assert answers + client.session.answers() == b'ack: 1: ' + statement
+    assert bench.log == ['Düse 1 µm']
+
+
 def test_statements_are_acknowledged_with_numbers_from_one_and_executed_in_order(bench, client):
     assert client.say('textmsg(n)', 'n = double(21)', 'textmsg(n)') == [
         'ack: 1: textmsg(n)',
@@ -100,7 +109,7 @@ def test_interpreter_mode_has_no_interpreter_mode_inside(bench, client):
     client.say('interpreter_mode()')
     bench.step(2)
     assert not bench.programs.running
-    assert 'interpreter_mode is only possible in the main thread, once.' in bench.log[0]
+    assert 'only possible in the main thread, and not from within itself' in bench.log[0]
 
 
 def test_a_function_on_one_line_can_be_called_by_the_next(bench, client):
@@ -210,6 +219,15 @@ def test_skipbuffer_drops_what_has_not_begun(bench, client):
 def test_skipbuffer_lets_statements_behind_a_skipped_clear_go_on(client):
     client.say('sleep(0.1)', 'clear_interpreter()', 'n = 5')
     assert client.say('skipbuffer') == ['ack: 3: n = 5', 'ack: 3: skipbuffer']
+
+
+def test_skipbuffer_waits_for_a_clear_that_runs_already(bench, client):
+    """What follows it was not compiled before, and must not be cleared by it."""
+    client.say('sleep(0.1) clear_interpreter()', 'textmsg("cleared")')
+    bench.step(2)
+    client.say('skipbuffer', 'textmsg("kept")')
+    bench.wait(0.2)
+    assert bench.log[-1] == 'kept'
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,16 @@ class UrDriverClient:
     def __init__(self, cell):
         self.cell, self.node = cell, cell.client_node
         self._clients: dict[str, Any] = {}
+        self._action_clients: list[Any] = []
+
+    def destroy(self):
+        """
+        Destroy the clients of actions, which rclpy does not destroy with their node.
+
+        They would keep its participant. Where 32 are alive, no node finds another.
+        """
+        for client in self._action_clients:
+            client.destroy()
 
     def call(self, name, type_name='std_srvs/srv/Trigger', /, **fields):
         """Call a service and return its response."""
@@ -55,6 +65,7 @@ class UrDriverClient:
     def action(self, name, type_name):
         """Return the client of an action, when its server is there."""
         client = ActionClient(self.node, kind(type_name), name)
+        self._action_clients.append(client)
         self.cell.spin_until(client.server_is_ready)
         return client
 

@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
+from os.path import samefile
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,6 +33,16 @@ def length(text: str) -> float:
     from ur_cartesian_driver.importing import parse_length
 
     return parsed(parse_length, text)
+
+
+def resume_length(text: str) -> float:
+    """Return a length [m] by which a goal is resumed before its stop, or approached."""
+    from ur_cartesian_driver.path.resumption import MAX_RESUME_LENGTH
+
+    number = length(text)
+    if number > MAX_RESUME_LENGTH:
+        raise argparse.ArgumentTypeError(f'{text} is not within 0 and {MAX_RESUME_LENGTH:g} m')
+    return number
 
 
 def code_output(text: str) -> tuple[str, CodeOutput]:
@@ -116,3 +128,10 @@ def seconds(text: str) -> float:
     if not 0.0 <= number <= MAX_SECONDS:  # or NaN
         raise argparse.ArgumentTypeError(f'{number:g} s is not within 0 and {MAX_SECONDS:g} s')
     return number
+
+
+def is_same_file(one: str | None, other: str | None) -> bool:
+    """Return whether two options name one file that exists."""
+    with suppress(OSError):
+        return bool(one and other) and samefile(str(one), str(other))
+    return False

@@ -98,7 +98,7 @@ def _add_own_driver(command: CommandParser) -> None:
         '--wait',
         type=argument_types.seconds,
         default=10.0,
-        help='until the robot must be ready [s]',
+        help='how long to wait until the robot is ready [s]',
     )
 
 
@@ -180,8 +180,8 @@ def _add_append(command: CommandParser) -> None:
     command.add_argument(
         '--last',
         action='store_true',
-        help='nothing follows: the goal ends with these points, or without a file with those '
-        'that it has',
+        help='no points follow: the goal ends with these, or, without a file, with the ones that '
+        'it has',
     )
     place = command.add_mutually_exclusive_group()
     place.add_argument(
@@ -194,7 +194,7 @@ def _add_append(command: CommandParser) -> None:
         '--replace-from-time',
         type=argument_types.seconds,
         metavar='SECONDS',
-        help='time from the start of the goal from which on its points are replaced',
+        help='replace all points after this time, counted from the start of the goal',
     )
 
 
@@ -229,20 +229,17 @@ def _add_send(command: CommandParser) -> None:
         action='store_true',
         help='go on where the goal of this file was stopped (noted in FILE.stopped)',
     )
-    command.add_argument(
-        '--overlap',
-        type=float,
-        default=5.0,
-        metavar='MM',
-        help='how far before that place the path is resumed (5 mm)',
-    )
-    command.add_argument(
-        '--approach',
-        type=float,
-        default=30.0,
-        metavar='MM',
-        help='from how far behind the path, along the z axis of the tool (30 mm)',
-    )
+    for name, default, text in (
+        ('overlap', '5mm', 'how far before that place the path is resumed'),
+        ('approach', '30mm', 'from how far behind the path, along the z axis of the tool'),
+    ):
+        command.add_argument(
+            f'--{name}',
+            type=argument_types.resume_length,
+            default=default,
+            metavar='LENGTH',
+            help=text,
+        )
     command.add_argument(
         '--report', action='store_true', help='print the report: what was done, and why'
     )
@@ -320,8 +317,8 @@ def _add_show(command: CommandParser) -> None:
     command.add_argument(
         '--host',
         default=plan_commands.LOOPBACK,
-        help='address on which the page of --live is served; others than the default let others '
-        'of the network look',
+        help='address on which the page of --live is served; with an address other than the '
+        'default, anybody on the network can open it',
     )
     command.add_argument(
         '--port',
@@ -475,7 +472,9 @@ def _add_teach(command: CommandParser) -> None:
     from ur_cartesian_driver.cli import teach_command
 
     command.set_defaults(run=teach_command.teach_path)
-    command.add_argument('-o', '--output', default='path.yaml', help='goal file')
+    command.add_argument(
+        '-o', '--output', help='goal file; path.yaml by default, which must not exist yet'
+    )
     _add_own_driver(command)
     command.add_argument(
         '--speed', type=argument_types.factor, help="of lines and arcs [m/s]; else the driver's"
@@ -501,7 +500,8 @@ def _add_valve(command: CommandParser) -> None:
         type=float,
         nargs=2,
         metavar=('BEGINS', 'ENDS'),
-        help='how far behind the slow bead the fast one begins and ends [mm]: lay no beads',
+        help='how far behind the slow bead the fast one begins and ends [mm]: lay no beads; '
+        '--slow and --fast are those of the beads',
     )
     _add_length(command, 'ruler', '0.5mm', 'uncertainty of one reading')
     for name, speed in (('slow', 0.02), ('fast', 0.2)):
@@ -682,7 +682,7 @@ COMMANDS: dict[str, tuple[str, Callable[[CommandParser], None]]] = {
         _add_sweep,
     ),
     'import': (
-        'make a goal of a file of others: CSV, G-code, DXF, ROS messages, recordings, URScript',
+        'make a goal from a file: CSV, G-code, DXF, ROS messages, recordings, URScript',
         _add_import,
     ),
     'teach': (
@@ -699,8 +699,8 @@ COMMANDS: dict[str, tuple[str, Callable[[CommandParser], None]]] = {
         _add_calibration,
     ),
     'check-robot': (
-        'tell what works with a robot and how it differs from what is assumed; moves nothing '
-        'without being asked',
+        'report what works with a robot, and where it differs from our assumptions; moves the '
+        'arm only after asking',
         _add_check_robot,
     ),
     'identify': (

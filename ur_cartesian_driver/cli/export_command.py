@@ -8,10 +8,10 @@ import argparse
 import os
 from pathlib import Path
 
-from ur_cartesian_driver.cli.plots.recording_plot import newest_recording
 from ur_cartesian_driver.cli.progress import counted
 from ur_cartesian_driver.driver.recordings.export_options import Exporter, ExportOptions
 from ur_cartesian_driver.driver.recordings.recording import Recording
+from ur_cartesian_driver.driver.recordings.recording_folder import newest_recording
 from ur_cartesian_driver.file_formats import FileFormats
 
 #: The exporters, by suffix.

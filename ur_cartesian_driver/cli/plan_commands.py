@@ -89,7 +89,12 @@ def show(arguments: argparse.Namespace) -> int:
                 return 1
             status, state = 1, planning.state
             page = refusal_page(
-                planning.goal, refusal, planning.arm, state.actual_q, state.T_flange_tcp
+                planning.goal,
+                refusal,
+                planning.arm,
+                state.actual_q,
+                state.T_flange_tcp,
+                planning.planes,
             )
     except ImportError as error:
         print(f'ur-cartesian show: {error}', file=sys.stderr)
@@ -115,7 +120,7 @@ def _show_live(arguments: argparse.Namespace) -> int:
     planning = GoalPlanning(arguments, state)
     plan = None
     try:
-        if planning.has_goal:
+        if planning.message is not None:
             plan = planning.plan()
     except GoalRefused as refusal:
         print(f'refused, {code_text(refusal.code)}: {refusal}', file=sys.stderr)
@@ -157,34 +162,35 @@ async def _follow(page: LivePage, host: str, port: int) -> NoReturn:
 class GoalPlanning:
     """The goal of a command line, and the arm that it is planned for."""
 
-    def __init__(self, arguments: argparse.Namespace, robot: RobotState | None = None) -> None:
+    def __init__(
+        self, arguments: argparse.Namespace, robot: RobotState | None = None, *, model: str = ''
+    ) -> None:
         """
         Read the parameters and the goal.
 
         :param robot: the state of the robot; None = the state that the arguments give.
+        :param model: name of the arm's model; empty = the one that the arguments give.
         """
         from ur_cartesian_driver.planning.preflight.clearance import self_collision_remark
         from ur_cartesian_driver.ros.parameters.parameter_files import read_settings
 
         self._settings = settings = read_settings(arguments.params_file, arguments.param)
-        model = robot_model(arguments.ur_type or settings.driver.ur_type)
-        if remark := self_collision_remark(model.name, settings.planning):
+        its_model = robot_model(model or arguments.ur_type or settings.driver.ur_type)
+        if remark := self_collision_remark(its_model.name, settings.planning):
             print(remark, file=sys.stderr)
-        self.arm = Arm(model, calibration(arguments, model))
+        self.arm = Arm(its_model, calibration(arguments, its_model))
         if robot is None:
             q = vector6(arguments.joints or SimulatorConfig().q)
             tcp = arguments.tcp or IDENTITY
         else:
             q, tcp = robot.actual_q, robot.T_flange_tcp
         self.state = state_at_rest(self.arm, q, tcp)
-        self._message = read_goal(arguments) if arguments.file else None
+        self.frames = settings.frames
+        self.options = settings.planning.for_program(settings.driver)
+        #: The goal's message; None if the command line names no goal.
+        self.message = read_goal(arguments) if arguments.file else None
         #: The goal; None before :meth:`plan` has resolved its frames.
         self.goal: Goal | None = None
-
-    @property
-    def has_goal(self) -> bool:
-        """Whether the command line names a goal."""
-        return self._message is not None
 
     @property
     def planes(self) -> tuple[Plane, ...]:
@@ -201,17 +207,15 @@ class GoalPlanning:
         from ur_cartesian_driver.planning import plan
         from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
 
-        settings = self._settings
-        options = settings.planning.for_program(settings.driver)
         self.goal = goal_from_message(
-            self._message,
-            settings.frames,
+            self.message,
+            self.frames,
             now=time_ns(),
             snapshot=ArmSnapshot.of(self.state),
-            time_tolerance=settings.node.goal_time_tolerance,
+            time_tolerance=self._settings.node.goal_time_tolerance,
         )
         with timed('planning'):
-            return plan(self.goal, self.state, self.arm, options)
+            return plan(self.goal, self.state, self.arm, self.options)
 
 
 def _numbers(values: Iterable[float]) -> str:

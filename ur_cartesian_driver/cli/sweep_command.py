@@ -13,15 +13,9 @@ from pathlib import Path as FilePath
 import sys
 
 from ur_cartesian_driver.cli.argument_types import MAX_VARIANTS
-from ur_cartesian_driver.cli.commands import read_goal
+from ur_cartesian_driver.cli.plan_commands import GoalPlanning
 from ur_cartesian_driver.cli.progress import counted
-from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.geometry.pose import IDENTITY
-from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.path import Path
-from ur_cartesian_driver.sim import SimulatorConfig
-from ur_cartesian_driver.sim.command_line.simulate import calibration
 from ur_cartesian_driver.sweep import (
     at_places,
     calibrated,
@@ -72,12 +66,9 @@ def variants_of(arguments: argparse.Namespace) -> list[Variant]:
     :raises ValueError: there are too many variants; or a calibration is given for several models,
         or with --monte-carlo.
     """
-    from ur_cartesian_driver.ros.parameters.parameter_files import read_settings
-
-    settings = read_settings(arguments.params_file, arguments.param)
-    models = arguments.model or [arguments.ur_type or settings.driver.ur_type]
+    models = arguments.model
     offsets = {name: getattr(arguments, name) for name in ('x', 'y', 'z', 'rz')}
-    count = prod(map(len, offsets.values())) * len(models) * max(1, arguments.monte_carlo)
+    count = prod(map(len, offsets.values())) * max(1, len(models)) * max(1, arguments.monte_carlo)
     if count > MAX_VARIANTS:
         raise ValueError(f'the sweep has {count} variants; give {MAX_VARIANTS} at most')
     if arguments.calibration or arguments.calibration_seed is not None:
@@ -88,14 +79,14 @@ def variants_of(arguments: argparse.Namespace) -> list[Variant]:
                 '--monte-carlo draws calibrations of its own; leave --calibration and '
                 '--calibration-seed out'
             )
-    model = robot_model(models[0])
+    planning = GoalPlanning(arguments, model=models[0] if models else '')
     variant = Variant(
-        goal=Path.from_message(read_goal(arguments)),
-        arm=Arm(model, calibration(arguments, model)),
-        start=vector6(arguments.joints or SimulatorConfig().q),
-        T_flange_tcp=arguments.tcp or IDENTITY,
-        options=settings.planning.for_program(settings.driver),
-        frames=settings.frames,
+        goal=Path.from_message(planning.message),
+        arm=planning.arm,
+        start=planning.state.actual_q,
+        T_flange_tcp=planning.state.T_flange_tcp,
+        options=planning.options,
+        frames=planning.frames,
     )
     variants = at_places(variant, **offsets)
     if len(models) > 1:

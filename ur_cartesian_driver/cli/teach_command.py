@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path as FilePath
 import sys
 import threading
 
@@ -21,24 +22,63 @@ HELP = (
     'Enter takes a point like the one before; l: a line to it, j: a joint motion, p: a line of a '
     'process, a: here is the middle of an arc, and the next Enter its end; u: undo, q: write, end'
 )
+#: The file of a lesson for which none is named; it is not replaced.
+DEFAULT_OUTPUT = 'path.yaml'
 #: Longest time until the arm can be guided, and until the robot holds it again [s].
 FREEDRIVE_TIME = 10.0
 _KINDS = {'l': 'line', 'j': 'joint', 'p': 'process'}
 
 
 def teach_path(arguments: argparse.Namespace) -> int:
-    """Connect, let a person guide the arm, and write the taken points, even after Ctrl-C."""
+    """
+    Connect, let a person guide the arm, and write the taken points, even after Ctrl-C.
+
+    :raises OSError: the file cannot be written. This is found out before the robot is connected;
+        if it happens afterwards, the goal is printed instead.
+    """
     lesson = Lesson(Path().at(speed=arguments.speed, blend=arguments.blend))
+    output = arguments.output or DEFAULT_OUTPUT
+    if not arguments.output and FilePath(output).exists():
+        raise OSError(f'{output} exists already; name the file by -o')
+    _check_writable(FilePath(output))
     try:
         with ready_driver(arguments, allow_freedrive=True) as driver:
             guide(driver, lesson, _keys(), _say)
     finally:
         if lesson.path.poses:
-            lesson.path.save(arguments.output)
-            _say(f'{_points(len(lesson.path))} in {arguments.output}')
+            save(lesson.path, output)
+            _say(f'{_points(len(lesson.path))} in {output}')
         else:
             _say('no point was taken, so nothing is written')
     return 0
+
+
+def _check_writable(file: FilePath) -> None:
+    """Open a file for writing, and leave it as it is."""
+    existed = file.exists()
+    try:
+        file.open('a').close()
+    except OSError as error:
+        raise OSError(
+            f'{file} cannot be written: {error.strerror}; choose another file by -o'
+        ) from None
+    if not existed:
+        file.unlink()
+
+
+def save(path: Path, file: str) -> None:
+    """
+    Write a path to a file, or print it if that fails, since nobody can take its points again.
+
+    :raises OSError: the file cannot be written.
+    """
+    try:
+        path.save(file)
+    except OSError as error:
+        _say(path.to_yaml())
+        raise OSError(
+            f'{file} cannot be written: {error.strerror}; the goal is printed above'
+        ) from None
 
 
 def guide(

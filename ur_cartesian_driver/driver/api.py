@@ -363,8 +363,8 @@ class Driver(RobotServices, InteractiveMotions):
             raise RobotNotReady('A person guides the arm by hand; end freedrive first.')
         if is_paused(state) or is_stopped(state):
             raise RobotNotReady(
-                'A motion is running that is paused or stopped, so no other motion can preempt '
-                'it; resume or cancel it.'
+                'The running motion is paused or stopped, so no other motion can preempt it; '
+                'resume or cancel it.'
             )
 
     @property
@@ -429,8 +429,8 @@ class Driver(RobotServices, InteractiveMotions):
     def _options_for(self, state: RobotState) -> PlanningOptions:
         """Return the planning options, with the features of the connected robot."""
         status = self.status
-        return replace(
-            self.options.for_program(self.config),
+        return self.options.for_program(
+            self.config,
             calibration_known=status.calibration_known,
             optimove_known=has_feature('optimove', status.software()),
             path_offset_known=has_feature('path_offset', status.software()),
@@ -475,7 +475,7 @@ class Driver(RobotServices, InteractiveMotions):
             else '',
         )
         data = pack_parts(request)
-        active = ActiveMotion(number, plan, on_progress, self._send)
+        active = ActiveMotion(number, plan, on_progress, self._send, self._log)
         if job.feed_override is not None:
             active.motion.feed_problem = (
                 HAS_FEED_INPUT if self.config.feed_override_input else None

@@ -13,12 +13,12 @@ LOG = logging.getLogger('ur_cartesian_driver')
 T = TypeVar('T')
 
 
-def run_callback(callback: Callable[[T], None], argument: T) -> None:
+def run_callback(callback: Callable[[T], None], argument: T, log: logging.Logger) -> None:
     """Call user code; an exception that it raises is logged, and does not end the thread."""
     try:
         callback(argument)
     except Exception as error:
-        LOG.exception(
+        log.exception(
             'a callback of the driver failed with %s: %s; the driver goes on',
             type(error).__name__,
             error,

@@ -216,8 +216,9 @@ def check_target(T_base_tcp: Pose, state: RobotState, options: PlanningOptions) 
     if 0.0 < max_distance < distance:
         raise InvalidGoal(
             'The target',
-            f'is {distance:.4g} m away from the tool, max_approach_distance is {max_distance:g} m',
-            'approach it by a goal, or raise the parameter',
+            f'is {distance:.4g} m away from the tool, more than max_approach_distance = '
+            f'{max_distance:g} m',
+            'send a goal to go there, or raise the parameter',
         )
 
 

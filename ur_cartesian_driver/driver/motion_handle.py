@@ -7,11 +7,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
+import logging
 from math import isfinite
 import threading
 
 from ur_cartesian_driver.driver.appender import Appender, AppendResult
-from ur_cartesian_driver.driver.callbacks import run_callback
+from ur_cartesian_driver.driver.callbacks import LOG, run_callback
 from ur_cartesian_driver.driver.ipc.channel import (
     CancelMotion,
     Request,
@@ -30,16 +31,17 @@ from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 OnProgress = Callable[[Progress], None]
 
 
-#: The goal takes no signal; an input of the robot gives it.
+#: Why clients cannot slow a motion: its goal has no bounds for a signal.
 NO_FEED_OVERRIDE = (
     'feed_override',
-    'is empty in the goal that runs',
+    'is not set in the running goal',
     'set its minimum in the goal',
 )
+#: The same: an input of the robot gives the signal.
 HAS_FEED_INPUT = (
     'feed_override_input',
-    'names an input of the robot, which alone slows the goals',
-    "set the parameter to '' for signals of clients",
+    'names an input of the robot, whose signal slows all goals',
+    "set the parameter to '' so that clients can give the signal",
 )
 
 
@@ -139,7 +141,7 @@ class MotionHandle:
         """
         if self.offset_timeout is None:
             raise InvalidGoal(
-                'path_offset', 'is empty in the goal that runs', 'set its limits in the goal'
+                'path_offset', 'is not set in the running goal', 'set its limits in the goal'
             )
         values = {'along': along, 'across': across, 'normal': normal, 'age': age}
         for name, value in values.items():
@@ -207,14 +209,16 @@ class ActiveMotion:
         plan: Plan,
         on_progress: OnProgress | None,
         send: Callable[[Request], None],
+        log: logging.Logger = LOG,
     ) -> None:
         """
         Begin with no progress and no outcome.
 
         :param send: sends requests to the robot loop.
+        :param log: takes the errors of ``on_progress``.
         """
         self._outcome: Future[Outcome] = Future()
-        self._on_progress = on_progress
+        self._on_progress, self._log = on_progress, log
         #: Guards the attributes below.
         self._lock = threading.Lock()
         #: The plan; None once a thread makes its report.
@@ -257,7 +261,7 @@ class ActiveMotion:
         """Keep a progress report of the robot loop, and pass it on."""
         self.motion.progress = progress
         if self._on_progress is not None:
-            run_callback(self._on_progress, progress)
+            run_callback(self._on_progress, progress, self._log)
 
     def end(self, outcome: Outcome) -> None:
         """Deliver the outcome; any further outcome is ignored."""

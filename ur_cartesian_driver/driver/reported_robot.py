@@ -72,11 +72,11 @@ class ReportedRobot:
         match notification:
             case ServoProgress(report=report):
                 for listener in list(self.servo_listeners):
-                    run_callback(listener, report)
+                    run_callback(listener, report, self._log)
             case PulsesGiven(pulses=pulses):
                 for pulse in pulses:
                     for to_pulse in list(self.pulse_listeners):
-                        run_callback(to_pulse, pulse)
+                        run_callback(to_pulse, pulse, self._log)
             case StatusChanged(status=status):
                 self.set_status(status)
             case SignalsChanged(signals=signals):
@@ -105,7 +105,7 @@ class ReportedRobot:
         else:
             self.ready.clear()
         for listener in list(self.status_listeners):
-            run_callback(listener, status)
+            run_callback(listener, status, self._log)
 
     def _update_limits(self, limits: JointLimits) -> None:
         """Tighten the joint limits for planning to those that the robot reports."""

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import IntEnum
 from importlib import import_module
 from types import SimpleNamespace
 from typing import Any, TypeAlias
@@ -31,6 +32,8 @@ class Whole:
 
     low: int
     high: int
+    #: What the numbers mean; None = they count.
+    choices: type[IntEnum] | None = None
 
 
 _UINT8, _UINT32 = Whole(0, 2**8 - 1), Whole(0, 2**32 - 1)
@@ -38,7 +41,6 @@ _TIME = {'sec': Whole(-(2**31), 2**31 - 1), 'nanosec': _UINT32}
 _VECTOR = {'x': 0.0, 'y': 0.0, 'z': 0.0}
 _FORMS: Mapping[Form, Any] = {
     Form.PIN: _UINT8,
-    Form.CHOICE: _UINT8,
     Form.COUNT: _UINT32,
     Form.INDEX: _UINT32,
     Form.DURATION: _TIME,
@@ -61,6 +63,8 @@ def _schema(kind: type) -> dict[str, Any]:
 
 
 def _value_schema(each: GoalField) -> Any:
+    if each.form is Form.CHOICE:
+        return replace(_UINT8, choices=each.type)
     if each.form in _FORMS:
         return _FORMS[each.form]
     if each.form is Form.RECORD:
@@ -78,7 +82,7 @@ def _packed_schema() -> dict[str, Any]:
         if each.field.form is Form.RECORD:
             schema.setdefault('posture_joint_names', [''])
         if each.packed is not None:
-            schema[each.packed] = [_FORMS[Form.CHOICE] if each.field.form is Form.CHOICE else 0.0]
+            schema[each.packed] = [_UINT8 if each.field.form is Form.CHOICE else 0.0]
     return schema
 
 
@@ -181,15 +185,21 @@ def _slot_value(value: Any, slot: Any) -> Any:
 
 def _number(value: object, key: str) -> float:
     # YAML reads 1e-3 as a text, because its own notation is 1.0e-3.
-    with suppress(ValueError):
+    with suppress(ValueError, OverflowError):
         if isinstance(value, (int, float, str)) and not isinstance(value, bool):
             return float(value)
+    if isinstance(value, int) and not isinstance(value, bool):
+        raise FieldError(f'{key} is {value!r:.20}..., which is too large for a number.')
     raise FieldError(f'{key} is {value!r}, but must be a number.')
 
 
 def _whole(value: object, kind: Whole, key: str) -> int:
     if not isinstance(value, int) or isinstance(value, bool) or not kind.low <= value <= kind.high:
+        names = {} if kind.choices is None else kind.choices.__members__
+        choice = names.get(str(value).upper())
+        meant = '' if choice is None else f'; {choice.name} is {choice.value}'
         raise FieldError(
-            f'{key} is {value!r}, but must be a whole number from {kind.low} to {kind.high}.'
+            f'{key} is {value!r:.60}, but must be a whole number from {kind.low} to '
+            f'{kind.high}{meant}.'
         )
     return value

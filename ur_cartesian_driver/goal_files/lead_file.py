@@ -129,4 +129,7 @@ def _lead(entry: Any) -> Lead:
 def _seconds(key: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f'{key} is {value!r:.60}, but must be a number of seconds')
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError(f'{key} is {value!r:.20}..., which is too large for a time') from None

@@ -6,7 +6,7 @@ The kinematics of one arm as the YAML that the package ``ur_description`` takes.
 The file has the pose of each joint in the link before it, with all joints at 0, as a URDF has it:
 x y z, and roll pitch yaw of R = Rz(yaw) Ry(pitch) Rx(roll). Each joint turns about its z axis.
 
-The DH frames of a calibrated arm are no good places for links. Its axes of shoulder lift, elbow
+The DH frames of a calibrated arm make poor link frames. Its axes of shoulder lift, elbow
 and wrist 1 are so nearly parallel that their common normals may lie hundreds of metres away. But
 Rz(q) commutes with shifts along z and with turns about z, so a frame may lie anywhere on its axis,
 turned by any constant angle, and the chain stays the same for all q. Upper arm and forearm are

@@ -97,6 +97,8 @@ def wrist_solutions(
     """Yield the solutions for two shoulders, each with two wrists, without the elbow."""
     r11, r12, r13, r21, r22, r23, r31, r32, _ = rotation_from_quaternion(T_base_flange.quaternion)
     px, py, pz = wrist_centre(ideal, T_base_flange)
+    if px == py == 0.0:
+        return  # on axis 1, from which the arm is d4 away
     d4, d5 = ideal.d4, ideal.d5
     for outward in _roots(px * px + py * py - d4 * d4, slack):
         # px s1 - py c1 = d4 and px c1 + py s1 = outward, solved for s1 and c1.

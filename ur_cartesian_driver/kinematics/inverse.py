@@ -85,6 +85,8 @@ def solutions(arm: Arm, T_base_flange: Pose, seed: Joints | None = None) -> list
         of the search.
     """
     wrist_3 = 0.0 if seed is None else seed[5]
+    if _is_far(T_base_flange):
+        return []
     if not arm.calibrated:
         return closed_form(ideal_arm_of(arm), T_base_flange, wrist_3)
     more = [seed] if seed is not None and _is_near(arm.forward(seed), T_base_flange) else []
@@ -96,14 +98,19 @@ def solutions(arm: Arm, T_base_flange: Pose, seed: Joints | None = None) -> list
     return []
 
 
+def _is_far(T_base_flange: Pose) -> bool:
+    """Return whether a pose has a NaN, or a number whose squares could overflow."""
+    return not all(abs(value) < _MAX_DISTANCE for value in T_base_flange.position)
+
+
 def nearest(arm: Arm, T_base_flange: Pose, q_near: Joints) -> Joints | None:
     """
     Return the solution within the limits that is nearest to ``q_near`` [rad]; None if none is.
 
     All branches and full turns are searched; the distance is Euclidean in joint space.
     """
-    if not max(map(abs, T_base_flange.position)) < _MAX_DISTANCE:
-        return None  # also NaN; the squares of such numbers overflow
+    if _is_far(T_base_flange):
+        return None
     best = None
     for misfit_factor in MISFIT_FACTORS if arm.calibrated else (0.0,):
         starts = closed_form(ideal_arm_of(arm), T_base_flange, q_near[5], misfit_factor)
@@ -153,6 +160,8 @@ def explain_unreachable(arm: Arm, T_base_flange: Pose) -> str:
 
     For a calibrated arm, the clause has the lengths of its ideal arm.
     """
+    if _is_far(T_base_flange):
+        return f'it is more than {_MAX_DISTANCE:g} m away'
     found = solutions(arm, T_base_flange)
     if found:
         return _explain_outside_limits(found, arm.model)

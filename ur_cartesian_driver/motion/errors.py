@@ -119,8 +119,8 @@ class AlreadySent(InvalidGoal):
         """Take the first replaceable point and the earliest ``time_from_start`` [s]."""
         DriverError.__init__(
             self,
-            'What is to be replaced has been sent to the robot; replace from point '
-            f'{first_point} on, from {first_time:.3f} s on, or later.',
+            'The points to be replaced have been sent to the robot already; replace from point '
+            f'{first_point} or from {first_time:.3f} s on, or later.',
         )
         self.first_point, self.first_time = first_point, first_time
 

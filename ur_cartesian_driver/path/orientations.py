@@ -22,6 +22,7 @@ from ur_cartesian_driver.motion.geometry.vectors import (
     unit,
     Vector3,
 )
+from ur_cartesian_driver.path.path_numbers import any_number
 
 #: The tool's axis z points straight down, its axis x along y of the frame.
 DOWN: Quaternion = (sqrt(0.5), sqrt(0.5), 0.0, 0.0)
@@ -53,6 +54,7 @@ def axis_angle(axis: Sequence[float], angle: float) -> Quaternion:
     :raises InvalidGoal: the axis is zero, or the angle looks like degrees.
     """
     x, y, z = direction('axis', axis)
+    angle = any_number('axis_angle()', 'angle', angle)
     if not isfinite(angle) or abs(angle) > MAX_ANGLE:
         raise InvalidGoal(
             'angle', f'is {angle:g} rad, more than two turns', f'write deg({angle:g}) for degrees'
@@ -92,7 +94,10 @@ def direction(name: str, vector: Sequence[float]) -> Vector3:
 
     :raises InvalidGoal: the vector is zero, or does not consist of three finite numbers.
     """
-    values = [float(value) for value in vector]
+    try:
+        values = [float(value) for value in vector]
+    except (TypeError, ValueError, OverflowError):
+        values = []
     if len(values) != 3 or not all(map(isfinite, values)) or not any(values):
         raise InvalidGoal(name, f'is {vector!r}', 'give three numbers that are not all zero')
     x, y, z = values

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal.goal import (
@@ -14,8 +15,9 @@ from ur_cartesian_driver.motion.goal.goal import (
     OutputKind,
     SafeOutput,
 )
-from ur_cartesian_driver.motion.goal.output_names import output_fault, output_name
+from ur_cartesian_driver.motion.goal.output_names import output_fault, output_name, OUTPUTS
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
+from ur_cartesian_driver.path.path_numbers import any_number
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +30,14 @@ class Output:
 
     def __post_init__(self) -> None:
         """Refuse a pin that the robot does not have."""
+        if not isinstance(self.pin, Integral):
+            name = OUTPUTS[self.kind][0]
+            raise InvalidGoal(f'the pin of a {name}', f'is {self.pin!r:.60}', 'give its number')
         self._check(0.0)
+
+    def __str__(self) -> str:
+        """Return the name of the output for a sentence."""
+        return output_name(self.kind, self.pin)
 
     def command(self, value: float, waypoint: int, offset: float) -> IOCommand:
         """
@@ -60,10 +69,10 @@ class Output:
         )
 
     def _check(self, value: float) -> float:
-        number = float(value)
+        number = any_number(str(self), 'value', value)
         if (fault := output_fault(self.kind, self.pin, number)) is not None:
             field, wrong, remedy = fault
-            raise InvalidGoal(f'the {field} of {output_name(self.kind, self.pin)}', wrong, remedy)
+            raise InvalidGoal(f'the {field} of {self}', wrong, remedy)
         return number
 
 
@@ -95,14 +104,14 @@ class Input:
     pin: int
 
     def wait(self, value: float, timeout: float, below: bool, go_on: bool) -> InputWait:
-        """Return the event that waits for a value of the input; the value is not checked."""
+        """Return the event that waits for a value of the input; no number is checked."""
         return InputWait(
             waypoint=0,
             input=self.kind,
             pin=self.pin,
             value=value,
             below=below,
-            timeout=float(timeout),
+            timeout=timeout,
             go_on=go_on,
         )
 

@@ -11,6 +11,7 @@ raises an :exc:`~ur_cartesian_driver.motion.errors.InvalidGoal` at the program l
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from numbers import Integral
 import os
 from pathlib import Path as FilePath
 from typing import Any
@@ -26,6 +27,7 @@ from ur_cartesian_driver.goal_files.goal_schema import message_of, with_defaults
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.vectors import ZERO3
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import (
     CORNER_ANGLE,
@@ -43,7 +45,12 @@ from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.path.centre_line import CentreLine, RestToRest
 from ur_cartesian_driver.path.outputs import Output
 from ur_cartesian_driver.path.path_events import PathWithEvents
-from ur_cartesian_driver.path.path_goal import goal_of_points, points_of_goal, settings_of
+from ur_cartesian_driver.path.path_goal import (
+    goal_of_points,
+    points_of_goal,
+    SETTINGS,
+    settings_of,
+)
 from ur_cartesian_driver.path.path_motions import (
     MAX_BLEND,
     MAX_COORDINATE,
@@ -54,6 +61,7 @@ from ur_cartesian_driver.path.path_numbers import (
     amount,
     any_number,
     NANOSECONDS,
+    to_nanoseconds,
     unit_quaternion,
     vector,
 )
@@ -65,7 +73,6 @@ from ur_cartesian_driver.path.path_points import (
     PathPoint,
     point_fields,
     seen_from,
-    with_fields,
 )
 from ur_cartesian_driver.path.resumption import APPROACH, OVERLAP, resume
 from ur_cartesian_driver.path.weave import strokes, woven
@@ -106,32 +113,52 @@ class Path(PathWithEvents):
         :param time: largest delay of the end after its planned time [s], negative = any.
         :param stall: how long the motion waits for an arm that is off its path [s], SERVO only;
             0 = such an arm is stopped, and the goal ends.
+        :raises InvalidGoal: a value is no tolerance, or not a finite time.
         """
+        where = 'tolerances()'
         given: dict[str, Any] = {'path_tolerance': path, 'goal_tolerance': goal}
         if stall is not None:
-            amount('tolerances()', 'stall', stall, 3600.0, 's')
-            stall = round(stall * NANOSECONDS) / NANOSECONDS
+            length = to_nanoseconds(where, amount(where, 'stall', stall, 3600.0, 's'))
+            stall = length / NANOSECONDS
             choice = OnPathTolerance.STALL if stall else OnPathTolerance.ABORT
             given |= {'on_path_tolerance': choice, 'stall_timeout': stall}
         if time is not None:
-            given['goal_time_tolerance'] = round(time * NANOSECONDS) / NANOSECONDS
-        return self._with_settings(**{k: value for k, value in given.items() if value is not None})
+            delay = to_nanoseconds(where, any_number(where, 'time', time))
+            given['goal_time_tolerance'] = delay / NANOSECONDS
+        return self._with_settings(
+            where, **{k: value for k, value in given.items() if value is not None}
+        )
 
     def asking(self, **fields: Any) -> Path:
         """
         Set goal fields that have no method of their own, by their names in the action.
 
-        :raises InvalidGoal: a field cannot have the value.
+        :raises InvalidGoal: a field cannot have the value, or is none of the whole path.
         """
-        return self._with(_settings=with_fields('asking()', self._settings, fields))
+        for name in fields:
+            if name not in SETTINGS:
+                raise InvalidGoal(
+                    'asking()',
+                    f'names {name}, which is no setting of a whole path',
+                    f'use one of {", ".join(SETTINGS)}, or the methods of the path',
+                )
+        return self._with_settings('asking()', **fields)
 
     def executed_as(self, mode: ExecutionMode) -> Path:
-        """Choose how the path is executed, such as by the robot (SPLINE) or streamed (SERVO)."""
-        return self._with_settings(execution=mode)
+        """
+        Choose how the path is executed, such as by the robot (SPLINE) or streamed (SERVO).
+
+        :raises InvalidGoal: there is no such mode.
+        """
+        return self._with_settings('executed_as()', execution=mode)
 
     def steady(self, min_fraction: float = 0.95) -> Path:
-        """Demand a fraction (0 to 1) of the asked speed everywhere; a slower path is refused."""
-        return self._with_settings(min_speed_fraction=min_fraction)
+        """
+        Demand a fraction (0 to 1) of the asked speed everywhere; a slower path is refused.
+
+        :raises InvalidGoal: the fraction is out of its range.
+        """
+        return self._with_settings('steady()', min_speed_fraction=min_fraction)
 
     def rounded(self, deviation: float, angle: float = 0.0) -> Path:
         """
@@ -153,7 +180,9 @@ class Path(PathWithEvents):
             number = any_number('rounded()', name, value)
             if not bounds.holds(number):
                 raise InvalidGoal(f'rounded(): {name}', bounds.refusal(number)[0], remedy)
-        return self._with_settings(corner_deviation=float(deviation), corner_angle=float(angle))
+        return self._with_settings(
+            'rounded()', corner_deviation=float(deviation), corner_angle=float(angle)
+        )
 
     def path_offset(
         self,
@@ -178,6 +207,7 @@ class Path(PathWithEvents):
         :param acceleration: largest acceleration of the offset along each axis [m/s^2]; 0 = 0.2.
         :param timeout: age from which an offset is stale [s]; 0 = 0.5.
         :param on_stale: whether a stale offset stays, or the tool goes back to its path.
+        :raises InvalidGoal: a number is out of its range.
         """
         offset = PathOffset(
             limits=(along, across, normal),
@@ -186,7 +216,7 @@ class Path(PathWithEvents):
             timeout=timeout,
             on_stale=on_stale,
         )
-        return self._with_settings(path_offset=offset)
+        return self._with_settings('path_offset()', path_offset=offset)
 
     def feed_override(
         self, minimum: float, *, maximum: float = 1.0, rate: float = 0.0, timeout: float = 0.0
@@ -202,9 +232,10 @@ class Path(PathWithEvents):
         :param maximum: largest fraction of the planned speed.
         :param rate: largest change of the fraction [1/s]; 0 = 0.5.
         :param timeout: age from which the signal is stale [s]; 0 = 0.5.
+        :raises InvalidGoal: a number is out of its range.
         """
         bounds = FeedOverride(minimum=minimum, maximum=maximum, rate=rate, timeout=timeout)
-        return self._with_settings(feed_override=bounds)
+        return self._with_settings('feed_override()', feed_override=bounds)
 
     def keep_open(self, replace_horizon: float = 0.0) -> Path:
         """
@@ -212,8 +243,9 @@ class Path(PathWithEvents):
 
         :param replace_horizon: how far ahead of the arm points are fixed [s]; later points can be
             replaced. 0 = no points can be replaced.
+        :raises InvalidGoal: the horizon is out of its range.
         """
-        return self._with_settings(keep_open=True, replace_horizon=replace_horizon)
+        return self._with_settings('keep_open()', keep_open=True, replace_horizon=replace_horizon)
 
     def safe(self, output: Output, value: float, *, restore: bool = False) -> Path:
         """
@@ -225,7 +257,7 @@ class Path(PathWithEvents):
         safe, known = output.safe(value, restore), self._settings.safe_outputs
         if any((other.output, other.pin) == (safe.output, safe.pin) for other in known):
             raise InvalidGoal('safe()', f'names {output} a second time', 'name it once')
-        return self._with_settings(safe_outputs=(*known, safe))
+        return self._with_settings('safe()', safe_outputs=(*known, safe))
 
     # ---- new paths from paths ------------------------------------------------------------------
 
@@ -254,16 +286,23 @@ class Path(PathWithEvents):
                 'add a motion to there',
             )
         if self._points and other._points:
-            first, last = other._points[0], self._points[-1]
-            if first.in_spline != last.in_spline:
+            after, last = other._points[0], self._points[-1]
+            if after.in_spline != last.in_spline:
                 raise mixed_spline('then()')
-            if bool(first.duration) != bool(last.duration):
+            if bool(after.duration) != bool(last.duration):
                 raise InvalidGoal(
                     'then()', 'joins a path with durations and one without', 'give both, or none'
                 )
+        first, start = self, self._start
+        if other._start is not None:
+            rest = other._start.segment.dwell  # of a path that is reversed
+            if not self._points and (start is None or rest):
+                start = other._start
+            elif rest and not self._points[-1].segment.dwell:
+                first = self.dwell(rest)
         return self._with(
-            _start=self._start if len(self) or self._start else other._start,
-            _points=(*self._points, *other._points),
+            _start=start,
+            _points=(*first._points, *other._points),
             _feed=other._feed,
             _settings=merged(self._settings, other._settings),
         )
@@ -275,36 +314,52 @@ class Path(PathWithEvents):
         Return this path moved by a distance [m].
 
         :param of_tool: move each point along the axes of the tool there, not of the frame.
-        :raises InvalidGoal: with ``of_tool``, an arc turns the tool, so that the result is no arc.
+        :raises InvalidGoal: with ``of_tool``, an arc turns the tool, so that the result is no arc;
+            or the tool turns in a spline at a point whose twist has no angular part.
         """
         step = vector('offset()', (dx, dy, dz), MAX_COORDINATE_OF_BASE, 'd')
         if not of_tool:
             return self.transformed(Pose(step))
+        if step == ZERO3:
+            return self
         T_tool_new = Pose(step)
-        previous = (self.start, *self.poses)
+        poses = (self.start, *self.poses, None)
         points = (
-            seen_from(point, T_tool_new, before, f'offset() at point {i}')
-            for i, (point, before) in enumerate(zip(self._points, previous, strict=False))
+            seen_from(point, T_tool_new, poses[i], poses[i + 2], f'offset() at point {i}')
+            for i, point in enumerate(self._points)
         )
         start = self._start
         return self._with(
-            _start=None if start is None else seen_from(start, T_tool_new, None, 'offset()'),
+            _start=None
+            if start is None
+            else seen_from(start, T_tool_new, poses[0], poses[1], 'offset() at the start'),
             _points=tuple(points),
         )
 
     def transformed(self, T: Pose) -> Path:
-        """Return this path with each pose transformed by a pose in the frame: ``T @ pose``."""
+        """
+        Return this path with each pose transformed by a pose in the frame: ``T @ pose``.
+
+        :raises InvalidGoal: the position is too far away, or the pose turns a twist of a spline of
+            which only some linear or angular components are given.
+        """
         T = Pose(
             vector('transformed()', T.position, MAX_COORDINATE), unit_quaternion('T', T.quaternion)
         )
         return self._with(
-            _start=None if self._start is None else moved(self._start, T),
-            _points=tuple(moved(point, T) for point in self._points),
+            _start=None if self._start is None else moved(self._start, T, 'transformed()'),
+            _points=tuple(
+                moved(point, T, f'transformed() at point {i}')
+                for i, point in enumerate(self._points)
+            ),
         )
 
     def reversed(self) -> Path:
         """
         Return the path backwards, from its end to its start.
+
+        A dwell at the end comes first then. A goal cannot begin with a dwell, so such a path has
+        to follow another one, by :meth:`then`.
 
         :raises InvalidGoal: the path has no start at which to end, or has events, which cannot be
             reversed.
@@ -372,8 +427,8 @@ class Path(PathWithEvents):
         :param alternating: every second pass goes backwards.
         :raises InvalidGoal: the path has no start, or the passes cannot be joined.
         """
-        if times < 1:
-            raise InvalidGoal('repeated()', f'is asked for {times} times', 'use 1 or more')
+        if not isinstance(times, Integral) or times < 1:
+            raise InvalidGoal('repeated()', f'is asked for {times!r} times', 'use 1 or more')
         path = self
         for i in range(1, times):
             one = self.offset(i * dx, i * dy, i * dz)
@@ -504,6 +559,13 @@ class Path(PathWithEvents):
     def _table(self) -> GoalTable:
         """Return the goal with its frames unresolved."""
         self._check_ends()
+        if self._start is not None and self._start.segment.dwell:
+            raise InvalidGoal(
+                'reversed()',
+                f'has a dwell of {self._start.segment.dwell:g} s at its start, where no goal can '
+                'have one',
+                'call dwell(0) before it, or let it follow another path by then()',
+            )
         return goal_of_points(self._points, self._settings, self.start, self.frame, self.tool)
 
     def _fields(self) -> dict[str, Any]:

@@ -24,17 +24,18 @@ from ur_cartesian_driver.motion.goal.goal import (
     PulseTrain,
     ScriptCall,
 )
-from ur_cartesian_driver.motion.goal.output_names import output_name
 from ur_cartesian_driver.path.outputs import Input, Output
 from ur_cartesian_driver.path.path_motions import PathOfMotions
 from ur_cartesian_driver.path.path_numbers import (
     amount,
     any_number,
+    many_numbers,
     NANOSECONDS,
+    numbers,
     to_nanoseconds,
     vector,
 )
-from ur_cartesian_driver.path.path_points import PathPoint
+from ur_cartesian_driver.path.path_points import PathPoint, with_fields
 from ur_cartesian_driver.planning.request.point_events.payload_changes import MAX_OFFSET
 from ur_cartesian_driver.planning.request.point_events.registry import check_event
 
@@ -69,8 +70,8 @@ class PathWithEvents(PathOfMotions):
         :param after: time after the place [s].
         :param before: time before the point [s]; only if the motion to it has a duration.
         :param distance: way along the path from the point to the place [m]; negative = before it.
-        :param fraction: the same as a fraction of the segment to the point (negative), or of the
-            segment that follows (positive).
+        :param fraction: the same as a fraction of a segment: of the one to the point if negative,
+            of the one after it if positive.
         :param lead: how much ahead of the place to switch, in real time [s]: the dead time of a
             valve, or the name of the valve in the driver's ``lead_file``.
         :raises InvalidGoal: there is no point, or the value, a time or the place is not possible.
@@ -94,20 +95,22 @@ class PathWithEvents(PathOfMotions):
         if before and (distance or fraction):
             raise InvalidGoal(
                 where,
-                f'has before={before:g} s and a place beside the point',
-                'give the place alone: a distance or fraction below 0 lies before the point',
+                'combines before with distance or fraction',
+                'use one of these; a distance or fraction below 0 lies before the point',
             )
+        if before and after:
+            raise InvalidGoal(where, 'combines before with after', 'use one of them')
         if lead and (after or before):
             raise InvalidGoal(
-                where, f'has lead={lead!r} and another time', 'move the place by a distance'
+                where, 'combines lead with after or before', 'move the place by a distance'
             )
         if before:
             index, offset = index - 1, self._points[-1].duration / NANOSECONDS - before
-            if not self._points[-1].duration or offset < 0.0 or index < 0 or after:
+            if not self._points[-1].duration or offset < 0.0 or index < 0:
                 raise InvalidGoal(
                     where,
-                    f'has before={before:g} s, but no motion with a duration of that time leads '
-                    'there from another point',
+                    f'has before={before:g} s, but the motion to this point has no duration, a '
+                    'shorter one, or begins at no point',
                     'add a point where the output is to change',
                 )
             offset += self._points[index].segment.dwell
@@ -141,7 +144,7 @@ class PathWithEvents(PathOfMotions):
 
         :param gain: fraction of the range per speed [1/(m/s)].
         :param filter_time: time constant of a low-pass filter for the speed [s].
-        :param lead: time before the point at which the output begins to follow [s].
+        :param lead: how long before the point the output begins to follow [s].
         :param idle: value after the end, and when the motion does not go on as planned.
         :raises InvalidGoal: there is no point, the output is not analog, or a number is out of its
             range.
@@ -156,35 +159,42 @@ class PathWithEvents(PathOfMotions):
             last_waypoint=1,
             pin=output.pin,
             domain=output.domain,
-            gain=float(gain),
-            offset=float(offset),
-            minimum=float(minimum),
-            maximum=float(maximum),
-            filter_time=float(filter_time),
-            begin_lead=float(lead),
-            idle=float(idle),
+            begin_lead=any_number(where, 'lead', lead),
+            **numbers(
+                where,
+                gain=gain,
+                offset=offset,
+                minimum=minimum,
+                maximum=maximum,
+                filter_time=filter_time,
+                idle=idle,
+            ),
         )
-        return self._happening(where, self._points[-1], proportional)
+        return self._with_event(where, self._points[-1], proportional)
 
     def end_follow_speed(self, output: Output, *, lead: float = 0.0) -> Self:
         """
         End :meth:`follow_speed` at the last point.
 
-        :param lead: time before the point at which the output ceases to follow [s].
+        :param lead: how long before the point the output ceases to follow [s].
         :raises InvalidGoal: the output does not follow the speed from an earlier point on, or
             ``lead`` is out of its range.
         """
+        where = f'end_follow_speed() at point {len(self) - 1}'
+        if output.kind is not OutputKind.STANDARD_ANALOG:
+            raise InvalidGoal(where, f'names {output}', 'use analog()')
         begun = self._begun(
             lambda one: isinstance(one, ProportionalOutput) and one.pin == output.pin
         )
         if begun is None:
             raise InvalidGoal(
-                f'end_follow_speed() at point {len(self) - 1}',
-                f'has no begin for analog output {output.pin} at a point before',
-                'call follow_speed() there',
+                where,
+                f'ends follow_speed({output}), which has not begun',
+                'call it at an earlier point',
             )
-        check_event('end_follow_speed()', replace(begun[1], end_lead=float(lead), last_waypoint=1))
-        return self._ended(*begun, end_lead=float(lead))
+        end_lead = any_number(where, 'lead', lead)
+        check_event(where, replace(begun[1], end_lead=end_lead, last_waypoint=1))
+        return self._ended(*begun, end_lead=end_lead)
 
     def pulses(
         self,
@@ -213,12 +223,12 @@ class PathWithEvents(PathOfMotions):
             last_waypoint=1,
             output=output.kind,
             pin=output.pin,
+            count=count,
             distance=any_number(where, 'distance', distance),
             phase=any_number(where, 'phase', phase),
             width=any_number(where, 'width', width),
-            count=count,
         )
-        return self._happening(where, self._points[-1], train)
+        return self._with_event(where, self._points[-1], train)
 
     def end_pulses(self, output: Output) -> Self:
         """
@@ -234,8 +244,8 @@ class PathWithEvents(PathOfMotions):
         if begun is None:
             raise InvalidGoal(
                 f'end_pulses() at point {len(self) - 1}',
-                f'has no begin for {output_name(output.kind, output.pin)} at a point before',
-                'call pulses() there',
+                f'ends pulses({output}), which has not begun',
+                'call it at an earlier point',
             )
         return self._ended(*begun)
 
@@ -261,16 +271,23 @@ class PathWithEvents(PathOfMotions):
             about them, 'rx' 'ry' 'rz' [Nm]; empty = no force, only watch for contact.
         :param speed_limits: how fast the tool may give way along and about the same axes [m/s],
             [rad/s]; None = 0.05 and 0.2.
-        :param max_yield: how far the tool may give way along the compliant axes [m]; about them:
-            ``max_yield_angle`` [rad].
-        :param max_deviation: how far the tool may be off its path along the other axes [m]; about
-            them: ``max_deviation_angle`` [rad]. For all four, 0 = the default.
-        :param damping: of force mode, 0 to 1; ``gain_scaling``: 0 to 2.
+        :param max_yield: how far the tool may give way along the compliant axes [m]; 0 = the
+            default, here and in the three below.
+        :param max_yield_angle: how far it may give way about them [rad].
+        :param max_deviation: how far the tool may be off its path along the other axes [m].
+        :param max_deviation_angle: how far it may be turned about them [rad].
+        :param damping: of force mode, 0 to 1.
+        :param gain_scaling: of force mode, 0 to 2.
         :param zero_sensor: zero the force sensor before the press.
         :param contact: the effect of the tool's first contact, which can end the goal.
         :raises InvalidGoal: as for :meth:`dwell`, or a number is out of its range.
         """
-        where, point = self._stop('press')
+        where, point = self._as_stop('press')
+        for what, given in (('forces', forces), ('speed_limits', speed_limits or {})):
+            if not isinstance(given, Mapping):
+                raise InvalidGoal(
+                    where, f'has the {what} {given!r:.60}', "name the axes, like {'z': 20.0}"
+                )
         limits = speed_limits or {}
         axes = tuple(forces)
         if limits and set(limits) != set(axes):
@@ -282,18 +299,23 @@ class PathWithEvents(PathOfMotions):
             last_waypoint=1,
             frame=frame,
             axes=axes,
-            forces=tuple(float(forces[axis]) for axis in axes),
-            speed_limits=tuple(float(limits[axis]) for axis in axes if limits),
-            max_yield=float(max_yield),
-            max_yield_angle=float(max_yield_angle),
-            max_deviation=float(max_deviation),
-            max_deviation_angle=float(max_deviation_angle),
-            damping=float(damping),
-            gain_scaling=float(gain_scaling),
+            forces=tuple(any_number(where, f'force {each}', forces[each]) for each in axes),
+            speed_limits=tuple(
+                any_number(where, f'speed limit {each}', limits[each]) for each in axes if limits
+            ),
             zero_sensor=zero_sensor,
             contact=contact,
+            **numbers(
+                where,
+                max_yield=max_yield,
+                max_yield_angle=max_yield_angle,
+                max_deviation=max_deviation,
+                max_deviation_angle=max_deviation_angle,
+                damping=damping,
+                gain_scaling=gain_scaling,
+            ),
         )
-        return self._happening(where, point, press)
+        return self._with_event(where, point, press)
 
     def end_press(self) -> Self:
         """
@@ -303,10 +325,12 @@ class PathWithEvents(PathOfMotions):
 
         :raises InvalidGoal: as for :meth:`dwell`, or no press has begun at an earlier point.
         """
-        where, point = self._stop('end_press')
+        where, point = self._as_stop('end_press')
         begun = self._begun(lambda one: isinstance(one, Press))
         if begun is None:
-            raise InvalidGoal(where, 'has no begin at a point before', 'call press() there')
+            raise InvalidGoal(
+                where, 'ends press(), which has not begun', 'call it at an earlier point'
+            )
         return self._with_point(-1, point)._ended(*begun)
 
     def dwell(self, time: float) -> Self:
@@ -317,7 +341,7 @@ class PathWithEvents(PathOfMotions):
 
         :raises InvalidGoal: there is no point, or the point has a blend or a twist of its own.
         """
-        where, point = self._stop('dwell')
+        where, point = self._as_stop('dwell')
         length = (
             to_nanoseconds(where, amount(where, 'time', time, MAX_STOP_TIME, 's')) / NANOSECONDS
         )
@@ -332,10 +356,14 @@ class PathWithEvents(PathOfMotions):
         :param timeout: longest time until the function returns [s].
         :raises InvalidGoal: as for :meth:`dwell`, or a number is out of its range.
         """
-        where, point = self._stop('call')
-        numbers = tuple(float(argument) for argument in arguments)
-        call = ScriptCall(waypoint=0, function=function, arguments=numbers, timeout=float(timeout))
-        return self._happening(where, point, call)
+        where, point = self._as_stop('call')
+        call = ScriptCall(
+            waypoint=0,
+            function=function,
+            arguments=many_numbers(where, 'argument', arguments),
+            timeout=any_number(where, 'timeout', timeout),
+        )
+        return self._with_event(where, point, call)
 
     def wait_for(
         self,
@@ -353,19 +381,22 @@ class PathWithEvents(PathOfMotions):
 
         :param value: True or False for a digital input, the level of an analog one [A] or [V].
         :param timeout: longest wait [s].
-        :param below: wait until an analog input is below the level, not at it or above.
+        :param below: wait until an analog input is below the level, instead of at it or above.
         :param go_on: whether the motion goes on after the timeout; if not, the goal fails.
         :raises InvalidGoal: as for :meth:`dwell`, there is no such input or level, or the point
             already has a wait or a call.
         """
-        where, point = self._stop('wait_for')
-        wait = what.wait(float(value), timeout, below, go_on)
-        path = self._happening(where, point, wait)
+        where, point = self._as_stop('wait_for')
+        given = numbers(where, value=value, timeout=timeout)
+        wait = what.wait(**given, below=below, go_on=go_on)
+        path = self._with_event(where, point, wait)
         if any(isinstance(other, InputWait) for other in point.events):
             raise InvalidGoal(where, 'waits for a second input', 'add a point for it')
         if any(isinstance(other, ScriptCall) for other in point.events):
             raise InvalidGoal(
-                where, 'follows a call(), which comes after it', 'let the function wait'
+                where,
+                'is written after call(), but at one point the robot waits before it calls',
+                'let the function wait',
             )
         return path
 
@@ -387,16 +418,16 @@ class PathWithEvents(PathOfMotions):
         :param transition: how long the controller takes to go over to this payload [s].
         :raises InvalidGoal: as for :meth:`dwell`, or a number is out of its range.
         """
-        where, point = self._stop('payload')
+        where, point = self._as_stop('payload')
         cog = vector(where, center_of_gravity, MAX_OFFSET)
         change = PayloadChange(
             waypoint=0,
-            mass=float(mass),
+            mass=any_number(where, 'mass', mass),
             center_of_gravity=cog,
-            inertia=tuple(float(each) for each in inertia),
-            transition_time=float(transition),
+            inertia=many_numbers(where, 'inertia', inertia),
+            transition_time=any_number(where, 'transition', transition),
         )
-        return self._happening(where, point, change)
+        return self._with_event(where, point, change)
 
     # ---- inside --------------------------------------------------------------------------------
 
@@ -406,21 +437,22 @@ class PathWithEvents(PathOfMotions):
         points[index] = point
         return self._with(_points=tuple(points))
 
-    def _happening(self, where: str, point: PathPoint, event: Any) -> Self:
+    def _with_event(self, where: str, point: PathPoint, event: Any) -> Self:
         """
         Return the path with an event at the last point.
 
         :param point: the last point, changed as the event requires.
-        :param event: the event, numbered as if the last point were point 0. If it needs an end,
-            the end is point 1 for the check, and is removed afterwards.
+        :param event: the event, numbered as if the last point were point 0. One that needs an end
+            has it at point 1 for the check, and none afterwards.
         """
+        event = with_fields(where, event, {})
         check_event(where, event)
         if type(event) in _METHODS:
             event = replace(event, last_waypoint=0)
         return self._with_point(-1, replace(point, events=(*point.events, event)))
 
     def _begun(self, is_wanted: Callable[[Any], bool]) -> tuple[int, Any] | None:
-        """Return the point where the latest wanted event without an end begins, and the event."""
+        """Return the latest wanted event that has no end, after the point where it begins."""
         for i in range(len(self) - 2, -1, -1):
             for event in self._points[i].events:
                 if type(event) in _METHODS and not event.last_waypoint and is_wanted(event):
@@ -451,8 +483,8 @@ class PathWithEvents(PathOfMotions):
                         f'call {end} at a later point',
                     )
 
-    def _stop(self, name: str) -> tuple[str, PathPoint]:
-        """Return where a method is called, as a phrase, and the last point changed to a stop."""
+    def _as_stop(self, name: str) -> tuple[str, PathPoint]:
+        """Return method and point for the text of errors, and the last point changed to a stop."""
         if not self._points:
             raise InvalidGoal(f'{name}()', 'comes before the first point', 'add a motion first')
         where, point = f'{name}() at point {len(self) - 1}', self._points[-1]

@@ -20,6 +20,13 @@ from ur_cartesian_driver.path.path_numbers import NANOSECONDS, to_nanoseconds
 from ur_cartesian_driver.path.path_points import PathPoint, SAME_POSITION
 from ur_cartesian_driver.planning.request.point_events.registry import EVENT_KINDS
 
+#: The fields of a goal that hold for its whole path. The others follow from frames and points.
+SETTINGS = tuple(
+    each.name
+    for each in goal_fields(Goal)
+    if each.name not in ('waypoints', 'segments', 'frame_id', 'controlled_frame')
+    and each.name not in {kind.field for kind in EVENT_KINDS.values()}
+)
 #: The usual blend radius at both ends of a PROCESS motion for which none is given [m].
 PROCESS_BLEND = 0.002
 #: The least duration of such a blend [s]: the robot leaves out a blend that is shorter than one
@@ -78,12 +85,7 @@ def goal_of_points(
 
 def settings_of(goal: Goal) -> Goal:
     """Return the settings of a goal that hold for its whole path, as a goal without points."""
-    events = {kind.field for kind in EVENT_KINDS.values()}
-    others = {'waypoints', 'segments', 'frame_id', 'controlled_frame', *events}
-    given = {each.name: getattr(goal, each.name) for each in goal_fields(Goal)}
-    return Goal(
-        waypoints=(), **{name: value for name, value in given.items() if name not in others}
-    )
+    return Goal(waypoints=(), **{name: getattr(goal, name) for name in SETTINGS})
 
 
 def points_of_goal(goal: Goal) -> tuple[PathPoint, ...]:

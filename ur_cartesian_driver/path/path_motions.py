@@ -57,6 +57,8 @@ MAX_DURATION = 3600.0
 _TOOL, _JOINTS, _FRACTION = 'm/s', 'rad/s', 'of the limits of the robot'
 _MAX_SPEED = {_TOOL: (5.0, 100.0), _JOINTS: (20.0, 200.0), _FRACTION: (1.0, 1.0)}
 
+#: The name of the start in refusals.
+_START = 'start'
 _BASE_FRAMES = ('', 'base', 'base_link')
 _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 _OPTIMIZED_TYPES = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
@@ -108,7 +110,7 @@ class PathOfMotions:
             object.__setattr__(self, name, value)
         self._set(_start=None, _points=(), _feed=Feed(), _settings=Goal(waypoints=()))
         if start is not None:
-            pose = self._pose('start', start, orientation)
+            pose = self._pose(_START, start, orientation)
             self._set(_start=PathPoint(waypoint=Waypoint(pose=pose), auto_blend=True))
 
     def _set(self, **values: Any) -> None:
@@ -121,9 +123,13 @@ class PathOfMotions:
         path._set(**{each.name: getattr(self, each.name) for each in fields(self)} | changes)
         return path
 
-    def _with_settings(self, **fields: Any) -> Self:
-        """Return the path with other values in some fields of its goal."""
-        return self._with(_settings=replace(self._settings, **fields))
+    def _with_settings(self, where: str, **fields: Any) -> Self:
+        """
+        Return the path with other values in some fields of its goal.
+
+        :raises InvalidGoal: a field cannot have the value.
+        """
+        return self._with(_settings=with_fields(where, self._settings, fields))
 
     def __repr__(self) -> str:
         return f'<Path of {len(self)} points in frame {self.frame or "base"!r}>'
@@ -478,6 +484,8 @@ class PathOfMotions:
         before = place if isinstance(place, Pose) else self.end
         position = place.position if isinstance(place, Pose) else place
         if orientation is None:
+            if before is None and where == _START:
+                raise InvalidGoal(where, 'has no orientation', 'write Path(position, orientation)')
             if before is None:
                 raise InvalidGoal(
                     where, 'has no orientation, and there is none before', 'give one, or a start'
@@ -541,33 +549,44 @@ class PathOfMotions:
     ) -> tuple[float, float]:
         """Return speed and acceleration of a motion, in the units of its type."""
         feed = self._feed
-        unit, usual = _TOOL, (feed.speed, feed.acceleration)
+        unit, word, usual = _TOOL, 'speed', (feed.speed, feed.acceleration)
         if kind in _OPTIMIZED_TYPES:
             unit, usual = _FRACTION, (0.0, 0.0)
         elif kind is SegmentType.JOINT:
-            unit, usual = _JOINTS, (feed.joint_speed, feed.joint_acceleration)
+            unit, word = _JOINTS, 'joint_speed'
+            usual = (feed.joint_speed, feed.joint_acceleration)
         elif not moved:
-            unit, usual = _JOINTS, (feed.turn_speed, feed.turn_acceleration)
+            unit, word, usual = _JOINTS, 'turn_speed', (feed.turn_speed, feed.turn_acceleration)
         bounds = _MAX_SPEED[unit]
         speed = amount(where, 'speed', options.speed, bounds[0], unit)
         acceleration = amount(where, 'acceleration', options.acceleration, bounds[1], unit)
+        is_own = speed is not None
         speed = usual[0] if speed is None else speed
-        if timed and (speed or kind in _OPTIMIZED_TYPES):
+        if timed and kind in _OPTIMIZED_TYPES:
             raise InvalidGoal(
-                where, 'has a duration and a speed', 'give one of them; at(speed=0) unsets it'
+                where,
+                'has a duration, which an optimized motion cannot keep',
+                'leave out the duration or optimized',
             )
+        if timed and speed:
+            remedy = 'give one of them' if is_own else f'at({word}=0) before it unsets the speed'
+            raise InvalidGoal(where, 'has a duration and a speed', remedy)
         return speed, usual[1] if acceleration is None else acceleration
 
     def _nanoseconds(self, where: str, duration: float | None) -> int:
         if duration is None:
             if self._points and self._points[-1].duration:
                 raise InvalidGoal(
-                    where, 'has no duration, but the points before have', 'give each one'
+                    where,
+                    'has no duration, but the motions before have',
+                    'give one to each motion, or to none',
                 )
             return 0
         if self._points and not self._points[-1].duration:
             raise InvalidGoal(
-                where, 'has a duration, but the points before have none', 'give each one, or none'
+                where,
+                'has a duration, but the motions before have none',
+                'give one to each motion, or to none',
             )
         time = to_nanoseconds(where, amount(where, 'duration', duration, MAX_DURATION, 's'))
         if not time:

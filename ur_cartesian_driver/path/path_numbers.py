@@ -37,15 +37,30 @@ def amount(where: str, name: str, value: float | None, bound: float, unit: str) 
 def any_number(where: str, name: str, value: Any) -> float:
     try:
         return float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidGoal(where, f'has the {name} {value!r:.60}', 'give a number') from None
+
+
+def numbers(where: str, **values: Any) -> dict[str, float]:
+    """Return values as numbers, by their names."""
+    return {name: any_number(where, name, value) for name, value in values.items()}
+
+
+def many_numbers(where: str, name: str, values: Any) -> tuple[float, ...]:
+    """Return a sequence of numbers of any length."""
+    try:
+        return tuple(any_number(where, name, value) for value in values)
+    except TypeError:
+        raise InvalidGoal(
+            where, f'has the {name} {values!r:.60}', 'give a sequence of numbers'
+        ) from None
 
 
 def vector(where: str, values: Sequence[float], bound: float, prefix: str = '') -> Vector3:
     """Return three numbers, none of which is larger than a bound."""
     try:
         x, y, z = (float(value) for value in values)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidGoal(
             where, f'has the position {values!r:.60}', 'give x, y and z [m]'
         ) from None
@@ -66,7 +81,7 @@ def unit_quaternion(where: str, q: Sequence[float]) -> Quaternion:
     try:
         x, y, z, w = (float(value) for value in q)
         square = x * x + y * y + z * z + w * w
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         square = nan
     if not abs(square - 1.0) <= _UNIT:
         raise InvalidGoal(
@@ -81,12 +96,12 @@ def unit_quaternion(where: str, q: Sequence[float]) -> Quaternion:
 def six_numbers(where: str, values: Sequence[float]) -> Vector6:
     """Return three linear and three angular numbers; missing angular ones become NaN (free)."""
     try:
-        numbers = [float(value) for value in values]
-    except (TypeError, ValueError):
-        numbers = []
-    if len(numbers) not in (3, 6) or any(abs(n) > _MAX_RATE for n in numbers if not isnan(n)):
+        given = [float(value) for value in values]
+    except (TypeError, ValueError, OverflowError):
+        given = []
+    if len(given) not in (3, 6) or any(abs(n) > _MAX_RATE for n in given if not isnan(n)):
         raise InvalidGoal(where, f'is {values!r:.80}', 'give 3 or 6 numbers in m and rad')
-    a, b, c, *rest = numbers
+    a, b, c, *rest = given
     d, e, f = rest or (nan, nan, nan)
     return (a, b, c, d, e, f)
 

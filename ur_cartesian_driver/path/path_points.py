@@ -6,11 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from math import isnan
 from typing import Any, TypeVar
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import Pose, Quaternion, rotate
-from ur_cartesian_driver.motion.geometry.vectors import add, Vector6, vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.vectors import add, Vector3, Vector6, vector6, ZERO6
 from ur_cartesian_driver.motion.goal.declared_types import with_declared_types, WrongType
 from ur_cartesian_driver.motion.goal.field_annotations import goal_fields
 from ur_cartesian_driver.motion.goal.goal import ArcMode, Goal, Segment, Waypoint
@@ -21,6 +22,10 @@ T = TypeVar('T')
 
 #: Poses that differ by less than this [m], [rad] are the same.
 SAME_POSITION, SAME_ANGLE = 1e-6, 1e-6
+#: Axes of two frames with a direction cosine of less than this are at right angles.
+_ALIGNED = 1e-12
+#: The fields of a point that are rates.
+RATES = ('twist', 'acceleration', 'jerk')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,51 +104,102 @@ def point_fields(segment: Segment) -> dict[str, Any]:
     }
 
 
-def moved(point: PathPoint, T: Pose) -> PathPoint:
-    """Return a point with its poses and rates transformed by a pose in its frame."""
+def moved(point: PathPoint, T: Pose, where: str) -> PathPoint:
+    """
+    Return a point with its poses and rates transformed by a pose in its frame.
+
+    :raises InvalidGoal: a rate has free and given components, which the transform would mix.
+    """
     waypoint, via = point.waypoint, point.segment.via
+    rates: dict[str, Any] = {
+        name: _turned(getattr(waypoint, name), T.quaternion, where, name) for name in RATES
+    }
     return replace(
         point,
-        waypoint=replace(
-            waypoint,
-            pose=T @ waypoint.pose,
-            twist=_turned(waypoint.twist, T.quaternion),
-            acceleration=_turned(waypoint.acceleration, T.quaternion),
-            jerk=_turned(waypoint.jerk, T.quaternion),
-        ),
+        waypoint=replace(waypoint, pose=T @ waypoint.pose, **rates),
         segment=point.segment if via is None else replace(point.segment, via=T @ via),
     )
 
 
-def _turned(rates: Vector6, q: Quaternion) -> Vector6:
+def _turned(rates: Vector6, q: Quaternion, where: str, name: str) -> Vector6:
     if rates == ZERO6:
         return rates
     x, y, z, a, b, c = rates
-    return (*rotate(q, (x, y, z)), *rotate(q, (a, b, c)))
+    return (*_rotated(q, (x, y, z), where, name), *_rotated(q, (a, b, c), where, name))
 
 
-def seen_from(point: PathPoint, T_tool_new: Pose, before: Pose | None, where: str) -> PathPoint:
-    """Return a point as passed by another frame on the tool, whose pose is ``T_tool_new``."""
+def _rotated(q: Quaternion, v: Vector3, where: str, name: str) -> Vector3:
+    """Return a rotated vector; NaN is a free component."""
+    if not any(map(isnan, v)):
+        return rotate(q, v)
+    axes = [rotate(q, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+    rotated = []
+    for i in range(3):
+        parts = [(axis[i], x) for axis, x in zip(axes, v, strict=True) if abs(axis[i]) > _ALIGNED]
+        free = [isnan(x) for _, x in parts]
+        if any(free) and not all(free):
+            raise InvalidGoal(
+                where,
+                f'turns a {name} of which only some components are given',
+                'give all of its linear and all of its angular components, or none',
+            )
+        rotated.append(sum(factor * x for factor, x in parts))
+    x, y, z = rotated
+    return (x, y, z)
+
+
+def seen_from(
+    point: PathPoint, T_tool_new: Pose, before: Pose | None, after: Pose | None, where: str
+) -> PathPoint:
+    """
+    Return a point as passed by another frame on the tool, whose pose is ``T_tool_new``.
+
+    :raises InvalidGoal: the tool turns on an arc; or it turns at a point of a spline in a way that
+        the driver chooses, so that the other frame's speed is not known.
+    """
     waypoint, segment = point.waypoint, point.segment
     offset = rotate(waypoint.pose.quaternion, T_tool_new.position)
+    turns = before is None or before.angle_to(waypoint.pose) > SAME_ANGLE
     if segment.via is not None:
-        turns = before is None or before.angle_to(waypoint.pose) > SAME_ANGLE
         if turns or segment.arc_mode is ArcMode.FIXED:
             raise InvalidGoal(
                 where, 'turns the tool on an arc, which is none beside it', 'use a spline'
             )
         via = Pose(add(segment.via.position, offset), segment.via.quaternion)
         segment = replace(segment, via=via)
+    turns = turns or (after is not None and after.angle_to(waypoint.pose) > SAME_ANGLE)
+    twist, acceleration = waypoint.twist, waypoint.acceleration
+    turn, turn_change = (_turn_of(rates, turns) for rates in (twist, acceleration))
+    new_twist = twist_at((*twist[:3], *turn), offset)
+    new_acceleration = acceleration_at(
+        (*acceleration[:3], *turn_change), (*twist[:3], *turn), offset
+    )
+    for name, old, new in (
+        ('twist', twist, new_twist),
+        ('acceleration', acceleration, new_acceleration),
+    ):
+        if any(isnan(b) and not isnan(a) for a, b in zip(old[:3], new[:3], strict=True)):
+            raise InvalidGoal(
+                where,
+                f'has a linear {name}, but the driver chooses how the tool turns there',
+                'give the angular components, too',
+            )
     return replace(
         point,
         waypoint=replace(
             waypoint,
             pose=waypoint.pose @ T_tool_new,
-            twist=twist_at(waypoint.twist, offset),
-            acceleration=acceleration_at(waypoint.acceleration, waypoint.twist, offset),
+            twist=(*new_twist[:3], *twist[3:]),
+            acceleration=(*new_acceleration[:3], *acceleration[3:]),
         ),
         segment=segment,
     )
+
+
+def _turn_of(rates: Vector6, turns: bool) -> Vector3:
+    """Return the angular rates; free ones are 0 where the tool does not turn."""
+    a, b, c = (x if turns or not isnan(x) else 0.0 for x in rates[3:])
+    return (a, b, c)
 
 
 def backwards(point: Waypoint) -> Waypoint:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import floor, inf, isfinite, sqrt
+from math import floor, inf, sqrt
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,8 @@ from ur_cartesian_driver.planning.spline.spline_points import tool_points
 #: How far before the stop the path is resumed, and how far from the path the approach begins,
 #: backwards along the tool's z axis [m].
 OVERLAP, APPROACH = 0.005, 0.03
+#: The largest value of either [m]; more must be millimetres by mistake.
+MAX_RESUME_LENGTH = 1.0
 #: In a goal with times: time until the approach begins [s], and speed of the approach [m/s].
 APPROACH_TIME, APPROACH_SPEED = 4.0, 0.03
 #: Factor on blend radii: on arcs, blends begin somewhat farther from their points.
@@ -522,5 +524,9 @@ def _check(goal: Goal, place: PathPlace, overlap: float, approach: float) -> Non
             'take those of the result of this goal',
         )
     for name, value in (('overlap', overlap), ('approach', approach)):
-        if not (isfinite(value) and 0.0 <= value <= 1.0):
-            raise InvalidGoal(name, f'is {value:g} m, but must be from 0 to 1 m', 'correct it')
+        if not 0.0 <= value <= MAX_RESUME_LENGTH:  # or NaN
+            raise InvalidGoal(
+                name,
+                f'is {value:g} m, but must be from 0 to {MAX_RESUME_LENGTH:g} m',
+                'mm() converts',
+            )

@@ -14,8 +14,8 @@ from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
 from ur_cartesian_driver.path.centre_line import arc, CentreLine, line, RestToRest, Stroke
 from ur_cartesian_driver.path.path_points import PathPoint, SAME_POSITION
 
-#: Number of points on each wave; time step of the differences that give their twists [s].
 _POINTS_PER_WAVE = 8
+#: Time step of the finite differences for the twists of points [s].
 _STEP = 1e-5
 
 
@@ -35,11 +35,15 @@ def strokes(start: Pose, points: Sequence[PathPoint]) -> list[Stroke]:
             raise InvalidGoal(
                 where,
                 'has outputs or inputs, a duration, a posture or a dwell',
-                'give them to the result',
+                'add them to the path that weave() returns',
             )
         stroke = _stroke(before, point)
         if stroke is None or stroke.length <= SAME_POSITION:
-            raise InvalidGoal(where, 'has a motion that is no line or arc', 'use line() or arc()')
+            raise InvalidGoal(
+                where,
+                'has a motion that is no line or arc',
+                'use line() or arc(), without `optimized` and `follow`',
+            )
         if found and not found[-1].is_smooth_into(stroke):
             raise InvalidGoal(
                 f'weave() at point {i - 1}', 'has a corner', 'weave each leg and join them'

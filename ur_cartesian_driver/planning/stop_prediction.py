@@ -47,7 +47,7 @@ def at_set_point(state: RobotState, arm: Arm) -> RobotState:
     ``MAX_STATIC_ERROR`` is returned unchanged: friction cannot be the cause.
     """
     q = state.target_q
-    if max(map(abs, subtract6(q, state.actual_q))) > MAX_STATIC_ERROR:
+    if q == state.actual_q or max(map(abs, subtract6(q, state.actual_q))) > MAX_STATIC_ERROR:
         return state
     return replace(state, actual_q=q, actual_tcp_pose=_tcp_at(state, arm, q))
 
@@ -77,6 +77,6 @@ def predict_stop(state: RobotState, arm: Arm, deceleration: float) -> RobotState
 
 
 def _tcp_at(state: RobotState, arm: Arm, q: Joints) -> Pose:
-    """Return the reported TCP, moved as the flange of the model moves to ``q``."""
+    """Return the reported TCP pose, displaced as the model's flange when it moves to ``q``."""
     # Forward kinematics alone is not enough: the arm may differ from its model.
     return arm.forward(q) @ (arm.forward(state.actual_q).inverse() @ state.actual_tcp_pose)

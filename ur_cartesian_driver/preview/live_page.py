@@ -101,7 +101,7 @@ def _text(state: RobotState, plan: Plan | None) -> str:
         ('TCP', f'{x:.1f} {y:.1f} {z:.1f} mm'),
         ('speed', f'{1e3 * hypot(*state.actual_tcp_twist[:3]):.1f} mm/s'),
         ('speed slider', f'{100.0 * state.target_speed_fraction:.0f} %'),
-        ('from its target', f'{1e3 * lag:.2f} mm'),
+        ('off its set-point', f'{1e3 * lag:.2f} mm'),
     ]
     if plan is not None:
         place = np.array(state.actual_tcp_pose.position)

@@ -138,22 +138,36 @@ def scene_of_plan(server: Server, arm: Arm, tcp: Pose, plan: Plan | None) -> Sce
     return scene
 
 
-def refusal_page(goal: Goal, refusal: GoalRefused, arm: Arm, q: Joints, tcp: Pose) -> str:
+def refusal_page(
+    goal: Goal,
+    refusal: GoalRefused,
+    arm: Arm,
+    q: Joints,
+    tcp: Pose,
+    planes: Sequence[Plane] = (),
+) -> str:
     """
     Return the page of a goal that was refused: its points, and the place of the refusal in red.
 
     :param q: the joint positions of the arm [rad].
     :raises ImportError: viser is not installed; the text says how to get it.
     """
-    points = [goal.T_base_frame @ waypoint.pose for waypoint in goal.waypoints]
-    path = np.array([pose.position for pose in (arm.forward(q) @ tcp, *points)])
-    with serve(()) as server:
+    # The orientation may be what is wrong; points given by joints have no place.
+    path = np.array(
+        [
+            (arm.forward(q) @ tcp).position,
+            *(goal.T_base_frame.apply(waypoint.pose.position) for waypoint in goal.waypoints),
+        ]
+    )
+    has_place = np.isfinite(path).all(axis=1)
+    with serve(planes) as server:
         scene = Scene(server, arm, tcp)
-        grey: Colours = np.full((len(path) - 1, 3), 150, dtype=np.uint8)
-        scene.add_path(path, grey)
-        scene.add_points(enumerate(path[1:]))
+        drawn = path[has_place]
+        scene.add_path(drawn, np.full((len(drawn) - 1, 3), 150, dtype=np.uint8))
+        numbers = np.flatnonzero(has_place[1:]).tolist()
+        scene.add_points(zip(numbers, drawn[1:], strict=True))
         place = _place(str(refusal), path)
-        if place is not None:
+        if place is not None and np.isfinite(place).all():
             scene.add_ball('refused', place, 0.012, _REFUSED)
         recorded = scene.record(np.zeros(1), np.array([q]))
     text = f'<p class="refused">Refused: {escape(str(refusal))}</p>'

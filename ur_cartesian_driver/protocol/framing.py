@@ -191,17 +191,17 @@ class LineBuffer:
     """
     Cuts a stream into lines of text; a carriage return before the line feed is dropped.
 
-    Bytes that are not UTF-8 become backslash escapes, so that an odd character in a text for
-    people does not end a connection.
+    Bytes that are not in the encoding become backslash escapes, so that an odd character in a text
+    for people does not end a connection.
     """
 
-    def __init__(self, limit: int = 65536) -> None:
+    def __init__(self, limit: int = 65536, encoding: str = 'utf-8') -> None:
         """
         Start empty.
 
         :param limit: longest line that is accepted [bytes]; it bounds the memory.
         """
-        self._limit = limit
+        self._limit, self._encoding = limit, encoding
         self._rest = b''
 
     def feed(self, data: bytes) -> list[str]:
@@ -221,12 +221,12 @@ class LineBuffer:
                 raise RemoteProtocolError(
                     f'A line is longer than {self._limit} bytes: {hex_text(line)}.'
                 )
-        return [decode_text(line.removesuffix(b'\r')) for line in lines]
+        return [decode_text(line.removesuffix(b'\r'), self._encoding) for line in lines]
 
 
-def decode_text(data: bytes) -> str:
-    """Return a text from the wire; bytes that are not UTF-8 become backslash escapes."""
-    return data.decode('utf-8', 'backslashreplace')
+def decode_text(data: bytes, encoding: str = 'utf-8') -> str:
+    """Return a text from the wire; bytes that are not in the encoding become backslash escapes."""
+    return data.decode(encoding, 'backslashreplace')
 
 
 #: Longest text from a robot that is shown to people [characters].

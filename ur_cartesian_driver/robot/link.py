@@ -11,8 +11,8 @@ Commands go through :mod:`~.program.program_control`. The arm is powered and the
 automatically on the first connection only (:mod:`~.program.auto_start`).
 
 Events (:mod:`~ur_cartesian_driver.motion.events`) go to one callback, in the order in which they
-happened, on the event loop. A status that follows from an event is reported before that event, so
-that the end of a goal never arrives while a lost robot still seems ready.
+happened, on the event loop. The status that an event causes is reported before the event, so a
+goal never ends while a lost robot is still READY.
 """
 
 from __future__ import annotations
@@ -110,8 +110,9 @@ class RobotLink:
         self.version: ControllerVersion | None = None
         #: The robot's newest state; None = the robot is not connected.
         self.robot: RobotState | None = None
-        #: Time of the newest state [s]; the check whether this state is too old.
+        #: Time of the newest state [s].
         self._state_time = inf
+        #: Tells whether the newest state is too old.
         self._stale = StaleStates(settings.max_state_age)
         #: The robot's inputs, outputs and tool; None = not reported yet.
         self.signals: Signals | None = None
@@ -169,18 +170,20 @@ class RobotLink:
 
     def close(self) -> None:
         """Close all ports; the robot program stops the arm, at the latest as its sockets close."""
-        if self._explain_timer is not None:
-            self._explain_timer.cancel()
+        self._cancel_explanation()
         self.program.close()
 
     def explain(self, text: str) -> None:
         """Set the last error of the status: a sentence, and the events that led to it."""
-        if self._explain_timer is not None:
-            self._explain_timer.cancel()
-            self._explain_timer = None
+        self._cancel_explanation()
         self._status.update(
             last_error=timestamped(f'{text} {"; ".join(self.event_log.event_chain())}.')
         )
+
+    def _cancel_explanation(self) -> None:
+        if self._explain_timer is not None:
+            self._explain_timer.cancel()
+            self._explain_timer = None
 
     def report_error(self, text: str) -> None:
         """Set the last error of the status to a sentence, and log it."""
@@ -287,8 +290,8 @@ class RobotLink:
         before, self.robot = self.robot, robot
         self._callbacks.state(robot)
         changes = () if before is None else mode_changes(before, robot)
-        # Unless a mode changes, the packet cannot change the status, so the goal reacts to the
-        # packet first, perhaps by a CANCEL.
+        # The goal has the packet first, because it may have to cancel at once; a change of a mode
+        # changes the status first.
         status_may_change = before is None or bool(changes)
         if not status_may_change:
             self._callbacks.event(StateReceived(state=robot))
@@ -348,7 +351,7 @@ class RobotLink:
             )
 
     def _on_kinematics(self, geometry: DhTable) -> None:
-        if not self.status.calibration_known:
+        if not (self.status.calibration_known or self.status.state is ConnectionState.REFUSED):
             self._callbacks.geometry(geometry)
             self._status.update(calibration_known=True)
 
@@ -396,6 +399,7 @@ class RobotLink:
         :param status_text: the reason with the name of the interface, for the status.
         """
         self.event_log.note(status_text)
+        self._cancel_explanation()  # the loss of the robot explains that of the program
         last_error = (
             timestamped(status_text, self.status.last_error)
             if self.robot is None
@@ -464,7 +468,7 @@ def model_names(robot_type: int, software_major: int) -> list[str]:
     """
     Return the models that report this type; for example, a UR7e reports the type of a UR5.
 
-    A type of a newer robot has none.
+    The list is empty for a type that this driver does not know.
     """
     return [
         name

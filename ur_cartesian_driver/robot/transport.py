@@ -44,6 +44,10 @@ REMEDIES = {
 }
 
 
+def ignore(_: object) -> None:
+    """Do nothing; for callbacks that nobody needs."""
+
+
 class TcpConnection(asyncio.BufferedProtocol):
     """
     One TCP connection, dialled or accepted.

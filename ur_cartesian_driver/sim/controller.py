@@ -27,6 +27,7 @@ from ur_cartesian_driver.motion.state.rtde_state import (
     SafetyMode,
     SafetyStatus,
 )
+from ur_cartesian_driver.protocol.rtde.rtde_fields import fields_of, INPUT_TYPES
 from ur_cartesian_driver.sim.motion import MotionGenerator
 from ur_cartesian_driver.sim.motion.actual_motion import ActualMotion
 from ur_cartesian_driver.sim.motion.contact.contact_motion import ArmState, ContactMotion
@@ -40,10 +41,11 @@ from ur_cartesian_driver.sim.pendant_programs.external_control import (
 from ur_cartesian_driver.sim.pendant_programs.program_tree import (
     FetchedScript,
     ProgramTree,
+    SavedProgram,
     UnreadableProgram,
 )
 from ur_cartesian_driver.sim.programs.interpreter_mode import InterpreterMode
-from ur_cartesian_driver.sim.programs.program_runner import ProgramRunner
+from ur_cartesian_driver.sim.programs.program_runner import HELD, ProgramRunner
 from ur_cartesian_driver.sim.programs.rtde_watchdog import Watchdogs
 from ur_cartesian_driver.sim.programs.stored_programs import StoredPrograms, URPX_SUFFIX
 from ur_cartesian_driver.sim.programs.timed_function_guard import Builtins
@@ -71,8 +73,6 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 #: The controller's clock at the start [s]: RTDE clients believe that a controller that has been
 #: up for less than 40 s is still booting.
 START_TIME = 60.0
-#: States of a program in which the arm slows down to a standstill, or stands still.
-_HELD_STATES = (RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING)
 #: Number of past cycles whose joint positions programs can ask for.
 MAX_HISTORY = 100
 _MAX_POPUPS = 100
@@ -307,7 +307,7 @@ class Controller:
 
         :param was_at_rest: whether the arm stood still before this cycle; then no ramp is needed.
         """
-        held = self.programs.state in _HELD_STATES or self._stopping_on_path
+        held = self.programs.state in HELD or self._stopping_on_path
         target = 0.0 if held else self.speed_slider
         if was_at_rest or self.scale == target:
             self.scale = target
@@ -415,7 +415,7 @@ class Controller:
 
         Directories in the name are ignored.
         """
-        program = self.stored_programs.program(file := PurePosixPath(name).name)
+        program = self._stored_program(file := PurePosixPath(name).name)
         if program is None:
             return f'File not found: {name}'
         if isinstance(program, UnreadableProgram):
@@ -423,13 +423,32 @@ class Controller:
         if file.endswith(URPX_SUFFIX) and self.config.version[0] < POLYSCOPE_X:
             software = '.'.join(map(str, self.config.version[:2]))
             return f'{file} is a program of PolyScope X, and the robot has PolyScope {software}'
-        if isinstance(program, ProgramTree) and not program.has_external_control:
-            program = program.script(file, FetchedScript())
         if isinstance(program, ProgramTree):
             return self.programs.load_generated(
                 file, partial(self.external_control.generate, program, file)
             )
         return self.programs.load(file, program)
+
+    def load_program_aside(self, name: str, then: Callable[[str], None]) -> None:
+        """
+        Load a program as :meth:`load_program` does, after compiling it beside the cycles.
+
+        :param then: called with the result, at once or later.
+        """
+        program = self._stored_program(PurePosixPath(name).name)
+        if isinstance(program, str):
+            self.programs.compile_first(
+                program, lambda mistake: then(mistake or self.load_program(name))
+            )
+        else:
+            then(self.load_program(name))
+
+    def _stored_program(self, file: str) -> SavedProgram | None:
+        """Return a stored program, as text unless it is generated when it is played."""
+        program = self.stored_programs.program(file)
+        if isinstance(program, ProgramTree) and not program.has_external_control:
+            return program.script(file, FetchedScript())
+        return program
 
     def power_on(self) -> str:
         """Power up to IDLE; return the reason of a refusal, else an empty string."""
@@ -483,8 +502,16 @@ class Controller:
 
         :param frequency: lowest rate of writing [Hz]; 0 ends the check.
         :param action: 'pause' or 'stop' the program if the input is late; 'ignore' = do nothing.
-        :raises RuntimeException: the action has another value.
+        :raises RuntimeException: the robot has no such input, reads inputs at a lower rate, or the
+            action has another value. (Assumed: the manual names the values, but no error.)
         """
+        if variable not in fields_of(INPUT_TYPES, self.config.version):
+            raise RuntimeException(f'variable_name is {variable!r}, which is no RTDE input')
+        if frequency * self.cycle > 1.0:
+            rate = 1.0 / self.cycle
+            raise RuntimeException(
+                f'min_frequency is {frequency:g}; inputs are read {rate:g} times a second'
+            )
         if action not in ('pause', 'stop', 'ignore'):
             raise RuntimeException(f"action is {action!r}; it must be 'pause', 'stop' or 'ignore'")
         self.watchdogs.watch(variable, frequency, action, self.time)

@@ -40,6 +40,7 @@ from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
 from ur_cartesian_driver.sim.interfaces.tcp_server import TcpServer
 from ur_cartesian_driver.sim.pendant_programs.script_requests import ScriptRequests
 from ur_cartesian_driver.sim.programs.compile_thread import CompileThread
+from ur_cartesian_driver.sim.programs.program_runner import compile_at_once
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets
 from ur_cartesian_driver.sim.sockets.tcp_script_sockets import TcpScriptSockets
@@ -179,6 +180,7 @@ class SimulatedRobot:
         :raises OSError: a port is taken.
         """
         listening: Future[None] = Future()
+        self._failure = None
         self._thread = threading.Thread(
             target=self._run_thread, args=(listening,), name='ur-sim', daemon=True
         )
@@ -246,6 +248,8 @@ class SimulatedRobot:
             await self._script_requests.close()
             if self._compiler is not None:
                 self._compiler.close()
+                self.controller.programs.compile_aside = compile_at_once
+            self._ports = None
             self.controller.sockets.close_all()
             for server in (*self._servers, *self._read_only.values()):
                 await server.close()
@@ -283,12 +287,12 @@ class SimulatedRobot:
     async def _cycles(self) -> None:
         stream, realtime = PrimaryStream(self.controller), RealtimeStream(self.controller)
         took_scripts = self.controller.takes_scripts
-        primary, secondary, packets = self._read_only.items()
-        states = (*primary, *secondary)
+        primary, secondary, packet_servers = self._read_only.items()
+        state_servers = (*primary, *secondary)
         while True:
             await self._clock.next_cycle()
             if self._compiler is not None and isinstance(self._clock, VirtualClock):
-                # A program must start in the same cycle, however long this computer compiles it.
+                # Runs repeat: a program starts in a cycle that no speed of this computer changes.
                 await self._compiler.wait_until_idle()
             self.controller.skipped_time = self._clock.skipped
             self.controller.step()
@@ -299,20 +303,22 @@ class SimulatedRobot:
             for session, connection in self._rtde.session_connections:
                 for package in session.packages():
                     connection.write(package)
-            for client, line in self._interpreter.session_connections:
-                line.write(client.answers())
+            for client, client_connection in self._interpreter.session_connections:
+                client_connection.write(client.answers())
+            for _, dashboard_client in self._dashboard.session_connections:
+                dashboard_client.poll()
             for _, api_client in self._robot_api.session_connections:
                 api_client.poll()
             for message in stream.messages():
                 for server in primary:
                     server.broadcast(message)
-            if stream.is_due() and any(server.connections for server in states):
+            if stream.is_due() and any(server.connections for server in state_servers):
                 state = stream.state()
-                for server in states:
+                for server in state_servers:
                     server.broadcast_state(state)
-            if any(server.connections for server in packets):
+            if any(server.connections for server in packet_servers):
                 packet = realtime.packet()
-                for server in packets:
+                for server in packet_servers:
                     server.broadcast_state(packet)
 
     def _on_socket_data(self, port: int, data: bytes) -> None:
@@ -366,12 +372,7 @@ class SimulatedRobot:
         :raises ValueError: a text is not understood, or the robot has no such interface.
         """
         parsed = [parse_fault(f) if isinstance(f, str) else f for f in faults]
-
-        def add(_: Controller) -> None:
-            for fault in parsed:
-                self._faults.add(fault)
-
-        self.call(add)
+        self.call(lambda _: self._faults.add(*parsed))
 
     def clear_faults(self) -> None:
         """Forget faults that have not happened and end those that last."""
@@ -443,7 +444,7 @@ class SimulatedRobot:
 
     def answer(self, *answers: object) -> None:
         """
-        Type into the pendant's next windows that request a value, open or still to come.
+        Answer the windows of the pendant that request a value: open ones first, then later ones.
 
         :param answers: what the person types: `yes` or `no` for a boolean, a number, or a text.
         """

@@ -114,7 +114,8 @@ def type_name(value: Value) -> str:
 NUMBERS = frozenset({int, float})
 
 
-_FLOATS = frozenset({float})
+#: The type of the items of most lists.
+FLOATS = frozenset({float})
 
 
 def is_number(value: Value) -> TypeGuard[int | float]:
@@ -241,10 +242,9 @@ def _remainder(a: Any, b: Any) -> int | float:
     return math.fmod(a, b) if math.isfinite(a) else math.nan
 
 
-def _arithmetic(
-    symbol: str, compute: Callable[[Any, Any], int | float]
-) -> Callable[[Value, Value], Value]:
+def _arithmetic(symbol: str) -> Callable[[Value, Value], Value]:
     """Extend an operation on two numbers to lists and matrices."""
+    compute = COMPUTE[symbol]
 
     def operate(a: Value, b: Value) -> Value:
         kind_a, kind_b = type(a), type(b)
@@ -268,8 +268,6 @@ def _arithmetic(
         raise _unsupported(symbol, a, b)
 
     def on_lists(a: list[Value], b: list[Value]) -> list[Value]:
-        if _FLOATS.issuperset(map(type, a)) and _FLOATS.issuperset(map(type, b)):
-            return list(map(compute, a, b))  # most lists; none of the results needs a check
         return list(map(on_items, a, b))
 
     def on_items(a: Value, b: Value) -> int | float:
@@ -336,12 +334,16 @@ def identity(value: Value) -> Value:
     raise RuntimeException(f"Type error: '+' is not defined for {type_name(value)}")
 
 
+#: The arithmetic operations on two numbers; with two floats, no result needs a check.
+COMPUTE: dict[str, Callable[[Any, Any], int | float]] = {
+    '+': operator.add,
+    '-': operator.sub,
+    '*': operator.mul,
+    '/': _divide,
+    '%': _remainder,
+}
 BINARY: dict[str, Callable[[Value, Value], Value]] = {
-    '+': _arithmetic('+', operator.add),
-    '-': _arithmetic('-', operator.sub),
-    '*': _arithmetic('*', operator.mul),
-    '/': _arithmetic('/', _divide),
-    '%': _arithmetic('%', _remainder),
+    **{symbol: _arithmetic(symbol) for symbol in COMPUTE},
     '==': operator.eq,
     '!=': operator.ne,
     '<': _ordering('<', operator.lt),

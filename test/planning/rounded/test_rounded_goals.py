@@ -209,6 +209,18 @@ def test_points_that_repeat_are_passed_once(cell):
     assert again.duration == pytest.approx(once.duration, abs=1e-6)
 
 
+@pytest.mark.parametrize('bounds', [(5e-3, 1e-3), (1e-3, 5e-3)])
+def test_a_corner_that_is_given_twice_keeps_the_tighter_bound(cell, bounds):
+    places = [(0.06, 0, 0), (0.06, 0, 0), (0.06, 0.06, 0)]
+    goal = Goal(
+        waypoints=tuple(cell.point(*each) for each in places),
+        segments=tuple(Segment(corner_deviation=bound) for bound in (*bounds, 0.0)),
+    )
+    _, rows = tool_rows(cell, plan(goal, cell.state, cell.arm, OPTIONS), 0.004)
+    corner = np.array(goal.waypoints[0].pose.position)
+    assert 0.75e-3 < np.linalg.norm(rows - corner, axis=1).min() < 1.1e-3
+
+
 def test_arcs_that_turn_with_their_tangent_and_turns_on_the_spot_are_led_through(cell):
     goal = Goal(
         waypoints=(
@@ -232,6 +244,16 @@ def test_arcs_that_turn_with_their_tangent_and_turns_on_the_spot_are_led_through
     end = cell.arm.forward(found.rows.joints[-1].tolist()) @ cell.T_flange_tcp
     assert end.distance_to(goal.waypoints[-1].pose) < 1e-6
     assert end.angle_to(goal.waypoints[-1].pose) < 1e-5
+
+
+def test_an_acceleration_at_a_point_is_told_to_be_ignored_with_the_reason(cell):
+    goal = square(cell, corner_deviation=1e-3)
+    first = replace(goal.waypoints[0], acceleration=(0.1, 0, 0, 0, 0, 0))
+    found = plan(
+        replace(goal, waypoints=(first, *goal.waypoints[1:])), cell.state, cell.arm, OPTIONS
+    )
+    text = 'point 0: acceleration is ignored: corners are rounded with those of the segments'
+    assert text in found.report
 
 
 def test_the_slowest_limit_is_demanded_away(cell):

@@ -59,14 +59,16 @@ def make_ur(ur_interfaces, no_thread_left, sim, make_cell):
     def make(names_parameters=None, **driver_parameters):
         cell = make_cell(sim, 'events', **driver_parameters)
         names = UrDriverNames(parameter_overrides=names_parameters, context=cell.context)
-        made.append(names)
         cell.executor.add_node(names)
         cell.names = names
-        return UrDriverClient(cell)
+        client = UrDriverClient(cell)
+        made.append((names, client))
+        return client
 
-    made: list[Node] = []
+    made: list[tuple[Node, UrDriverClient]] = []
     yield make
-    for node in made:
+    for node, client in made:
+        client.destroy()
         node.destroy_node()
 
 

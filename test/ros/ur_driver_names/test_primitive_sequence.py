@@ -165,3 +165,22 @@ def test_a_speed_after_a_time_is_refused():
         goal(timed, line())
     with pytest.raises(InvalidGoal, match='primitive 2 has a move_time and primitive 0 a speed'):
         goal(line(), line(), timed)
+
+
+def test_an_argument_that_is_given_twice_is_refused():
+    motion = line()
+    motion.additional_arguments.append(SimpleNamespace(name='velocity', value=0.1))
+    with pytest.raises(InvalidGoal, match="'velocity' is given twice"):
+        goal(motion)
+
+
+def test_what_to_do_about_an_arc_among_times_is_said():
+    both = {**SPEED, 'move_time': 2.0}
+    arc = primitive(CIRCULAR_CARTESIAN, A, B, arguments=both)
+    with pytest.raises(InvalidGoal, match='an arc that has a velocity and an acceleration'):
+        goal(line(arguments=both), arc)
+
+
+def test_poses_too_many_are_refused_with_their_number():
+    with pytest.raises(InvalidGoal, match='takes one; give just one'):
+        goal(primitive(LINEAR_CARTESIAN, A, B))

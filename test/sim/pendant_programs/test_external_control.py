@@ -61,7 +61,14 @@ def make(bench):
 def ask(bench, *commands):
     session = DashboardSession(bench.controller)
     session.open()
-    return [session.feed(f'{command}\n'.encode()).decode().strip() for command in commands]
+    answers = []
+    for command in commands:
+        answer = session.feed(f'{command}\n'.encode())
+        while not answer:
+            bench.step()
+            answer = session.feed(b'')
+        answers.append(answer.decode().strip())
+    return answers
 
 
 @pytest.mark.parametrize('robot', [CB3, E_SERIES, X])

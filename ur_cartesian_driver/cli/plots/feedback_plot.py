@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.preview.pictures import pyplot
 
 
 def draw(record: Path, drawing: Path, title: str) -> None:
@@ -21,24 +22,18 @@ def draw(record: Path, drawing: Path, title: str) -> None:
     :param drawing: the picture; its suffix decides the format.
     :raises OSError: matplotlib is not installed, or the file cannot be written.
     """
-    try:
-        import matplotlib
-    except ImportError:
-        raise OSError('no picture without matplotlib; install it (extra `plot`)') from None
-    matplotlib.use('Agg')
-    from matplotlib import pyplot
-
+    plt = pyplot()
     rows = [json.loads(line) for line in record.read_text(encoding='utf-8').splitlines()]
     time = np.array([row['stamp'] for row in rows])
     time -= time[0]
     planned, actual = (np.array([row[key] for row in rows]) for key in ('desired', 'actual'))
-    figure = pyplot.figure(figsize=(11.0, 5.0), layout='constrained')
+    figure = plt.figure(figsize=(11.0, 5.0), layout='constrained')
     figure.suptitle(title)
     _path(figure.add_subplot(1, 2, 1, projection='3d'), planned, actual)
     deviation = 1000.0 * np.linalg.norm(planned - actual, axis=1)
     _over_time(figure, time, np.array([row['speed'] for row in rows]), deviation)
     figure.savefig(drawing, dpi=110)
-    pyplot.close(figure)
+    plt.close(figure)
 
 
 def _path(axes: Any, planned: Floats, actual: Floats) -> None:

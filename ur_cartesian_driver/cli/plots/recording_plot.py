@@ -17,12 +17,11 @@ import numpy as np
 
 from ur_cartesian_driver.cli.progress import timed
 from ur_cartesian_driver.driver.recordings.recording import Recording
-from ur_cartesian_driver.driver.recordings.recording_format import (
-    OUTPUT_NAMES,
-    PART_SUFFIX,
-)
+from ur_cartesian_driver.driver.recordings.recording_folder import newest_recording
+from ur_cartesian_driver.driver.recordings.recording_format import OUTPUT_NAMES
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
+from ur_cartesian_driver.preview.pictures import pyplot
 
 #: Largest number of packets in a picture.
 MAX_ROWS = 6000
@@ -41,24 +40,13 @@ def plot(arguments: argparse.Namespace) -> int:
     """Draw a recording."""
     file = newest_recording(Path(arguments.file))
     picture = Path(arguments.output or file.with_suffix('.png'))
+    recording = Recording.load(file, MAX_ROWS)
+    if not len(recording.time):
+        raise ValueError(f'{file} has no packets, so there is nothing to draw')
     with timed('drawing'):
-        draw(Recording.load(file, MAX_ROWS), picture)
+        draw(recording, picture)
     print(f'picture: {picture}')
     return 0
-
-
-def newest_recording(path: Path) -> Path:
-    """
-    Return the path of a recording; for a directory, the newest one in it.
-
-    :raises OSError: the directory contains no recording.
-    """
-    if path.is_dir() and path.suffix != PART_SUFFIX:
-        found = sorted(path.glob('*_points*.npz')) or sorted(path.glob(f'*_points*{PART_SUFFIX}'))
-        if not found:
-            raise OSError(f'there is no recording in {path}; see the parameter record_directory')
-        return found[-1]
-    return path
 
 
 # ---- the picture ----------------------------------------------------------------------------
@@ -71,14 +59,8 @@ def draw(recording: Recording, picture: Path, title: str = '') -> None:
     :param picture: the file to write; its suffix decides the format.
     :raises OSError: matplotlib is not installed, or the picture cannot be written.
     """
-    try:
-        import matplotlib
-    except ImportError:
-        raise OSError('no picture without matplotlib; install it (extra `plot`)') from None
-    matplotlib.use('Agg')
-    from matplotlib import pyplot
-
-    with matplotlib.rc_context(
+    plt = pyplot()
+    with plt.rc_context(
         {
             'font.size': 9.0,
             'axes.spines.top': False,
@@ -91,13 +73,13 @@ def draw(recording: Recording, picture: Path, title: str = '') -> None:
             'path.simplify_threshold': 0.5,
         }
     ):
-        figure = pyplot.figure(figsize=(12.0, 7.2), layout='constrained')
+        figure = plt.figure(figsize=(12.0, 7.2), layout='constrained')
         figure.suptitle(title or _title(recording), fontsize=11.0)
         left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.0, 1.35))[0]
         _draw_path(left, recording)
         _draw_time(right, recording)
         figure.savefig(picture, dpi=100)
-        pyplot.close(figure)
+        plt.close(figure)
 
 
 def _title(recording: Recording) -> str:

@@ -64,7 +64,7 @@ class DriverConfig(LinkSettings):
     #: planned and executed path, joints, speeds, lag, outputs, events. Empty: no recordings.
     record_directory: str = ''
     #: Largest size of all recordings together [MB]; the oldest ones are removed. A motion takes
-    #: 0.24 MB a second at 500 Hz; a single recording ends at half of this size.
+    #: 0.27 MB a second at 500 Hz; a single recording ends at half of this size.
     record_max_size: Annotated[float, Range(1.0, 1000000.0)] = 2000.0
     #: Where the robot loop, which holds the connections to the robot, runs: in a process of its
     #: own, or in a thread (for tests; large goals then disturb it).

@@ -91,6 +91,8 @@ class StateMemory:
         """Map the memory; the descriptor may be closed afterwards."""
         self._memory = mmap.mmap(descriptor, _SIZE)
         self._count = 0
+        #: The count at which a state was read last, and that state.
+        self._last_read: tuple[int, RobotState | None] = 0, None
 
     def close(self) -> None:
         """Unmap the memory."""
@@ -108,10 +110,13 @@ class StateMemory:
         """Return the newest state; None = there is no state."""
         while True:
             (before,) = _COUNTER.unpack_from(self._memory, 0)
+            if before == self._last_read[0]:
+                return self._last_read[1]
             data = self._memory[_COUNTER.size : _COUNTER.size + _DATA.size]
             (after,) = _COUNTER.unpack_from(self._memory, 0)
             if before == after and not before & 1:
-                return _state(_DATA.unpack(data)) if before else None
+                self._last_read = before, _state(_DATA.unpack(data))
+                return self._last_read[1]
 
     def _write(self, data: bytes) -> None:
         if self._memory.closed:  # sockets that close after the memory still report states

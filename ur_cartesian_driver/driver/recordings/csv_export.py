@@ -31,6 +31,8 @@ _PARTS = {
     'output': ('0', '1'),  # [A] or [V]
 }
 _SECONDS = ('time', 'lag', 'buffered')
+#: Packets whose numbers are objects of Python at a time: those of an hour would take gigabytes.
+_BLOCK = 4096
 
 
 def write_csv(recording: Recording, file: BinaryIO, options: ExportOptions) -> None:
@@ -52,7 +54,9 @@ def write_csv(recording: Recording, file: BinaryIO, options: ExportOptions) -> N
     text = TextIOWrapper(file, encoding='utf-8', newline='')
     writer = csv.writer(text, lineterminator='\n')
     writer.writerow(columns)
-    for row in zip(*(column.tolist() for column in columns.values()), strict=True):
-        writer.writerow(row)
-        options.progress()
+    for begin in range(0, len(recording.time), _BLOCK):
+        block = (column[begin : begin + _BLOCK].tolist() for column in columns.values())
+        for row in zip(*block, strict=True):
+            writer.writerow(row)
+            options.progress()
     text.detach()  # else the file would be closed with the wrapper

@@ -159,7 +159,7 @@ class Recorder:
         self._start_time, self._time = state.timestamp, 0.0
         self._flush_due, self._used = FLUSH_PERIOD, 0
         self._stale_points_begun = state.points_begun
-        self._submit(folder, folder.open)
+        self._submit(folder, folder.open, always=True)
         if metadata['points']:
             self.add_plan(job.reference, -inf)
         count = metadata['points']
@@ -178,7 +178,8 @@ class Recorder:
         rows = np.empty(len(reference.time), dtype=disk.PLANNED_DTYPE)
         rows['time'], rows['pose'] = reference.time, reference.poses
         rows['point'] = reference.point
-        self._submit(folder, lambda: folder.write_plan(rows, since))
+        if not self._submit(folder, lambda: folder.write_plan(rows, since)):
+            folder.is_plan_whole = False
 
     def add_state(
         self, state: RobotState, waypoint: int = -1, buffered: float = nan, lag: float = nan
@@ -254,7 +255,7 @@ class Recorder:
             'text': outcome.text,
             'report': outcome.report,
         }
-        self._submit(folder, lambda: folder.close(known), is_last=True)
+        self._submit(folder, lambda: folder.close(known), always=True)
         if (writer := self._writer) is not None and (finisher := self._finisher) is not None:
             writer.submit(
                 lambda: finisher.submit(
@@ -267,7 +268,7 @@ class Recorder:
         if (folder := self._folder) is not None:
             self._flush(folder)
             self._folder = None
-            self._submit(folder, folder.abandon, is_last=True)
+            self._submit(folder, folder.abandon, always=True)
         self._is_closing = True
         if self._writer is not None and self._finisher is not None:
             self._writer.end(timeout)
@@ -294,16 +295,18 @@ class Recorder:
             self._writer.submit(write)  # at most as many such jobs wait as there are buffers
 
     def _submit(
-        self, folder: RecordingFolder, work: Callable[[], None], is_last: bool = False
-    ) -> None:
-        """Give the writer a job, unless too many jobs wait."""
+        self, folder: RecordingFolder, work: Callable[[], None], *, always: bool = False
+    ) -> bool:
+        """Give the writer a job, unless too many jobs wait; return whether it has the job."""
         writer = self._writer
-        if writer is not None and (is_last or writer.jobs.qsize() < MAX_PENDING_JOBS):
-            writer.submit(lambda: folder.run_guarded(work))
+        if writer is None or (writer.jobs.qsize() >= MAX_PENDING_JOBS and not always):
+            return False
+        writer.submit(lambda: folder.run_guarded(work))
+        return True
 
     def _start_workers(self) -> None:
         size = BUFFER_ROWS * disk.EXECUTED_STRUCT.size
-        self._buffer = bytearray(size)
+        self._buffer, self._free_buffers = bytearray(size), SimpleQueue()
         for _ in range(BUFFER_COUNT - 1):
             self._free_buffers.put(bytearray(size))
         self._is_closing = False

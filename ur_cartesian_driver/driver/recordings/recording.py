@@ -141,8 +141,10 @@ class Recording:
                         f'{path} is damaged: {name} has {len(getattr(self, name))} rows, not '
                         f'{rows}'
                     )
-        for name in _EXECUTED_COLUMNS:
-            values, expected = getattr(self, name), disk.EXECUTED_DTYPE[name]
+        for name in (*_EXECUTED_COLUMNS, *_PLANNED_COLUMNS):
+            planned = name.removeprefix('planned_')
+            fields = disk.EXECUTED_DTYPE if planned == name else disk.PLANNED_DTYPE
+            values, expected = getattr(self, name), fields[planned]
             if values.dtype != expected.base or values.shape[1:] != expected.shape:
                 raise ValueError(
                     f'{path} is damaged: {name} has rows of {values.dtype} {values.shape[1:]}, '
@@ -159,7 +161,7 @@ class Recording:
         """
         By output, such as 'standard_digital 2': (k,) the packet that shows each of its pulses.
 
-        A packet that shows more than one, because others were lost, is there as often.
+        A packet that shows several pulses, because packets were lost, is listed once for each.
         """
         found = {}
         for slot, output in enumerate(self.metadata.get('pulse_outputs', ())):

@@ -62,6 +62,8 @@ class RecordingFolder:
         self._last_times: Floats = np.empty(0)
         #: How many rows were lost because the disk was too slow.
         self.lost_rows = 0
+        #: Whether no piece of the plan was lost in this way.
+        self.is_plan_whole = True
 
     def open(self) -> None:
         """Make the folder and its files."""
@@ -69,8 +71,8 @@ class RecordingFolder:
         self._path = _new(self._directory / f'{recording_name(self._metadata)}{disk.PART_SUFFIX}')
         self._rows = disk.GrowingArray(self._path / disk.EXECUTED_FILE, disk.EXECUTED_DTYPE)
         # The lock shows that this process writes the folder; the system releases the lock when
-        # the process ends.
-        fcntl.flock(self._rows.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        # the process ends. Another arm's process holds it at most while it looks at it.
+        fcntl.flock(self._rows.file, fcntl.LOCK_EX)
         self._plan = disk.GrowingArray(self._path / disk.PLANNED_FILE, disk.PLANNED_DTYPE)
         self._events = open(self._path / disk.EVENTS_FILE, 'xb', buffering=0)  # noqa: SIM115  # open until close()
         self._write_metadata()
@@ -108,6 +110,11 @@ class RecordingFolder:
     def close(self, outcome: dict[str, Any]) -> None:
         """Write the outcome."""
         self._metadata.update(outcome=outcome, rows_left_out=self.lost_rows)
+        if not (self.is_plan_whole or self._metadata['trouble']):
+            self._metadata['trouble'] = (
+                'Pieces of the plan are missing, because the disk was too slow.'
+            )
+            self._warn(self._metadata['trouble'])
         self._write_metadata()
 
     def finish(self, yield_cpu: Callable[[], None]) -> None:
@@ -140,7 +147,9 @@ class RecordingFolder:
             )
 
     def _write_metadata(self) -> None:
-        (self._path / disk.METADATA_FILE).write_text(json.dumps(self._metadata), encoding='utf-8')
+        written = self._path / f'{disk.METADATA_FILE}.new'  # the old file is valid until then
+        written.write_text(json.dumps(self._metadata), encoding='utf-8')
+        written.replace(self._path / disk.METADATA_FILE)
 
     def _close_files(self) -> None:
         for name in ('_rows', '_plan', '_events'):
@@ -190,19 +199,47 @@ def enforce_quota(
             path.unlink(missing_ok=True)
 
 
+def newest_recording(path: Path) -> Path:
+    """
+    Return the path of a recording; for a directory, the newest one in it.
+
+    Files and folders that do not have the name of a recording, such as renamed ones, are left out;
+    folders of motions that run or were killed count only if there is no file.
+
+    :raises OSError: the directory contains no recording.
+    """
+    if not path.is_dir() or path.suffix == disk.PART_SUFFIX:
+        return path
+    found = _recordings(path)
+    files = [each for each in found if each.suffix != disk.PART_SUFFIX]
+    if not found:
+        raise OSError(
+            f'there is no recording in {path}; see the parameter record_directory, and name a '
+            'file that was renamed'
+        )
+    return (files or found)[-1]
+
+
+def _recordings(directory: Path) -> list[Path]:
+    """Return all recordings of a directory, the oldest first."""
+    return sorted(p for p in directory.iterdir() if _RECORDING_NAME.fullmatch(p.name))
+
+
 def _unused_recordings(directory: Path) -> list[Path]:
     """Return the recordings that no process writes, the oldest first."""
-    return sorted(
+    return [
         path
-        for path in directory.iterdir()
-        if _RECORDING_NAME.fullmatch(path.name)
-        and not (path.suffix == disk.PART_SUFFIX and _is_written(path))
-    )
+        for path in _recordings(directory)
+        if path.suffix != disk.PART_SUFFIX or not _is_written(path)
+    ]
 
 
 def _size(recording: Path) -> int:
-    files = recording.iterdir() if recording.is_dir() else [recording]
-    return sum(file.stat().st_size for file in files)
+    try:
+        files = recording.iterdir() if recording.is_dir() else [recording]
+        return sum(file.stat().st_size for file in files)
+    except FileNotFoundError:  # another arm's process has finished or removed it
+        return 0
 
 
 def _is_written(folder: Path) -> bool:

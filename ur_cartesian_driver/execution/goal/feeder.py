@@ -13,6 +13,10 @@ its :attr:`~Feeder.parts`, inherits. The machine looks up the capabilities once
 (:class:`Capabilities`). The methods of a capability class are the defaults for feeders without
 that capability.
 
+The word feed has two meanings here. A feeder *feeds* the robot (:meth:`Feeder.feed`). Names with
+``feed_``, and :class:`~.feed_state.FeedState`, are about the *feed* of machine tools: the speed of
+a motion, as a fraction of the planned one (``feed_override``).
+
 To add a capability, write its class here, add a line to :class:`Capabilities`, use it in the
 machine, and let the feeder or part that has it inherit from the class. The other feeders need no
 change.

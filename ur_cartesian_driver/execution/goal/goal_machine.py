@@ -29,6 +29,7 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     SetTemporaryTcp,
     StopProgram,
 )
+from ur_cartesian_driver.execution.goal.goal_outcome import GoalOutcome
 from ur_cartesian_driver.execution.goal.goal_transitions import (
     detect_stop,
     GoalState,
@@ -54,7 +55,6 @@ from ur_cartesian_driver.execution.goal.output_guard import OutputGuard
 from ur_cartesian_driver.execution.goal.pulse_counter import PulseCounter
 from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
 from ur_cartesian_driver.motion import events
-from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal.goal import DEFAULT_GOAL_TIME_TOLERANCE
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.state_age import explain_age
@@ -112,11 +112,8 @@ class GoalMachine:
         self._deadline = inf
         #: In SETTLING: the time by which the controller's target must be at the last point [s].
         self._arrival_due = inf
-        #: The code and the text of the outcome, as far as they are decided.
-        self._code: ErrorCode | None = None
-        self._text = ''
-        self._touched = False
-        self._has_moved = False
+        #: The outcome, as far as it is decided.
+        self.outcome = GoalOutcome(self._monitor, self.can)
         self._has_entered_restoring = False
 
     @property
@@ -357,23 +354,15 @@ class GoalMachine:
         transition = TRANSITIONS[self.state][signal]
         before, self.state = self.state, transition.state
         if transition.code is not None:
-            if before is GoalState.PROGRAM_LOST:  # the new text says why the program ended
-                text = f'{text}; before that, {self._text}'
-            if self._code is ErrorCode.CONNECTION_LOST and signal is GoalSignal.UNCONFIRMED:
-                self._text = f'{self._text}; {text}'  # the lost connection is the cause
-            else:
-                self._code, self._text = transition.code, text
-                self._touched = signal is GoalSignal.CONTACT
+            self.outcome.decide(transition.code, text, signal, before)
         if self.state is before:
             return []
         # If the feeder left its mode while the safe outputs are armed, the program would set them.
         # After a success they are disarmed first, and the feeder leaves its mode in ENDED.
-        disarms_first = self.state is GoalState.RESTORING and self._succeeds() and self._guard
+        succeeds = self.outcome.succeeds
+        disarms_first = self.state is GoalState.RESTORING and succeeds and self._guard
         commands = [] if disarms_first else self.feeder.enter(self.state, self._packet)
         return commands + self._enter(self.state, signal, now)
-
-    def _succeeds(self) -> bool:
-        return self._code is ErrorCode.SUCCESSFUL
 
     def _apply_supply(self, now: float) -> list[GoalCommand]:
         signal, text = self.can.appending.supply(self.state)
@@ -383,7 +372,7 @@ class GoalMachine:
         """Set the deadline of a state, and return the commands in addition to the feeder's."""
         match state:
             case GoalState.MOVING:
-                self._deadline, self._has_moved = inf, True
+                self._deadline, self.outcome.has_moved = inf, True
             case GoalState.AWAITING_POINTS:
                 self._deadline = now + (self.can.appending.append_timeout or inf)
                 return self._apply_supply(now)
@@ -405,26 +394,9 @@ class GoalMachine:
         tolerance = self.job.goal_time_tolerance or DEFAULT_GOAL_TIME_TOLERANCE
         self._deadline = inf if tolerance < 0.0 else now + tolerance
         self._arrival_due = min(self._deadline, now + DEFAULT_GOAL_TIME_TOLERANCE)
-        if late := self._explain_late(tolerance):
+        if late := self.outcome.late_arrival(tolerance):
             return self._apply(GoalSignal.NOT_SETTLED, late, now)
         return []
-
-    def _explain_late(self, tolerance: float) -> str:
-        """
-        Return how late the last point was reached, as a clause; '' = in time.
-
-        :param tolerance: allowed delay [s]; negative = any delay.
-        """
-        if self.job.due is None or tolerance < 0.0:
-            return ''
-        due = self.job.due + self._monitor.allowed_delay
-        late = self._monitor.scaled_time - due
-        if late <= tolerance:
-            return ''
-        return (
-            f'the last point was reached {late:.3f} s after its time {due:.3f} s, '
-            f'goal_time_tolerance is {tolerance:.3f} s'
-        )
 
     def _enter_restoring(self, now: float) -> list[GoalCommand]:
         """Restore the TCP and release the outputs; a goal that set neither ends at once."""
@@ -432,7 +404,7 @@ class GoalMachine:
         if self.temporary_tcp is None and not self._guard:
             return self._apply(GoalSignal.RESTORED, '', now)
         self._deadline = now + timeouts.SAFE_OUTPUTS_TIMEOUT
-        release = self._guard.release(succeeded=self._succeeds())
+        release = self._guard.release(succeeded=self.outcome.succeeds)
         commands = [*self._progress(), *release]
         if self.temporary_tcp is not None:
             self._deadline = now + timeouts.ARMING_TIMEOUT
@@ -441,7 +413,8 @@ class GoalMachine:
 
     def _secure_unconfirmed(self) -> list[GoalCommand]:
         """Write the safe outputs of a failed goal, unless the program has confirmed them."""
-        if self._succeeds() or (self._has_entered_restoring and self._guard.is_safe(self._packet)):
+        is_safe = self._has_entered_restoring and self._guard.is_safe(self._packet)
+        if self.outcome.succeeds or is_safe:
             return []
         # On entering RESTORING, the machine has already released the outputs.
         release = [] if self._has_entered_restoring else self._guard.release(succeeded=False)
@@ -450,7 +423,7 @@ class GoalMachine:
     def _end(self, signal: GoalSignal) -> list[GoalCommand]:
         # Once RESTORING was entered, no motion is left that could go on.
         if signal in STOP_PROGRAM_AFTER and not self._has_entered_restoring:
-            return [StopProgram(reason=self._text), *self._finish()]
+            return [StopProgram(reason=self.outcome.cause), *self._finish()]
         return self._finish()
 
     # ---- reports ------------------------------------------------------------------------------
@@ -478,39 +451,11 @@ class GoalMachine:
             lag=self.can.streaming.lag,
             at_end=waits
             or self.state is GoalState.SETTLING
-            or (self._succeeds() and not self._touched),
+            or (self.outcome.succeeds and not self.outcome.touched),
             waits=waits,
         )
         return [ReportProgress(progress=progress)]
 
     def _finish(self) -> list[GoalCommand]:
-        tcp, monitor = self.temporary_tcp, self._monitor
-        has_place = not self._succeeds() and len(self.job.waypoint)
-        outcome = events.Outcome(
-            code=self._code if self._code is not None else ErrorCode.EXECUTION_FAILED,
-            text=self._success_text() if self._succeeds() else self._failure_text(),
-            report=(
-                *(() if tcp is None else (tcp.report(monitor.latest),)),
-                *(line for each in self.can.reporting for line in each.report),
-            ),
-            stopped=monitor.place() if has_place else None,
-            touched=self._touched,
-        )
+        outcome = self.outcome.for_client(self.temporary_tcp)
         return [*self._progress(), Finish(outcome=outcome)]
-
-    def _success_text(self) -> str:
-        if self._text:
-            return f'{self._text}.'
-        return self.can.phrasing.success_text() or self._monitor.success_text()
-
-    def _failure_text(self) -> str:
-        """Return the sentence of a goal that failed: the cause, and the place."""
-        location, laws = 'before anything moved', ''
-        if self._code is ErrorCode.GOAL_TOLERANCE_VIOLATED:
-            location, laws = 'at the last point', self._monitor.law_clause()
-        elif own := self.can.phrasing.location(started=self._has_moved):
-            location = own
-        elif self._has_moved:
-            location = self._monitor.location()
-        text = self._text if location in self._text else f'{self._text} ({location})'
-        return f'{text[:1].upper()}{text[1:]}{laws}.'

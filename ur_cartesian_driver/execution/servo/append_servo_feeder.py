@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The feeder of a goal with keep_open through the buffered servo.
+The feeder of a keep_open goal that runs through the buffered servo.
 
-The driver makes the set-points. Those already made can no longer be replaced, but the remaining
-curve can be, even its ending, at once. A goal whose set-points reach the ending comes to rest
-(RUNNING_OUT, :mod:`~ur_cartesian_driver.execution.goal.goal_transitions`); points that come later
-continue from that rest.
+The driver makes the set-points. Those already made are final; the rest of the curve, its ending
+included, can still be replaced, with immediate effect. A goal whose set-points reach the ending
+comes to rest (RUNNING_OUT, :mod:`~ur_cartesian_driver.execution.goal.goal_transitions`); points
+that come later continue from that rest.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class AppendServoFeeder(ServoFeeder, Appendable):
         self.append_timeout = timeout
         self._appended = AppendedRecords(monitor)
         self.parts = (self._appended, *self.parts)
-        #: The motion that begins where the arm comes to rest; None = no points came for it.
+        #: The motion after the stop; None = no points have come for it.
         self._next_spline: JointSpline | None = None
         #: The planned time at which the arm comes to rest [s]; inf = the ending can be replaced.
         self._stop_time = inf
@@ -90,7 +90,7 @@ class AppendServoFeeder(ServoFeeder, Appendable):
         self._spline = self._source.spline
 
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
-        """Note the rest after the ending, or go on with the points that came meanwhile."""
+        """Record the stop after the ending, or go on with the points appended during it."""
         if state is GoalState.AWAITING_POINTS:
             self._appended.rest(self._stop_time)
         elif state is GoalState.MOVING and self._next_spline is not None:
@@ -105,6 +105,6 @@ class AppendServoFeeder(ServoFeeder, Appendable):
             packet = self.monitor.latest
             if state is GoalState.RUNNING_OUT and packet is not None and is_at_rest(packet):
                 return GoalSignal.SUCCESS, ''
-            if self._stop_time < inf:  # the next packet leads to RUNNING_OUT
+            if self._stop_time < inf:  # no arrival: `supply` signals STARVING with the next packet
                 return NO_MEANING
         return super().interpret(event, state)

@@ -430,7 +430,9 @@ class GcodeMachine:
         self._seen_percent = True
 
     def _number(self, _: str, own: _Words) -> None:
-        self._sequence.meet_number(self._line, int(own['O']), is_first=not self._has_begun)
+        self._sequence.check_program_number(
+            self._line, int(own['O']), is_first=not self._has_begun
+        )
 
     @cached_property
     def _is_lathe(self) -> bool:

@@ -12,7 +12,8 @@ import re
 from ur_cartesian_driver.importing.imported_path import BrokenFile
 
 _NUMBER_LINE = re.compile(r'\s*(?:N\s*[0-9]+\s*)?[O:]\s*([0-9]{1,8})\s*(?:[(;].*)?', re.I)
-_END_LINE = re.compile(r'\s*(?:N\s*[0-9]+\s*)?M\s*0*(?:2|30)\b', re.I)
+_COMMENT = re.compile(r'\([^)]*\)|;.*')
+_END = re.compile(r'M\s*0*(?:2|30)(?![0-9.])', re.I)
 #: Largest depth of nested calls, as in Fanuc's controls and LinuxCNC.
 _MAX_DEPTH = 10
 #: Largest number of executed lines of all subprograms together.
@@ -28,12 +29,12 @@ class _Call:
     #: The index of the subprogram's first line.
     first: int
     #: The index of the line after the call.
-    back: int
+    return_index: int
     repeats_left: int
 
 
 class LineSequence:
-    """Yields the lines of a program with their numbers; calls determine the next line."""
+    """Yields the lines of a program in the order of execution, with their numbers."""
 
     def __init__(self, lines: Sequence[str]) -> None:
         """Begin at the first line."""
@@ -50,7 +51,7 @@ class LineSequence:
                 self._in_subprograms += 1
                 if self._in_subprograms > _MAX_LINES:
                     raise BrokenFile(
-                        self._next, f'subprograms have more than {_MAX_LINES} lines to execute'
+                        self._next, f'subprograms would execute more than {_MAX_LINES} lines'
                     )
             yield self._next, self._lines[self._next - 1]
         if self._calls:
@@ -63,12 +64,14 @@ class LineSequence:
         self._calls.clear()
         self._next = len(self._lines)
 
-    def meet_number(self, line: int, number: int, *, is_first: bool) -> None:
+    def check_program_number(self, line: int, number: int, *, is_first: bool) -> None:
         """Accept an O number at the program's beginning; refuse to run into a later O number."""
         if self._calls:
-            raise BrokenFile(line, f'the subprogram O{self._calls[-1].number} has no M99 before')
+            raise BrokenFile(
+                line, f'the subprogram O{self._calls[-1].number} reaches O{number} without M99'
+            )
         if not is_first:
-            raise BrokenFile(line, f'the program runs into O{number}; end it by M30 before')
+            raise BrokenFile(line, f'the main program runs into O{number}; end it by M30 before')
 
     def call(self, line: int, words: dict[str, float]) -> None:
         """
@@ -79,13 +82,14 @@ class LineSequence:
         """
         number, repeats = words.get('P'), words.get('L', 1.0)
         if number is None or set(words) - {'P', 'L'}:
-            raise BrokenFile(line, 'M98 needs the number of a subprogram in P, and takes L beside')
+            raise BrokenFile(line, 'M98 takes P, the number of a subprogram, L, and nothing else')
         if number < 1.0 or number % 1.0 or repeats % 1.0 or not 0.0 <= repeats <= 9999.0:
             raise BrokenFile(line, 'M98 needs a whole P of at least 1, and L from 0 to 9999')
         first = self._first_line(line, int(number))
         if first is None and 'L' not in words and number >= _PACKED:
-            repeats, number = divmod(number, _PACKED)
-            first = self._first_line(line, int(number))
+            repeats, packed = divmod(number, _PACKED)
+            if (first := self._first_line(line, int(packed))) is not None:
+                number = packed
         if first is None:
             raise BrokenFile(line, f'O{number:g} is not in the file, and other files are not read')
         if len(self._calls) == _MAX_DEPTH:
@@ -102,11 +106,12 @@ class LineSequence:
             M2 or M30.
         """
         if words:
-            raise BrokenFile(line, 'M99 with a place to go on at is not read')
+            raise BrokenFile(line, 'M99 with a line to continue at (P) is not read')
         if not self._calls:
-            if any(map(_END_LINE.match, self._lines[line:])):
+            if any(_END.search(_COMMENT.sub('', text)) for text in self._lines[line:]):
                 raise BrokenFile(
-                    line, 'M99 ends the main program; put it before its subprograms, with M30'
+                    line,
+                    'M99 ends the main program; put the main program first, with M30 at its end',
                 )
             self.end()
             return False
@@ -116,7 +121,7 @@ class LineSequence:
             self._next = call.first
         else:
             self._calls.pop()
-            self._next = call.back
+            self._next = call.return_index
         return True
 
     def _first_line(self, line: int, number: int) -> int | None:

@@ -13,14 +13,14 @@ MAIN = 0
 
 
 class RunningScript:
-    """The program, as the functions that it calls see it."""
+    """What a called function can ask of the running program: its line, its thread, its remarks."""
 
     def __init__(self) -> None:
         """Begin before the program is compiled."""
         self.interpreter: ScriptInterpreter | None = None
-        #: A clause on the last call whose value can differ from that on a robot; empty = none.
+        #: A clause that names the last call whose value is assumed; '' = none is.
         self._assumed = ''
-        #: The subjects and the lines of the remarks, by the reason that the remarks give.
+        #: The remarks: their reason -> what it applies to, and the lines where that happened.
         self._said: dict[str, tuple[dict[str, None], set[int]]] = {}
 
     @property
@@ -47,15 +47,18 @@ class RunningScript:
     def leave_out(self, what: str, why: str) -> None:
         """Remark that a function lacks the effect or the value that it has on a robot."""
         if why in ASSUMED:
-            self._assumed = f'{what} of line {self.line} has no robot or machine to ask here'
+            self._assumed = (
+                f'the value of {what} of line {self.line} is assumed, because no robot answers '
+                'during an import'
+            )
         self.say(what, why)
 
     def suspicion(self, before: str) -> str:
-        """Return `before` and a possible reason for a failure or endless loop; empty = none."""
+        """Return `before` and a possible cause of a failure or endless loop; '' = none."""
         return f'{before}{self._assumed}' if self._assumed else ''
 
     def tell(self, remarks: ImportNotes) -> None:
-        """Add all remarks to the import's."""
+        """Copy all remarks into those of the import."""
         for why, (names, lines) in self._said.items():
             for line in lines:
                 remarks.add(line, ', '.join(names), why)

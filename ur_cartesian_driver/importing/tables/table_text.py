@@ -4,13 +4,14 @@
 The header and rows of a table, in the dialects that programs write.
 
 Columns are separated by semicolons, tabs, commas or blanks; rows and header can have different
-separators, because numpy.savetxt writes a header without changing it. The header is the first line
+separators, because numpy.savetxt writes the header that it is given. The header is the first line
 that names a position and is not a comment. If the rows begin before such a line, the header is the
 last comment before the rows that names a position.
 """
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterator
 import csv
 from dataclasses import dataclass, field
@@ -104,12 +105,12 @@ def read_table(
             if titles := next(filter(is_header, _titles(text, delimiters)), None):
                 header = (i + 1, titles)
             if not comment:
-                if header or _is_numeric(line):
+                if (header and header[0] == i + 1) or _is_numeric(line):
                     break
                 before.append(i + 1)
     if header is None:
         return _without_header(lines, delimiters, unit, remarks)
-    for number in before:
+    for number in before[: bisect_left(before, header[0])]:
         remarks.add(number, 'text before the header', 'it is no part of the table')
     return _with_rows(lines, *header, delimiters)
 
@@ -146,7 +147,7 @@ def _without_header(
     lines: list[str], delimiters: tuple[str | None, ...], unit: str, remarks: ImportNotes
 ) -> Table:
     """
-    Return a table of x, y and z if their unit is known, or one whose header is the first line.
+    Return a table whose header is its first text, or x, y and z if their unit is known.
 
     :raises BrokenFile: the file is empty, or has only numbers whose meaning is not known.
     """

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot, isfinite
+from math import hypot, inf, isfinite
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +48,11 @@ class Plane:
                 'point instead.'
             )
         length = hypot(nx, ny, nz)
-        if length < 1e-6:
+        length = 0.0 if length < 1e-6 else length
+        if not 0.0 < length < inf:
             raise ValueError(
-                f'workspace_planes: the normal of "{name}" is zero; it points into the allowed '
-                'side.'
+                f'workspace_planes: the normal of "{name}" is {"too long" if length else "zero"}; '
+                'it points into the allowed side.'
             )
         return cls(name, (x, y, z), (nx / length, ny / length, nz / length), margin)
 

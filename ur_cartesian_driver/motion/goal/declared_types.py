@@ -41,7 +41,7 @@ class WrongType(ValueError):
         self.problem, self.field = problem, field
 
     def inside(self, outer: str) -> WrongType:
-        """Return the same error, with the name of the containing value before its field."""
+        """Return this error with ``outer`` in front of its field."""
         separator = '.' if self.field and not self.field.startswith('[') else ''
         return WrongType(self.problem, f'{outer}{separator}{self.field}')
 
@@ -50,7 +50,7 @@ def with_declared_types(value: T, kind: type[T], name: str) -> T:
     """
     Return a value converted to exactly the type ``kind``; fields of dataclasses are converted too.
 
-    A number that an ``IntEnum`` does not have is kept.
+    An int that is no member of its ``IntEnum`` is kept, for later rules to refuse.
 
     :param name: the name of the value, with which an error text begins.
     :returns: the same object if nothing had to be converted.
@@ -66,8 +66,10 @@ def declare_types(instance: object) -> None:
 
     :raises WrongType: a value cannot be converted.
     """
-    for name, convert in _field_converters(type(instance)):  # type: ignore[arg-type]  # a dataclass
+    for name, convert, default in _field_converters(type(instance)):  # type: ignore[arg-type]  # a dataclass
         value = getattr(instance, name)
+        if value is default:
+            continue
         converted = _convert_part(convert, value, name)
         if converted is not value:
             object.__setattr__(instance, name, converted)
@@ -116,21 +118,21 @@ def declared_hints(kind: type) -> dict[str, Any]:
 
 
 @cache
-def _field_converters(kind: type) -> tuple[tuple[str, Convert], ...]:
+def _field_converters(kind: type) -> tuple[tuple[str, Convert, Any], ...]:
+    """Return the name, the converter and the default of each field."""
     hints = declared_hints(kind)
-    return tuple((field.name, _converter(hints[field.name])) for field in fields(kind))
+    return tuple((each.name, _converter(hints[each.name]), each.default) for each in fields(kind))
 
 
 def _dataclass(kind: type) -> Convert:
     converters = _field_converters(kind)
-    names = [name for name, _ in converters]
-    defaults = [field.default for field in fields(kind)]
+    names = [name for name, _, _ in converters]
 
     def convert(value: Any) -> Any:
         if not isinstance(value, kind):
             raise _wrong(value, kind.__name__)
         changed = {}
-        for (name, convert_field), default in zip(converters, defaults, strict=True):
+        for name, convert_field, default in converters:
             old = getattr(value, name)
             if old is default:  # true for most fields of a point
                 continue
@@ -191,7 +193,10 @@ def _member_of(kind: type[IntEnum]) -> Convert:
     def convert(value: Any) -> Any:
         if type(value) is kind:
             return value
-        number = _int(value)
+        try:
+            number = _int(value)
+        except WrongType:
+            raise _wrong(value, kind.__name__) from None
         try:
             return kind(number)
         except ValueError:

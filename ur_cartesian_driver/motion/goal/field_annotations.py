@@ -245,7 +245,7 @@ class GoalColumn:
 
 
 @cache
-def goal_columns(arrays: type, kind: type) -> tuple[GoalColumn, ...]:
+def declared_columns(arrays: type, kind: type) -> tuple[GoalColumn, ...]:
     """Return the columns of a class of arrays, each with the field of ``kind`` that it holds."""
     hints = declared_hints(arrays)
     table = {each.name: each for each in goal_fields(kind)}

@@ -9,13 +9,15 @@ itself, a new field took two dozen edits, and a forgotten edit raised no error: 
 was lost in a file or after a stop. So the dataclasses below declare everything about a field, and
 all other code iterates over them (:func:`~.field_annotations.goal_fields`).
 
-A field has a type, a unit in its comment, a default, and annotations: :class:`~.field_annotations.Sent`
-if messages name or represent it differently, :class:`~.field_annotations.Range` if not every number is
-allowed, :class:`~.field_annotations.Mark` for other properties. Schema, reading, writing, conversion of
+A field has a type, a unit in its comment, a default, and annotations:
+:class:`~.field_annotations.Sent` if messages name or represent it differently,
+:class:`~.field_annotations.Range` if not every number is allowed,
+:class:`~.field_annotations.Mark` for other properties. Schema, reading, writing, conversion of
 users' values to the declared types, and checks of ranges and enumerations follow from these. Goals
 can have thousands of points, so the driver stores points and segments in columns
-(:mod:`~.goal_columns`); ``WaypointColumns`` and ``SegmentColumns`` declare a column for each field,
-and its flat array in messages. Rules that concern more than one field are in ``planning.request``.
+(:mod:`~.goal_columns`); ``WaypointColumns`` and ``SegmentColumns`` declare a column for each
+field, and its flat array in messages. Rules that concern more than one field are in
+``planning.request``.
 
 To add a number to segments, declare it in MotionSegment.msg and PackedPoints.msg, in ``Segment``
 and ``SegmentColumns``, and use it where the motion is planned. Paths accept it by name, as in

@@ -186,8 +186,8 @@ class Frames:
         raise InvalidGoal(
             _FRAME_ID,
             f'is "{name}", which is not a known frame',
-            f'known are {", ".join([*self._T_base, *self._T_flange, *self._T_tcp])}; others can '
-            'be named in the parameter static_frames',
+            f'name one of {", ".join([*self._T_base, *self._T_flange, *self._T_tcp])}; others '
+            'can be added to static_frames',
         )
 
     def T_flange_frame(self, name: str, snapshot: ArmSnapshot | None = None) -> Pose | None:
@@ -217,7 +217,7 @@ class Frames:
             _CONTROLLED,
             f'is "{name}", which is not a known frame',
             f'leave it empty for the active TCP of the robot, or name one of {known}; others can '
-            f'be named in the parameter static_frames, with {self.tool0} as their parent',
+            f'be added to static_frames, with {self.tool0} as their parent',
         )
 
 

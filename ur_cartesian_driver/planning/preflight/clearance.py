@@ -35,9 +35,9 @@ from ur_cartesian_driver.planning.request.goal_fields import point_field
 
 # Rows per block: blocks bound the memory, and a refusal ends the check early.
 _BLOCK = 4096
-# A pair still separates if its distance shrinks by no more than this [m]: samples are not exact.
+# A pair counts as separating while its distance shrinks by no more than this [m], by rounding.
 _RECEDING_TOLERANCE = 1e-4
-# How far a tool that works on a plane without a margin may be below it, by rounding [m].
+# How far a tool that works on a plane without a margin may be beyond it, by rounding [m].
 _ON_PLANE = 1e-6
 
 
@@ -84,7 +84,7 @@ class Clearance:
     The clearance of one arm with one tool.
 
     :param T_flange_tcp: the TCP of the goal; the cylinder of the tool leads from the flange to it.
-    :param options: of these, self_collision, min_clearance, tool_radius and workspace_planes.
+    :param options: self_collision, min_clearance, tool_radius and workspace_planes are used.
     """
 
     def __init__(self, arm: Arm, T_flange_tcp: Pose, options: PlanningOptions) -> None:
@@ -114,7 +114,7 @@ class Clearance:
         :param q: (n, 6) [rad], all configurations of a goal, in order of time.
         :param q_start: the start configuration; pairs that are too close there may separate.
         """
-        #: The first violation for which the goal is refused (True), and the first warning (False).
+        #: The first violation by whether its checker refuses (True) or only warns (False).
         found: dict[bool, Violation] = {}
         margin, description = inf, ''
         start = np.array([q_start])
@@ -207,7 +207,8 @@ class _InitialViolations:
         """
         Return whether each pair is refused in each row (rows, columns).
 
-        :param lower: the distances of the cylinders, which still change while the meshes touch.
+        :param lower: the distances of the cylinders; where meshes touch, they tell whether the
+            links separate.
         :param distances: the distances to compare with the bounds.
         """
         near = distances < self._bounds
@@ -267,8 +268,8 @@ class _SelfCollisionChecker:
         """
         Return the distances of cylinders, and those to compare with the bounds, (n, columns) each.
 
-        :param pending: whether a column needs exact distances; in other columns a distance below
-            the bound is returned as 0, which is faster.
+        :param pending: whether a column needs exact distances. Where a distance below the bound is
+            refused anyway, it is returned as 0 in the other columns, which is faster.
         """
         lower = self._bodies.distances(q, inf if pending.any() else self._bound)
         close = np.flatnonzero((lower < self._bound).any(axis=0))
@@ -278,7 +279,7 @@ class _SelfCollisionChecker:
         for column in close:
             pair = self._bodies.pairs[column]
             rows = np.flatnonzero(lower[:, column] < self._bound)
-            if pending[column]:
+            if pending[column] or not self.refuses:
                 distances[rows, column] = self._meshes.distances(pair, q[rows])
             else:
                 near, lower_bounds = self._meshes.nearer_than(self._bound, pair, q[rows])
@@ -366,7 +367,7 @@ class _PlaneChecker:
         else:
             text = f'{name} comes within {distance:.4f} m of the workspace plane "{plane.name}"'
         if plane.margin > 0.0:
-            text += f', its margin is {plane.margin:.4f} m'
+            text += f', whose margin is {plane.margin:.4f} m'
         return Violation(
             row=row,
             text=text,

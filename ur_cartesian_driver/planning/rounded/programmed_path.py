@@ -25,12 +25,15 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
 )
 from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.planning.geometry.blended_path import curves_of
-from ur_cartesian_driver.planning.geometry.samples import STEP_ANGLE, STEP_LENGTH
+from ur_cartesian_driver.planning.geometry.samples import (
+    check_sample_count,
+    STEP_ANGLE,
+    STEP_LENGTH,
+)
 from ur_cartesian_driver.planning.request.validate import arc_error
 from ur_cartesian_driver.planning.rounded.rounded_path import Polyline
-from ur_cartesian_driver.planning.spline.spline_path import check_sample_count
 
-#: Radius [m] at which a turn of the tool is measured as the length of an arc, for ``s``.
+#: A turn of the tool adds its angle times this radius [m] to the place ``s`` on the path.
 TURN_RADIUS = 0.05
 #: Allowed deviations of the set-points from lines, arcs and turns between corners [m], [rad].
 CURVE_BOUNDS = 1e-5, 2e-4
@@ -90,9 +93,9 @@ def programmed_sections(
     curves, faults = curves_of(goal.motions, goal.T_base_frame, starts, targets.copy())
     for row, fault in faults.items():
         raise arc_error(row, fault)
-    # Samples are never farther apart than this, so a path that needs too many is refused here.
-    steps = np.maximum(curves.length / STEP_LENGTH, curves.angle / STEP_ANGLE)
-    check_sample_count(steps, np.arange(n), CHECK_SPEEDS)
+    # With the largest spacing of samples, these are the fewest: an impossible path ends here.
+    fewest = np.maximum(curves.length / STEP_LENGTH, curves.angle / STEP_ANGLE)
+    check_sample_count(fewest, np.arange(n), CHECK_SPEEDS)
     count = curves.chord_counts(_CHORD_ERROR, _CHORD_TURN)
     last = np.cumsum(count)
     segment = np.repeat(np.arange(n), count)
@@ -118,9 +121,11 @@ def programmed_sections(
         own = slice(begin, int(last[end]) + 1)
         s = np.concatenate([[0.0], np.cumsum(steps[begin : own.stop - 1])])
         kept = np.append(True, steps[begin : own.stop - 1] > 0.0)
+        # A point that is given twice has the tighter bound of the two.
+        kept_bounds = np.minimum.reduceat(bounds[own], np.flatnonzero(kept))
         sections.append(
             ProgrammedSection(
-                polyline=Polyline(s=s[kept], rows=rows[own][kept], bounds=bounds[own][kept]),
+                polyline=Polyline(s=s[kept], rows=rows[own][kept], bounds=kept_bounds),
                 segments=np.arange(first, end + 1),
                 ends=s[last[first : end + 1] - begin],
             )

@@ -37,15 +37,15 @@ SWITCH_OUTPUT takes no time:
 =======  =====================================================================  =====
 
 The output kind 5 makes an analog output follow the speed of the tool until the output is switched
-again. A record of the output kind 4 gives the law for the next record of kind 5: it has no trigger
-pose although its word 16 is 1, and its words 0 - 4 are gain [1/(m/s)], offset, minimum, maximum
-and the time constant of the filter [s]. A record of the output kind 6 gives the lead of the next
-output, likewise: words 0 - 11 are the planned speeds from its place back to its trigger pose, word
-13 is the lead [s], 15 the way between the two [m or rad], and 17 is 1 if the tool only turns.
-Likewise a record of the output kind 7 gives the law of the pulses that begin with the next record
-of kind 8: words 0 - 7 are the distance between pulses [mm], the way to the first one [m], their
-width [s], their number in millions, the slot of their count, kind and pin of the output, and 1 if
-those that are left at the end of the trajectory are not given.
+again. Records of the output kinds 4, 6 and 7 give laws; their word 16 is 1 although they have no
+trigger pose. Kind 4 gives the law of the next record of kind 5: words 0 - 4 are gain [1/(m/s)],
+offset, minimum, maximum and the time constant of the filter [s]. Kind 6 gives the lead of the next
+output: words 0 - 11 are the planned speeds from that output's place back to its trigger pose, word
+13 is the lead [s], 15 the distance between place and trigger pose [m or rad], and 17 is 1 if the
+tool only turns. Kind 7 gives the law of the pulses that begin with the next record of kind 8:
+words 0 - 7 are the distance between pulses [mm], the way to the first one [m], their width [s],
+their number in millions, the slot of their count, kind and pin of the output, and 1 if those that
+are left at the end of the trajectory are not given.
 
 The stops, which only our own program knows, are motions during which the arm stands still.
 WAIT waits: word 18 is the time from the end of the previous motion until the next one may begin.
@@ -65,7 +65,7 @@ Words that the table does not list are zeros:
          [m, rad]
 6 - 11   PRESS_LAW: limits [m/s, rad/s; m, rad]; BEGIN_PRESS: 1 = compliant     S
 12, 13   PRESS_LAW: damping, gain scaling                                       S
-14, 15   PRESS_LAW: 1 = zero the force sensor; what contact ends                S
+14, 15   PRESS_LAW: 1 = zero the force sensor; effect of contact (ContactEnd)   S
 12       BEGIN_PRESS: 1 = the task frame follows the tool                       S
 18       WAIT: the time; AWAIT_INPUT: longest wait; CHANGE_PAYLOAD: transition  T
          [s]
@@ -174,7 +174,7 @@ class SplineKind(IntEnum):
 
 
 class FollowKind(IntEnum):
-    """Word 12 of a SWITCH_OUTPUT that has a law, or begins by one; else an OutputKind."""
+    """Word 12 of a SWITCH_OUTPUT that carries a law or starts an output by one."""
 
     LAW = 4
     BEGIN = 5
@@ -223,7 +223,7 @@ def _indexed(name: str, count: int = 6) -> tuple[str, ...]:
 
 
 def _group_names(*groups: Sequence[str], time: str = 'word 18') -> tuple[str, ...]:
-    """Return the names of a record whose words from 0, 6 and 12 on are groups; the rest is 0."""
+    """Return the field names of a record; groups name the words from 0, 6 and 12 on."""
     names = [f'word {i}' for i in range(18)]
     for first, group in zip((0, 6, 12), groups, strict=False):
         names[first : first + len(group)] = group
@@ -328,8 +328,9 @@ _STOPS: dict[type[Stop], MotionType] = {
 }
 #: Types whose word 18 is not the duration of a move.
 _WITH_DELAY = frozenset((MotionType.SWITCH_OUTPUT, *_STOPS.values()))
-#: The motion types of arcs; the types of all other moves with a velocity and an acceleration.
+#: Arcs.
 ARC_TYPES = frozenset(_ARC_TYPES.values())
+#: Moves other than arcs that have a velocity and an acceleration.
 MOVE_TYPES = frozenset(kind for kinds in _TYPES.values() for kind in kinds)
 _OPTIMOVES = frozenset((*_TYPES[OptimoveJ], *_TYPES[OptimoveL]))
 
@@ -459,7 +460,7 @@ def _output_kind(output: SwitchOutput) -> int:
 
 def _law_fields(law: SpeedLaw) -> PointFields:
     numbers = (law.gain, law.offset, law.minimum, law.maximum, law.filter_time, 0)
-    # The value is 1, because in a stop the robot program switches waiting outputs of value 0.
+    # At a stop, the robot program executes pending outputs of value 0; this record is none.
     switch = (FollowKind.LAW, 0, 1, 0, 1, 0)
     return (*numbers, *ZERO6, *switch, 0, 0, MotionType.SWITCH_OUTPUT)
 

@@ -14,8 +14,8 @@ The sender must
 * send the next point in time: the robot waits 0.5 s for it, but only one controller step while a
   spline moves. A late point means ``TrajectoryResult.FAILURE``;
 * keep sending reverse messages meanwhile, or the program halts;
-* end the trajectory at rest. After a START with their number, the robot sets the blend radius of
-  the last point to 0.
+* end the trajectory at rest. After a START, which announces the number of points, the robot sets
+  the blend radius of the last one to 0.
 
 The result of a trajectory is one int32: 0 success, 1 canceled, 2 failure; from our own program
 also 3 input missing, 4 contact, 5 no contact, 6 touched. It comes in a TCP segment of its own.
@@ -98,22 +98,22 @@ def encode_rows(rows: PlannedRows, dialect: Dialect = NEWEST_DIALECT) -> bytes:
     moves, records = rows.primitives, rows.records
     first = np.cumsum(records) - records
     fields = np.zeros((int(records.sum()), POINT_FIELDS))
-    fine = np.zeros(len(fields), dtype=np.bool_)
+    accepted = np.zeros(len(fields), dtype=np.bool_)
     others: dict[int, Instruction] = {}
     if isinstance(moves, SplineRows):
-        fields[first], fine[first] = spline_fields(moves), moves.durations > 0.0
+        fields[first], accepted[first] = spline_fields(moves), moves.durations > 0.0
     elif isinstance(moves, MoveRows):
         for begin in range(0, len(moves), _CHUNK):  # all at once would need twice the memory
             part = slice(begin, begin + _CHUNK)
             fields[first[part]] = move_fields(moves[part])
-        fine[first] = are_plain_moves(moves)
+        accepted[first] = are_plain_moves(moves)
         others |= {int(first[row]): move for row, move in moves.others.items()}
     else:
         others |= zip(first.tolist(), moves, strict=True)
-    fine &= dialect.accepts(fields)
+    accepted &= dialect.accepts(fields)
     for row, outputs in rows.outputs.items():
         others |= {int(first[row]) + 1 + k: output for k, output in enumerate(outputs)}
-    for record in np.flatnonzero(~fine).tolist():
+    for record in np.flatnonzero(~accepted).tolist():
         instruction = others.get(record) or moves[int(np.searchsorted(first, record))]
         fields[record] = _checked_fields(instruction, record, dialect)
     return encode_numbers(fields, dialect)

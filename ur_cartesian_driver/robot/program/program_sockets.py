@@ -34,7 +34,7 @@ from ur_cartesian_driver.protocol.program.script_command import (
 from ur_cartesian_driver.protocol.program.trajectory_points import TrajectoryResultDecoder
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.link_settings import LinkSettings
-from ur_cartesian_driver.robot.transport import TcpConnection, TcpListener
+from ur_cartesian_driver.robot.transport import ignore, TcpConnection, TcpListener
 
 _HAS_OLDER_PROGRAM = 'wire_dialect is set to an older program; play that one on the pendant'
 
@@ -91,12 +91,12 @@ class ProgramSockets:
         self._requests = script_sender.RequestDecoder()
         self._trajectory = self._program_port('trajectory_port', self._on_results)
         self._commands = self._program_port('script_command_port', self._on_contacts)
-        self._reverse = self._program_port('reverse_port', _ignore)
+        self._reverse = self._program_port('reverse_port', ignore)
         self._sender = TcpListener(
             'script_sender_port',
             on_open=self._on_sender_open,
             on_data=self._on_request,
-            on_closed=_ignore,
+            on_closed=ignore,
             on_refused=listener.warning,
         )
         self._program_ports = (self._trajectory, self._commands, self._reverse)
@@ -321,7 +321,3 @@ class ProgramSockets:
         for _ in range(wanted):
             if not connection.send_at_once(script_sender.reply(self.text)):
                 return
-
-
-def _ignore(_: object) -> None:
-    """Do nothing."""

@@ -17,7 +17,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_client import (
 )
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion, RtdeTextMessage
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe, RtdeValue, RtdeValues
-from ur_cartesian_driver.robot.transport import dial, TcpConnection
+from ur_cartesian_driver.robot.transport import dial, ignore, TcpConnection
 
 #: Longest duration of the handshake [s].
 ANSWER_TIMEOUT = 2.0
@@ -25,10 +25,6 @@ ANSWER_TIMEOUT = 2.0
 SILENCE_TIMEOUT = 1.0
 #: Level of text messages up to which they are warnings or errors.
 WARNING_LEVEL = 2
-
-
-def ignore(_: str) -> None:
-    """Do nothing with a text."""
 
 
 class RtdeConnection:

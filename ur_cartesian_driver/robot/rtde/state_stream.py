@@ -13,13 +13,14 @@ from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.state_age import STALE_TIMEOUT, StateAge
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
-from ur_cartesian_driver.robot.rtde.rtde_connection import ignore, RtdeConnection
+from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 from ur_cartesian_driver.robot.rtde.state_decoding import (
     in_recipe_order,
     OPTIONAL_FIELDS,
     robot_state_from_rtde,
     STATE_FIELDS,
 )
+from ur_cartesian_driver.robot.transport import ignore
 
 
 class StateStream(RtdeConnection):

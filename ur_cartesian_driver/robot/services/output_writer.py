@@ -26,8 +26,8 @@ from ur_cartesian_driver.robot.services.rtde_input_writer import (
 )
 from ur_cartesian_driver.robot.services.service_calls import SetOutputCall
 
-#: How long a write with its attempts may take, while the end of a goal waits for it [s]; pause
-#: before another attempt [s], because the inputs of a closed connection are not free at once.
+#: Longest time for the outputs of one kind, with all attempts; a goal that ends waits for it [s].
+#: Pause before another attempt [s]: the inputs of a closed connection are not free at once.
 WRITE_TIMEOUT, RETRY_PERIOD = 0.25, 0.02
 
 
@@ -37,7 +37,7 @@ async def write_outputs(
     """
     Write the values of outputs; return the outputs that have changed, and the failures.
 
-    :param before: the outputs before the first attempt, kept for the next one; empty at first.
+    :param before: filled with the outputs before the first attempt; the same for each attempt.
     """
     by_kind: dict[int, list[SafeOutput]] = {}
     for output in outputs:
@@ -72,8 +72,7 @@ async def _write(
         done = False
     if not done:
         names = ' and '.join(output_name(output.output, output.pin) for output in outputs)
-        verb = 'is as it was' if len(outputs) == 1 else 'are as they were'
-        return [], f'The {names} {verb}, or not known to be safe: {reason}.'
+        return [], f'The {names} may not have been set: {reason}.'
     old_calls = [value_before(call, before) for call in calls]
     return [
         replace(output, value=old.value, domain=old.domain)

@@ -45,7 +45,7 @@ STEP_TIMEOUT = 35.0
 DISCONNECTED_TIMEOUT = 2.0
 #: How long the reports of a robot may contradict each other after a change [s].
 SETTLING_TIMEOUT = 0.3
-#: Pause before an unlock that came too early is repeated [s]; longest time of repetitions [s].
+#: Period of attempts to unlock [s]; how long an unlock that comes too early is repeated [s].
 UNLOCK_RETRY_PERIOD, UNLOCK_TIMEOUT = 0.5, 6.0
 
 #: Dashboard commands of the steps of a recovery; the last command is the step itself.
@@ -110,16 +110,18 @@ class RecoveryRunner:
 
         loop = asyncio.get_running_loop()
         last_step_time = loop.time()
+        was_connected = False
         while True:
+            was_connected = was_connected or self._link.robot is not None
             upcoming = await self._settled_step(situation)
             if upcoming.step is RecoveryStep.DONE:
                 return succeeded(_report(done, upcoming.text))
             if upcoming.step is RecoveryStep.OPERATOR:
                 return failed(_report(done, upcoming.text))
             if upcoming.step is RecoveryStep.WAIT:
-                # A robot that was not connected at the start is not waited for as long.
-                lost = self._link.robot is None and not done
-                if loop.time() - last_step_time > (DISCONNECTED_TIMEOUT if lost else STEP_TIMEOUT):
+                # A robot that has not been connected is not waited for as long.
+                timeout = STEP_TIMEOUT if was_connected else DISCONNECTED_TIMEOUT
+                if loop.time() - last_step_time > timeout:
                     return failed(_report(done, upcoming.text or describe_modes(self._link)))
                 await asyncio.sleep(POLL_PERIOD)
                 continue
@@ -140,7 +142,7 @@ class RecoveryRunner:
 
     async def _settled_step(self, situation: Callable[[], RecoverySituation]) -> NextStep:
         """
-        Return the next step; wait a while before one for a person, which may prove unnecessary.
+        Return the next step; before one for a person, wait for reports that make it unnecessary.
 
         Sockets and robot state show a change at different times, and a program that has just been
         started has not connected yet.
@@ -196,7 +198,7 @@ class RecoveryRunner:
             )
         ):
             return failed(
-                'it plays, but did not reach its External Control node within '
+                'the program runs, but did not reach its External Control node within '
                 f'{EFFECT_TIMEOUT:g} s.'
             )
         return answer
@@ -204,7 +206,8 @@ class RecoveryRunner:
     async def _do_without_dashboard(
         self, step: RecoveryStep, effect: ExpectedEffect
     ) -> ServiceAnswer:
-        for _ in range(2):  # an unlock is refused for 5 s after the stop
+        # An unlock is refused for 5 s after the stop: the first wait outlasts them.
+        for _ in range(2):
             if not self._link.control.send_primary(
                 PRIMARY_COMMANDS[step],
                 lambda: self._link.robot is not None and not effect.is_reached(self._link.robot),

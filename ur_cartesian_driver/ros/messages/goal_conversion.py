@@ -37,7 +37,7 @@ def goal_from_message(
 
     :param now: time of the node's clock when the goal was received [ns].
     :param snapshot: pose of the arm; None if it is not known.
-    :param time_tolerance: the value for a ``goal_time_tolerance`` of zero [s].
+    :param time_tolerance: the tolerance of a goal whose ``goal_time_tolerance`` is 0 [s].
     :raises InvalidGoal: a frame is unknown, or a number is not in its enumeration; the text names
         the field.
     :raises RobotNotReady: a frame moves with the arm, whose pose is not known.
@@ -83,7 +83,7 @@ def resolve_frames(
     goal: Goal, trajectory: Message, frames: Frames, *, now: int, snapshot: ArmSnapshot | None
 ) -> Goal:
     """
-    Return a goal with its frames resolved to their present poses.
+    Return a goal with its frames resolved.
 
     Transforms of tf2 are those at the goal's stamp; the newest ones if the goal has no stamp, or
     while the stamp lies in the future.

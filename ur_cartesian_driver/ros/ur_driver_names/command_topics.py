@@ -46,8 +46,8 @@ class _FreedriveSwitch:
     ) -> None:
         self._row, self._driver = row, driver
         self._is_wanted = self._is_calling = False
-        #: What the driver has confirmed; None = unknown.
-        self._confirmed: bool | None = False
+        #: Whether freedrive may be on: the driver was asked for it, and has not confirmed its end.
+        self._may_be_on = False
         self._watchdog = steady_timer(driver.node, settings.freedrive_timeout, self._late)
         self._watchdog.cancel()
         driver.on_close(self._end)
@@ -57,7 +57,6 @@ class _FreedriveSwitch:
     def _take(self, message: Message) -> None:
         if message.data:
             self._watchdog.reset()
-            self._confirmed = None  # a stop of the program ends freedrive
         else:
             self._watchdog.cancel()
         self._is_wanted = message.data
@@ -65,7 +64,7 @@ class _FreedriveSwitch:
 
     def _end(self) -> None:
         """Switch freedrive off, because nobody is left who could."""
-        if self._is_wanted or self._confirmed is not False:
+        if self._may_be_on:
             self._driver.call(SetBool, self._row.source, SetBool.Request(data=False))
 
     def _late(self) -> None:
@@ -76,17 +75,21 @@ class _FreedriveSwitch:
         self._follow()
 
     def _follow(self) -> None:
-        """Make the driver do what is wanted, unless a request is pending."""
+        """
+        Make the driver do what is wanted, unless a request is pending.
+
+        'On' is repeated with each message, because a stop of the program ends freedrive.
+        """
         on = self._is_wanted
-        if self._is_calling or on == self._confirmed:
+        if self._is_calling or not (on or self._may_be_on):
             return
-        self._is_calling = True
+        self._is_calling = self._may_be_on = True
         answer = self._driver.call(SetBool, self._row.source, SetBool.Request(data=on))
         answer.add_done_callback(lambda done: self._switched(on, done.result()))
 
     def _switched(self, on: bool, answer: ServiceAnswer) -> None:
         self._is_calling = False
-        self._confirmed = on if answer.ok else None
+        self._may_be_on = on or not answer.ok
         if not answer.ok:
             self._driver.warn(f'{self._row.name}: {answer.text}')
             if not self._is_wanted and not on:

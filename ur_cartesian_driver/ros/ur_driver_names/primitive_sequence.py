@@ -5,8 +5,8 @@ A sequence of motion primitives as a goal: primitive i becomes point i and segme
 
 The fields mean what they mean to motion_primitives_controllers and the UR driver's hardware
 interface: an arc has its goal first and its via second, joint positions are in the order of the
-arm, and a move_time of more than 0 replaces velocity and acceleration, except on an arc. What
-those silently ignore is refused here.
+arm, and a move_time of more than 0 replaces velocity and acceleration; an arc that has both is
+executed at its velocity.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def goal_of_sequence(motions: Sequence[Message], tf_prefix: str) -> Goal:
     """
     Return the goal for the ``motions`` of a ``MotionPrimitiveSequence``.
 
-    :param tf_prefix: of the driver's joints.
+    :param tf_prefix: the prefix of the driver's joint and frame names.
     :raises InvalidGoal: the sequence is empty, or a primitive cannot be executed as it says; the
         text names the primitive and its field.
     """
@@ -62,7 +62,7 @@ def goal_of_sequence(motions: Sequence[Message], tf_prefix: str) -> Goal:
 
 def check_targets(motions: Sequence[Message]) -> None:
     """
-    Refuse what the controller rejects: no primitives, an unknown type, wrong targets of a type.
+    Refuse what the controller rejects: no primitives, unknown types, targets that do not suit one.
 
     :raises InvalidGoal: the text names the primitive and its field.
     """
@@ -74,7 +74,7 @@ def check_targets(motions: Sequence[Message]) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Primitive:
-    """A primitive whose own fields are in order."""
+    """A primitive whose fields have been checked, but not yet beside those of the others."""
 
     index: int
     message: Message
@@ -161,13 +161,13 @@ def _check_targets(index: int, message: Message) -> None:
         raise InvalidGoal(
             _field(index, 'poses'),
             f'has {poses} entries, but a {name} primitive takes {wanted}',
-            'give them' if is_arc else 'give it, or joint_positions',
+            'give just these' if is_arc else 'give just one, or joint_positions',
         )
 
 
 def _arguments(index: int, message: Message) -> Mapping[str, float]:
     """Return the additional arguments by name; 0 = not given."""
-    found = dict.fromkeys(_ARGUMENTS, 0.0)
+    found, given = dict.fromkeys(_ARGUMENTS, 0.0), set[str]()
     for argument in message.additional_arguments:
         field = f"{_field(index, 'additional_arguments')} '{argument.name}'"
         if argument.name not in found:
@@ -178,6 +178,9 @@ def _arguments(index: int, message: Message) -> Mapping[str, float]:
                 f'is {argument.value:g}, but must be from 0 to {_MAX_ARGUMENT:g}',
                 'correct it',
             )
+        if argument.name in given:
+            raise InvalidGoal(field, 'is given twice', 'give it once')
+        given.add(argument.name)
         found[argument.name] = argument.value
     return found
 
@@ -192,12 +195,13 @@ def _check_times(primitives: Iterable[_Primitive]) -> None:
                 _field(other.index, 'additional_arguments'),
                 f'cannot be combined: primitive {with_time.index} has a move_time and primitive '
                 f'{without.index} a speed, but a goal has times at all its points or at none',
-                'give each primitive a move_time, or none',
+                'give each primitive a move_time, or none; an arc that has a velocity and an '
+                'acceleration as well is executed at those',
             )
 
 
 def _frame(primitives: Iterable[_Primitive], base: str) -> str:
-    """Return the frame of all poses; empty = the base of the controller, also by its name."""
+    """Return the frame of all poses; '' = the controller's base, left empty or named."""
     first: str | None = None
     for primitive in primitives:
         for k, pose in enumerate(primitive.message.poses):

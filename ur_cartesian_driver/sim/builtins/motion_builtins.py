@@ -249,11 +249,14 @@ class ModeBuiltins(BuiltinGroup):
         frame = pose(task_frame, 'task_frame')
         compliant = tuple(flag != 0.0 for flag in six(selection_vector, 'selection_vector'))
         one_of(type, 'type', (1, 2, 3))
+        bounds = six(limits, 'limits')
+        for i, bound in enumerate(bounds):
+            not_negative(bound, f'limits[{i}]')
         self._controller.contact.force_mode = ForceMode(
             q_base_task=frame.quaternion,
             compliant=compliant,
             wrench=six(wrench, 'wrench'),
-            limits=six(limits, 'limits'),
+            limits=bounds,
         )
 
     def end_force_mode(self) -> None:

@@ -19,15 +19,14 @@ from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets, SocketState
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
-from ur_cartesian_driver.urscript.script_values import to_text, Value
+from ur_cartesian_driver.urscript.script_values import INT_MAX, INT_MIN, to_text, Value
 
 CONNECT_TIMEOUT = 2.0
 #: Largest number of reads of one socket in a cycle; a further read waits for the next
-#: cycle. With TCP's flow control, this bound holds back a peer that writes without a pause, so
-#: that the program can do its other work. The bound of a real controller is not published.
+#: cycle. Without it, a peer that never stops writing would keep the program reading for ever; with
+#: it, TCP's flow control slows the peer down. The bound of a real controller is not published.
 READS_PER_CYCLE = 32
-#: Largest number of values in one read of numbers, and of characters in one string that is read
-#: without a suffix.
+#: Most values in one read of numbers; most characters in one string that is read without a suffix.
 MAX_NUMBERS, MAX_CHARACTERS = 30, 1023
 MAX_PORT = 65_535
 
@@ -79,7 +78,7 @@ class SocketBuiltins(BuiltinGroup):
         limit = number(timeout, 'timeout')
         deadline = self._now + limit if limit > 0.0 else float('inf')
         name_ = text(name, 'socket_name')
-        if self._has_read_enough(name_):
+        if self._count_read(name_):
             yield
         while True:
             found = take(self._sockets.received(name_))
@@ -89,14 +88,13 @@ class SocketBuiltins(BuiltinGroup):
                 return None
             yield
 
-    def _has_read_enough(self, name: str) -> bool:
-        """Count a read; return whether this read has to wait for the next cycle."""
+    def _count_read(self, name: str) -> bool:
+        """Count a read of any thread; return whether it has to wait for the next cycle."""
         now = self._controller.cycles
-        cycle, reads = self._reads.get(name, (now, 0))
-        reads = reads + 1 if cycle == now else 1
-        enough = reads > READS_PER_CYCLE
-        self._reads[name] = (now + 1, 1) if enough else (now, reads)
-        return enough
+        cycle, reads = max(self._reads.get(name, (now, 0)), (now, 0))
+        cycle, reads = (cycle, reads + 1) if reads < READS_PER_CYCLE else (cycle + 1, 1)
+        self._reads[name] = cycle, reads
+        return cycle > now
 
     def socket_read_binary_integer(
         self, number: Value, socket_name: Value = 'socket_0', timeout: Value = 2
@@ -153,18 +151,19 @@ class SocketBuiltins(BuiltinGroup):
     def socket_get_var(
         self, name: Value, socket_name: Value = 'socket_0'
     ) -> Generator[None, None, int]:
-        """Send `GET name`; return the value in the answer `name value`; on failure 0."""
-        self._send(f'GET {text(name, "name")}\n'.encode('latin-1'), socket_name)
+        """Send `GET name`; return the integer in the answer `name value`; on failure 0."""
+        self._send(f'GET {text(name, "name")}\n'.encode('latin-1', 'replace'), socket_name)
         answer = yield from self.socket_read_line(socket_name)
         try:
-            return int(float(answer.split()[1]))
-        except (IndexError, ValueError):
+            value = int(float(answer.split()[1]))
+        except (IndexError, ValueError, OverflowError):
             return 0
+        return value if INT_MIN <= value <= INT_MAX else 0
 
     def socket_set_var(self, name: Value, value: Value, socket_name: Value = 'socket_0') -> None:
         """Send `SET name value`."""
         line = f'SET {text(name, "name")} {whole(value, "value")}\n'
-        self._send(line.encode('latin-1'), socket_name)
+        self._send(line.encode('latin-1', 'replace'), socket_name)
 
     def socket_send_int(self, value: Value, socket_name: Value = 'socket_0') -> bool:
         """Send a 32 bit integer in network order."""
@@ -195,7 +194,14 @@ def _count(value: Value) -> int:
 
 def _bytes(value: Value, interpret_escape: Value) -> bytes:
     raw = text(value, 'prefix or suffix').encode('latin-1', 'replace')
-    return raw.decode('unicode_escape').encode('latin-1', 'replace') if interpret_escape else raw
+    if not interpret_escape:
+        return raw
+    try:
+        return raw.decode('unicode_escape').encode('latin-1', 'replace')
+    except UnicodeDecodeError:
+        raise RuntimeException(
+            f'the prefix or suffix {raw.decode("latin-1")!r} has an unfinished escape sequence'
+        ) from None
 
 
 def _take(received: bytearray, size: int) -> bytes:

@@ -82,7 +82,7 @@ class _WordReader:
         return self.take()
 
     def name(self) -> str:
-        if not self.peek().isidentifier():
+        if not self.peek().isidentifier() or self.peek() in ('at', 'for'):
             raise self.wrong('the name of an interface, such as rtde')
         return self.take()
 
@@ -121,7 +121,10 @@ def _read_seconds(words: _WordReader) -> float:
 def _read_size(words: _WordReader) -> int:
     if words.peek() in ('at', _END):
         return GARBAGE_SIZE
-    return int(words.number('a number of bytes'))
+    size = words.number('a number of bytes')
+    if not size.is_integer():
+        raise words.wrong('a whole number of bytes', f'{size:g}')
+    return int(size)
 
 
 _INTERFACE: dict[str, Reader] = {'interface': _WordReader.name}
@@ -170,15 +173,24 @@ def parse_fault(text: str) -> Fault:
     make, readers = _KINDS[words.take()]
     fields = {name: read(words) for name, read in readers.items()}
     has_duration = issubclass(make, DeviationFault | LastingInterfaceFault)
-    if words.skip('at'):
-        fields['trigger'] = _read_trigger(words)
-    if has_duration and words.skip('for'):
-        fields['duration'] = words.number('a time in seconds')
-        if not words.skip('s'):
-            raise words.wrong("'s'")
+    endings: dict[str, tuple[str, Reader]] = {'at': ('trigger', _read_trigger)}
+    if has_duration:
+        endings['for'] = 'duration', _read_duration
+    while words.peek() in endings:
+        name, read = endings.pop(words.take())
+        fields[name] = read(words)
     if words.peek() != _END:
-        raise words.wrong("'at', 'for' or the end" if has_duration else "'at' or the end")
+        raise words.wrong(' or '.join((*(f"'{word}'" for word in endings), 'the end')))
     return make(**fields)
+
+
+def _read_duration(words: _WordReader) -> float:
+    seconds = words.number('a time in seconds')
+    if seconds <= 0.0:
+        raise words.wrong('a time greater than 0', f'{seconds:g}')
+    if not words.skip('s'):
+        raise words.wrong("'s'")
+    return seconds
 
 
 def _read_trigger(words: _WordReader) -> FaultTrigger:

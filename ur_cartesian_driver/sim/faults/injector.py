@@ -109,19 +109,25 @@ class FaultInjector:
         self._impaired: dict[str, Impairment] = {}
         self._travelled = 0.0
 
-    def add(self, fault: Fault) -> None:
+    def add(self, *faults: Fault) -> None:
         """
-        Set a fault; it happens when it is triggered, in the next cycle at the earliest.
+        Set faults; each happens when it is triggered, in the next cycle at the earliest.
 
-        :raises ValueError: the robot has no such interface.
+        :raises ValueError: the robot has no such interface; none of the faults is set.
         """
-        if isinstance(fault, InterfaceFault) and fault.interface not in self.interfaces:
-            known = ', '.join(self.interfaces) or 'none'
-            raise ValueError(f'The robot has no interface {fault.interface!r}; it has {known}.')
-        trigger = fault.trigger
-        side = isinstance(trigger, PlaneCrossing) and self._is_beyond(trigger)
-        self._pending.append(_PendingFault(fault, self._controller.time, self._travelled, side))
-        self.active = True
+        for fault in faults:
+            if isinstance(fault, InterfaceFault) and fault.interface not in self.interfaces:
+                known = ', '.join(self.interfaces) or 'none'
+                raise ValueError(
+                    f'The robot has no interface {fault.interface!r}; it has {known}.'
+                )
+        for fault in faults:
+            trigger = fault.trigger
+            side = isinstance(trigger, PlaneCrossing) and self._is_beyond(trigger)
+            self._pending.append(
+                _PendingFault(fault, self._controller.time, self._travelled, side)
+            )
+            self.active = True
 
     def clear(self) -> None:
         """

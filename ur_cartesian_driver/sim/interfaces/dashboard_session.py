@@ -8,7 +8,8 @@ A command that this version of the robot's software lacks is answered like an un
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections import deque
+from collections.abc import Callable, Generator, Mapping
 import logging
 from pathlib import PurePosixPath
 
@@ -67,7 +68,8 @@ class DashboardHandlers:
     """
     The effects of the commands on a controller and its pendant.
 
-    A method that carries out a command returns None for success, otherwise the reply.
+    A method that carries out a command returns None for success, otherwise the reply. A method
+    that has to wait for the robot is a generator, which returns the same.
     """
 
     def __init__(self, controller: Controller) -> None:
@@ -105,10 +107,14 @@ class DashboardHandlers:
 
     # Effects of commands
 
-    def load(self, name: str) -> str | None:
+    def load(self, name: str) -> Generator[None, None, str | None]:
         """Load a program; quotation marks, which some clients put around the name, are removed."""
         name = name.strip('"')
-        refusal = self.controller.load_program(name)
+        refusals: list[str] = []
+        self.controller.load_program_aside(name, refusals.append)
+        while not refusals:
+            yield
+        refusal = refusals[0]
         if not refusal or refusal.startswith('File not found'):
             return refusal or None
         # A real robot's reply gives no reason; only its pendant does.
@@ -180,8 +186,13 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = {
     'shutdown': Controller.power_off,
     'close popup': Controller.close_popups,
 }
+#: Commands that are answered when the program has left a state: the manufacturer's page for CB3
+#: says that they return when stopping or pausing is completed; assumed for e-Series.
+_AWAITED = {'stop': RuntimeState.STOPPING, 'pause': RuntimeState.PAUSING}
 #: Handlers of commands that need more than a call of the controller; all others only reply.
-_HANDLERS: Mapping[str, Callable[[DashboardHandlers, str], str | None]] = {
+_HANDLERS: Mapping[
+    str, Callable[[DashboardHandlers, str], str | Generator[None, None, str | None] | None]
+] = {
     'load': DashboardHandlers.load,
     'load installation': DashboardHandlers.load_installation,
     'unlock protective stop': DashboardHandlers.unlock,
@@ -218,7 +229,7 @@ _VALUES: Mapping[str, str] = {
 
 
 class DashboardSession(ClientSession):
-    """Answers the commands that the software of this robot has."""
+    """Answers one command after the other, some of them when the robot has carried them out."""
 
     def __init__(self, controller: Controller) -> None:
         """Begin with the right to control that the client has on connecting."""
@@ -226,21 +237,35 @@ class DashboardSession(ClientSession):
         self._may_control = controller.takes_scripts
         self._handlers = DashboardHandlers(controller)
         self._server = DashboardServerCodec(controller.config.version[:2])
+        self._requests: deque[DashboardRequest | str] = deque()
+        #: The answer to the first request, while it is being made.
+        self._answering: Generator[None, None, bytes] | None = None
 
     def open(self) -> bytes:
         """Return the greeting."""
         return encode_line(BANNER)
 
     def feed(self, data: bytes) -> bytes:
-        """Answer each line with one line."""
+        """Take a part of a line; return the answers that are available, one line to each line."""
+        if data:
+            self._requests += self._server.feed(data)
         answers = b''
-        for request in self._server.feed(data):
-            answers += self._answer(request)
-            if request == _QUIT:
+        while self._requests:
+            if self._answering is None:
+                self._answering = self._answer(self._requests[0])
+            try:
+                next(self._answering)
+            except StopIteration as answer:
+                answers += answer.value
+            else:
+                break
+            self._answering = None
+            if self._requests.popleft() == _QUIT:
                 raise HangUp(answers)
         return answers
 
-    def _answer(self, request: DashboardRequest | str) -> bytes:
+    def _answer(self, request: DashboardRequest | str) -> Generator[None, None, bytes]:
+        """Carry out a request, and return the answer."""
         if isinstance(request, str):
             return not_understood(request)
         name, argument = request.name, request.argument
@@ -249,6 +274,12 @@ class DashboardSession(ClientSession):
             return encode_line(_LOCAL_CONTROL)
         if (control := _CONTROL.get(name)) and control(self._handlers.controller):
             return encode_line(f'Failed to execute: {name}')
-        if (handler := _HANDLERS.get(name)) and (refusal := handler(self._handlers, argument)):
-            return encode_line(refusal)
+        while name in _AWAITED and self._handlers.programs.state is _AWAITED[name]:
+            yield
+        if handler := _HANDLERS.get(name):
+            refusal = handler(self._handlers, argument)
+            if isinstance(refusal, Generator):
+                refusal = yield from refusal
+            if refusal:
+                return encode_line(refusal)
         return success(request, _VALUES.get(name, '{1}').format(self._handlers, argument))

@@ -7,6 +7,7 @@ from __future__ import annotations
 from ur_cartesian_driver.protocol.framing import LineBuffer
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.interfaces.tcp_server import ClientSession
+from ur_cartesian_driver.sim.programs.script_upload import SCRIPT_ENCODING
 
 #: Longest line [bytes]; a line can contain a whole function.
 _MAX_LINE_LENGTH = 1024 * 1024
@@ -18,7 +19,7 @@ class InterpreterSession(ClientSession):
     def __init__(self, controller: Controller) -> None:
         """Wait for statements."""
         self._interpreter_mode = controller.interpreter_mode
-        self._lines = LineBuffer(_MAX_LINE_LENGTH)
+        self._lines = LineBuffer(_MAX_LINE_LENGTH, SCRIPT_ENCODING)
         self._answers: list[str] = []
 
     def feed(self, data: bytes) -> bytes:
@@ -31,4 +32,5 @@ class InterpreterSession(ClientSession):
         """Return the answers since the last call."""
         text = ''.join(f'{answer}\n' for answer in self._answers)
         self._answers.clear()
-        return text.encode()
+        # An answer can quote a message of ours, which is not limited to this encoding.
+        return text.encode(SCRIPT_ENCODING, 'replace')

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ur_cartesian_driver.motion.state.rtde_state import RobotStatus, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotStatus, SafetyMode
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     encode_message,
     encode_state,
@@ -30,6 +30,7 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
     ToolModeInfo,
 )
 from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.programs.program_runner import PAUSED
 from ur_cartesian_driver.sim.rtde_output_values import COMPUTED, FIXED
 
 #: Field of a sub-package -> RTDE output with the same meaning.
@@ -58,7 +59,7 @@ NO_TIMESTAMP = 2**64 - 1
 STATE_RATE = 10.0
 #: Reported limit of the joint accelerations [rad/s^2], as recorded on a UR5e.
 _JOINT_ACCELERATION = 40.0
-#: Type of the robot -> type of its controller box; the boxes of other robots are not known.
+#: Type of the robot -> type of its controller box; unknown for other robots, which report 4.
 _CONTROLLER_BOXES = {1: 4, 2: 5, 3: 6, 4: 16, 7: 10, 8: 11}
 _EMERGENCY = frozenset({SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP})
 #: Position limit [rad] that is sent for an endless joint, instead of infinity.
@@ -81,7 +82,7 @@ def version_frame(controller: Controller) -> bytes:
 
 
 class PrimaryStream:
-    """The data for all clients: messages at once, states periodically and at mode changes."""
+    """The data for all clients: messages at once, states periodically and at safety changes."""
 
     def __init__(self, controller: Controller) -> None:
         """Compute the sub-packages that never change."""
@@ -127,7 +128,7 @@ class PrimaryStream:
 
 def _mode(controller: Controller) -> RobotModeData:
     state, safety = controller.programs.state, controller.safety.mode
-    paused = state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
+    paused = state in PAUSED
     return RobotModeData(
         timestamp=round(controller.timestamp * 1e6),
         power_on=bool(controller.robot_status & RobotStatus.POWER_ON),

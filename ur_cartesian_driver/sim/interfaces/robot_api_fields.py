@@ -1,15 +1,18 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The fields of requests to the Robot API, and of its refusals."""
+"""The fields of requests to the Robot API, its refusals, and answers that wait."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from email.parser import BytesParser
 from email.policy import HTTP
 from http import HTTPStatus
 import json
 from typing import Any
+
+from ur_cartesian_driver.sim.controller import Controller
 
 #: Fields of a request; those of a form are bytes.
 Body = Mapping[str, Any]
@@ -24,6 +27,15 @@ class Refused(Exception):
         """Take the status and the fields of the answer."""
         super().__init__(message)
         self.status, self.fields = status, {'message': message, **fields}
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """A request whose answer is due when the robot has carried it out, or cannot."""
+
+    #: Raises `Refused` if the request has failed.
+    is_done: Callable[[Controller], bool]
+    message: str
 
 
 def read_body(data: bytes, content_type: str) -> Body:

@@ -14,6 +14,7 @@ from ur_cartesian_driver.sim.interfaces.robot_api_fields import (
     Fields,
     Refused,
     text_field,
+    Waiting,
 )
 from ur_cartesian_driver.sim.pendant_programs.program_tree import UnreadableProgram
 from ur_cartesian_driver.sim.programs.stored_programs import read_urpx
@@ -64,15 +65,24 @@ def update_program(controller: Controller, body: Body) -> Fields:
     return {'programName': name, 'message': 'Program updated'}
 
 
-def load_program(field: str) -> Callable[[Controller, Body], Fields]:
+def load_program(field: str) -> Callable[[Controller, Body], Waiting]:
     """Return the handler that loads the program whose name is in a field."""
 
-    def load(controller: Controller, body: Body) -> Fields:
+    def load(controller: Controller, body: Body) -> Waiting:
         name = text_field(body, field)
         file = controller.stored_programs.names().get(name, '')
-        if error := controller.load_program(file) if file else f'No program {name!r}':
-            raise Refused(HTTPStatus.INTERNAL_SERVER_ERROR, 'Error', details=error)
-        return {'message': 'Program loaded'}
+        refusals: list[str] = []
+        if file:
+            controller.load_program_aside(file, refusals.append)
+        else:
+            refusals.append(f'No program {name!r}')
+
+        def is_done(_: Controller) -> bool:
+            if any(refusals):
+                raise Refused(HTTPStatus.INTERNAL_SERVER_ERROR, 'Error', details=refusals[0])
+            return bool(refusals)
+
+        return Waiting(is_done, 'Program loaded')
 
     return load
 

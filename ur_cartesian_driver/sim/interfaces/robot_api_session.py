@@ -10,7 +10,6 @@ mistakes in it. doc/simulation.md states the sources and the assumptions.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from http import HTTPStatus
 from http.client import HTTPException, parse_headers
@@ -29,6 +28,7 @@ from ur_cartesian_driver.sim.interfaces.robot_api_fields import (
     read_body,
     Refused,
     text_field,
+    Waiting,
 )
 from ur_cartesian_driver.sim.interfaces.robot_api_programs import (
     download_program,
@@ -60,15 +60,6 @@ _FORBIDDEN = {
     'message': 'Forbidden',
     'details': 'Not authorized to perform this operation under the current robot control mode.',
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Waiting:
-    """A request whose answer is due when the robot has carried it out, or cannot."""
-
-    #: Raises `Refused` if the request has failed.
-    is_done: Callable[[Controller], bool]
-    message: str
 
 
 Handler = Callable[[Controller, Body], 'Fields | Waiting']

@@ -30,8 +30,9 @@ from ur_cartesian_driver.urscript import (
 
 #: Bound on statements that wait to be compiled or executed; a robot accepts about as many.
 MAX_QUEUED_STATEMENTS = 500
-#: A statement that calls one of these functions is executed before the next one is compiled.
-_CLOSING = frozenset({'clear_interpreter', 'end_interpreter'})
+#: A statement that calls one of these functions, and not within another statement, is executed
+#: before the next one is compiled.
+_BARRIERS = frozenset({'clear_interpreter', 'end_interpreter'})
 
 AnswerCallback = Callable[[str], None]
 
@@ -65,8 +66,10 @@ class InterpreterMode:
         self._interpreter: ScriptInterpreter | None = None
         self._interpreted = self._executed = self._cleared = 0
         self._closing = self._clear_wanted = self._end_wanted = False
+        #: Whether the statement that is executed clears or ends the mode.
+        self._is_running_barrier = False
         self._queue.clear()
-        self._discard_queued('the program has ended')
+        self._discard_waiting('the program has ended')
 
     # What clients send
 
@@ -87,7 +90,7 @@ class InterpreterMode:
             )
         elif statement.strip():
             self._uncompiled.append((statement, answer))
-            self._compile_queued()
+            self._compile_waiting()
 
     def _abort(self) -> str:
         self._ownership.abort()
@@ -95,11 +98,11 @@ class InterpreterMode:
 
     def _skip(self) -> str:
         self._queue.clear()
-        self._closing = False  # a statement that clears or ends the mode may be gone
-        self._compile_queued()
+        self._closing = self._is_running_barrier
+        self._compile_waiting()
         return f'ack: {self._interpreted}'
 
-    def _compile_queued(self) -> None:
+    def _compile_waiting(self) -> None:
         """Compile and answer waiting statements, up to one that clears or ends the mode."""
         while self._interpreter is not None and self._uncompiled and not self._closing:
             statement, answer = self._uncompiled.popleft()
@@ -110,10 +113,10 @@ class InterpreterMode:
                 continue
             self._interpreted += 1
             self._queue.append((self._interpreted, line))
-            self._closing = bool(line.calls & _CLOSING)
+            self._closing = bool(line.calls & _BARRIERS)
             answer(f'ack: {self._interpreted}: {statement}')
 
-    def _discard_queued(self, reason: str) -> None:
+    def _discard_waiting(self, reason: str) -> None:
         while self._uncompiled:
             statement, answer = self._uncompiled.popleft()
             answer(f'discard: {reason}: {statement}')
@@ -130,17 +133,21 @@ class InterpreterMode:
         """
         interpreter = self._programs.interpreter
         if interpreter is None or interpreter.current_thread != 0 or self._interpreter is not None:
-            raise RuntimeException('interpreter_mode is only possible in the main thread, once.')
+            raise RuntimeException(
+                'interpreter_mode is only possible in the main thread, and not from within itself.'
+            )
         if clear_queue:
-            self._discard_queued('the queue was cleared')
+            self._discard_waiting('the queue was cleared')
         self._interpreter = interpreter
         self._end_wanted = self._clear_wanted = self._closing = False
         first_thread = interpreter.threads_started
-        self._compile_queued()
+        self._compile_waiting()
         while not self._end_wanted:
             if self._queue:
                 self._executed, line = self._queue.popleft()
+                self._is_running_barrier = bool(line.calls & _BARRIERS)
                 yield from line.steps
+                self._is_running_barrier = False
             else:
                 yield
             if self._clear_wanted:
@@ -166,4 +173,4 @@ class InterpreterMode:
         self._cleared = self._interpreted
         self._closing = self._clear_wanted = False
         if not self._end_wanted:
-            self._compile_queued()
+            self._compile_waiting()

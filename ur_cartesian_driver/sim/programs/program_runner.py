@@ -49,10 +49,11 @@ _parse_cached = lru_cache(maxsize=8)(parse)
 _compiled: dict[Hashable, tuple[ScriptProgram, GeneratedCode]] = {}
 MAX_COMPILED = 8
 
-#: States of a program that has not ended.
-RUNNING = frozenset(
-    {RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING}
-)
+#: States in which a program is paused; in which the arm stands still or slows down to a
+#: standstill; and in which a program has not ended.
+PAUSED = frozenset({RuntimeState.PAUSING, RuntimeState.PAUSED})
+HELD = PAUSED | {RuntimeState.RESUMING}
+RUNNING = HELD | {RuntimeState.PLAYING}
 
 
 class CompiledProgram(NamedTuple):
@@ -69,7 +70,8 @@ class CompileAside(Protocol):
         """Do the work, and call ``then`` with its result."""
 
 
-def _compile_at_once(work: Callable[[], T], then: Callable[[T], None]) -> None:
+def compile_at_once(work: Callable[[], T], then: Callable[[T], None]) -> None:
+    """Compile between two cycles."""
     then(work())
 
 
@@ -155,7 +157,7 @@ class ProgramRunner:
         #: Number of stops: a program that was sent before a stop does not start after the stop.
         self._stops = 0
         #: Function that compiles: at once, or in a thread while the cycles go on.
-        self.compile_aside: CompileAside = _compile_at_once
+        self.compile_aside: CompileAside = compile_at_once
 
     @property
     def current_thread(self) -> Hashable:
@@ -224,6 +226,18 @@ class ProgramRunner:
             self._messages.text(f'Program {name} was not started: {reason}.')
             self.start_failure = reason
         return bool(reason)
+
+    def compile_first(self, text: str, then: Callable[[str], None]) -> None:
+        """
+        Compile a program beside the cycles, so that loading it afterwards takes no time.
+
+        :param then: called with the mistake in the program; empty = there is none.
+        """
+
+        def end(compiled: CompiledProgram | CompileError) -> None:
+            then(str(compiled) if isinstance(compiled, CompileError) else '')
+
+        self.compile_aside(lambda: self._compile_text(text), end)
 
     def load(self, name: str, text: str) -> str:
         """
@@ -317,7 +331,7 @@ class ProgramRunner:
 
     def unpause(self) -> None:
         """Resume a paused program; start none."""
-        if self.state in (RuntimeState.PAUSED, RuntimeState.PAUSING):
+        if self.state in PAUSED:
             self.play()
 
     def play(self) -> str:
@@ -325,7 +339,7 @@ class ProgramRunner:
         reason = self._arm.start_refusal()
         if reason:
             return reason
-        if self.state in (RuntimeState.PAUSED, RuntimeState.PAUSING):
+        if self.state in PAUSED:
             self.state = RuntimeState.RESUMING
             if self._interpreter is not None:
                 self._interpreter.resume()

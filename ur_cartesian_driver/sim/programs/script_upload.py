@@ -24,6 +24,10 @@ from ur_cartesian_driver.urscript.script_errors import CompileError
 #: such bound.
 MAX_UPLOAD_SIZE = 1024 * 1024
 
+#: The encoding of URScript on all ports: the manufacturer's manual speaks of "(extended) ASCII".
+#: So each byte is a character, and no byte is an error.
+SCRIPT_ENCODING = 'latin-1'
+
 _BLOCKS = frozenset({'def', 'thread', 'if', 'while', 'switch'})
 #: The first line of a program.
 _FIRST_LINE = re.compile(r'(?:def|sec)\s')
@@ -89,7 +93,7 @@ class UploadDecoder:
         return UploadTooLong()
 
     def _line(self, data: bytes) -> UploadedItem | None:
-        line = data.decode('latin-1').rstrip('\r')
+        line = data.decode(SCRIPT_ENCODING).rstrip('\r')
         is_last = _LAST_LINE.match(line) is not None
         if self._skipping:
             self._skipping = not _LAST_LINE.match(line)

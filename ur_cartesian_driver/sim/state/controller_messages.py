@@ -97,7 +97,7 @@ class ControllerMessages:
         The body is: u32 request, u8 type of the request, u8 each for warning, error and blocking,
         u8 length of the title, title, text.
         """
-        title = popup.title.encode(errors='replace')[:255]
+        title = _cut(popup.title, 255).encode(errors='replace')
         flags = bytes([0, popup.warning, popup.error, popup.blocking])
         self.pending.append(
             RawMessage(
@@ -107,7 +107,7 @@ class ControllerMessages:
                 + flags
                 + bytes([len(title)])
                 + title
-                + popup.text.encode(errors='replace')[: _MAX_TEXT_LENGTH - 255],
+                + _cut(popup.text, _MAX_TEXT_LENGTH - 255).encode(errors='replace'),
             )
         )
 
@@ -115,8 +115,8 @@ class ControllerMessages:
         """
         Report that a window requests a value.
 
-        The body is not published. Assumed, like the beginning of a popup's body: u32 request (0),
-        u8 type of the value, text.
+        The layout of the body is undocumented. Assumed is one that begins like a popup's: u32
+        request (0), u8 type of the value, text.
 
         :param kind: the type of the value; 0 = boolean, 1 = integer, 2 = float, 3 = string.
         """
@@ -132,10 +132,8 @@ class ControllerMessages:
         return round(self._now() * 1e6)
 
 
-def _cut(text: str) -> str:
-    """Return the text, shortened to fit into a message."""
-    return (
-        text
-        if len(text) < _MAX_TEXT_LENGTH // 4
-        else text.encode(errors='replace')[:_MAX_TEXT_LENGTH].decode(errors='ignore')
-    )
+def _cut(text: str, length: int = _MAX_TEXT_LENGTH) -> str:
+    """Return the text, shortened to a number of bytes, at most four a character."""
+    if len(text) <= length // 4:
+        return text
+    return text.encode(errors='replace')[:length].decode(errors='ignore')

@@ -21,7 +21,13 @@ from ur_cartesian_driver.urscript.compiling.generated_code import (
     SWITCH,
 )
 from ur_cartesian_driver.urscript.container_methods import call_method
-from ur_cartesian_driver.urscript.script_values import SIZED, ThreadHandle, Value
+from ur_cartesian_driver.urscript.script_values import (
+    FLOATS,
+    NUMBERS,
+    SIZED,
+    ThreadHandle,
+    Value,
+)
 
 #: Names of the operators in generated code.
 OPERATORS = {
@@ -73,6 +79,9 @@ def operations(runtime: Runtime) -> dict[str, Any]:
 
     def copied(value: Value) -> Value:
         """Return a value that is stored or passed on."""
+        if type(value) is list and FLOATS.issuperset(map(type, value)):
+            pay(len(value))
+            return value[:]
         if type(value) in SIZED:
             pay(values.size_of(value))
             return values.copy(value)
@@ -100,10 +109,24 @@ def operations(runtime: Runtime) -> dict[str, Any]:
         return call_method(target, method, arguments)
 
     def operator(symbol: str) -> Callable[[Value, Value], Value]:
-        operate = values.BINARY[symbol]
+        operate, compute = values.BINARY[symbol], values.COMPUTE.get(symbol)
 
         def binary(a: Value, b: Value) -> Value:
             kind_a, kind_b = type(a), type(b)
+            if compute is not None and (kind_a is list or kind_b is list):
+                # Nearly all lists have floats only; none of the results needs a check.
+                if kind_b in NUMBERS:
+                    if FLOATS.issuperset(map(type, a)):
+                        pay(len(a) + 1)
+                        return [compute(item, b) for item in a]
+                elif kind_a in NUMBERS:
+                    if FLOATS.issuperset(map(type, b)):
+                        pay(len(b) + 1)
+                        return [compute(a, item) for item in b]
+                elif kind_a is kind_b and len(a) == len(b):
+                    if FLOATS.issuperset(map(type, a)) and FLOATS.issuperset(map(type, b)):
+                        pay(2 * len(a))
+                        return list(map(compute, a, b))
             if kind_a in SIZED or kind_b in SIZED:
                 pay(values.work_on(a, b))
             return operate(a, b)

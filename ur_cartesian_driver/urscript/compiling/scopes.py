@@ -26,9 +26,6 @@ from ur_cartesian_driver.urscript.script_errors import CompileError, name_not_fo
 
 Builtin = Callable[..., Any]
 
-#: Slot 0 of a frame holds the return value.
-FIRST_LOCAL = 1
-
 #: Nodes that contain statements.
 _COMPOUND = (
     tree.IfStatement,
@@ -44,8 +41,8 @@ class Scope:
 
     parent: Scope | None
     owner: tree.FunctionDefinition | tree.ScriptProgram
-    globals: dict[str, int]
-    locals: dict[str, int] = field(default_factory=dict)
+    globals: set[str]
+    locals: set[str] = field(default_factory=set)
     functions: dict[str, Scope] = field(default_factory=dict)
     #: The scopes of the functions that are called in this scope.
     calls: list[Scope] = field(default_factory=list)
@@ -88,7 +85,7 @@ def resolve(
     :raises CompileError: a name is unknown, or a call has wrong arguments.
     """
     root = Scope(
-        parent=enclosing, owner=program, globals=dict(enclosing.globals) if enclosing else {}
+        parent=enclosing, owner=program, globals=set(enclosing.globals) if enclosing else set()
     )
     _declare(root)
     for scope in root.walk():
@@ -121,21 +118,19 @@ def _declare(scope: Scope) -> None:
 
 def _declare_global(scope: Scope, node: tree.AssignStatement, name: str) -> None:
     if scope.definition is None or node.qualifier == 'global':
-        scope.globals.setdefault(name, len(scope.globals))
+        scope.globals.add(name)
 
 
 def _assign_locals(scope: Scope) -> None:
-    """Give a slot to each parameter and each local variable."""
+    """Collect the parameters and the local variables."""
     if scope.definition is None:
         return
-    names = [parameter.name for parameter in scope.definition.parameters]
+    scope.locals.update(parameter.name for parameter in scope.definition.parameters)
     for node in _own_statements(scope.body):
         if isinstance(node, tree.AssignStatement) and isinstance(node.target, tree.NameExpression):
             name = node.target.identifier
             if node.qualifier == 'local' or (not node.qualifier and name not in scope.globals):
-                names.append(name)
-    for name in names:
-        scope.locals.setdefault(name, len(scope.locals) + FIRST_LOCAL)
+                scope.locals.add(name)
 
 
 def _propagate_suspension(scopes: list[Scope]) -> None:

@@ -61,12 +61,12 @@ class LineCompiler:
 
     def _reset(self) -> None:
         scope = self._program.scope
-        self._scope = Scope(parent=scope, owner=scope.owner, globals=dict(scope.globals))
+        self._scope = Scope(parent=scope, owner=scope.owner, globals=set(scope.globals))
         self._functions = dict(self._program.functions)
 
     def forget(self) -> None:
         """Forget the variables and functions of all lines."""
-        self._runtime.forget(self._scope.globals.keys() - self._program.scope.globals)
+        self._runtime.forget(self._scope.globals - self._program.scope.globals)
         self._reset()
 
     def compile(self, text: str) -> CompiledLine:

@@ -185,7 +185,7 @@ class ScriptInterpreter:
         names = self._names
         return {
             name: names[global_name(name)]
-            for name in self.code.scope.globals
+            for name in sorted(self.code.scope.globals)
             if global_name(name) in names
         }
 
