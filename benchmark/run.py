@@ -37,6 +37,7 @@ MODULES = (
     'planning',
     'rounded_corners',
     'sliced',
+    'outputs',
     'free_axis',
     'import_files',
     'motion_page',

@@ -15,6 +15,7 @@ import asyncio
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib import import_module
 from math import nan
 from pathlib import Path
 import sys
@@ -297,6 +298,107 @@ def draw_rounded_corners() -> Path:
     return drawing
 
 
+async def a_photo_seam(cell: Any) -> tuple[list[tuple[float, ...]], list[tuple[float, ...]]]:
+    """Run a seam with pulses while the slider moves; return rows of the tool, and of pulses."""
+    rows: list[tuple[float, ...]] = []
+    x, y, _ = cell.memory.read().actual_tcp_pose.position
+    happens = a_goal('photo_seam', 'slider 0.4 at 0.13 m', 'slider 1 at 0.17 m')
+    running = asyncio.ensure_future(happens(cell))
+    while not running.done():
+        place = cell.robot.controller.motion.T_base_tcp.position
+        rows.append((cell.loop.time(), 1e3 * (place[0] - x), 1e3 * (place[1] - y), place[2]))
+        await cell.sleep(SHORT_CYCLE)
+    assert running.result().succeeded, running.result()
+    pulses = [pulse.pose.position for pulse in cell.owner.pulses]
+    return rows, [(1e3 * (place[0] - x), 1e3 * (place[1] - y)) for place in pulses]
+
+
+def draw_pulses() -> Path:
+    """Draw where the pulses of a seam come, and how fast the tool is; return the picture."""
+    from matplotlib import pyplot
+    import numpy as np
+    from robot_cell import run_cell
+
+    drawing = CHECKOUT / 'doc' / 'outputs_pulses.svg'
+    seen, given = run_cell(a_photo_seam, robot={'frequency': 1.0 / SHORT_CYCLE})
+    time, *places = np.array(seen).T
+    steps = np.linalg.norm(np.diff([places[0], places[1], 1e3 * places[2]], axis=1), axis=0)
+    figure, (above, speeds) = pyplot.subplots(1, 2, width_ratios=(1, 1.6), figsize=(10.0, 3.6))
+    above.plot(places[0], places[1], color='#9aa5b1', linewidth=1.0, label='tool')
+    above.plot(*np.array(given).T, '.', color='#c8372d', markersize=4, label='pulse')
+    above.set(aspect='equal', xlabel='x [mm]', ylabel='y [mm]', title='every 2 mm')
+    above.legend(loc='upper left')
+    speeds.plot(time[1:] - time[0], steps / SHORT_CYCLE, color='#1f77b4')
+    seen_at = [int(np.argmin(np.hypot(places[0] - px, places[1] - py))) for px, py in given]
+    speeds.vlines(time[seen_at] - time[0], 0.0, 12.0, color='#c8372d', linewidth=0.8)
+    speeds.set(xlabel='time [s]', ylabel='speed [mm/s]', ylim=(0.0, None))
+    speeds.set_title('the same pulses in time; the speed slider at 40 % for a while')
+    for axes in (above, speeds):
+        axes.grid(alpha=0.3)
+    return save_vectors(figure, drawing)
+
+
+def draw_beads() -> Path:
+    """Draw where beads begin and end without and with the lead of a valve; return the picture."""
+    from matplotlib import pyplot
+    import numpy as np
+
+    from ur_cartesian_driver.motion.goal.goal import OutputKind
+    from ur_cartesian_driver.motion.goal.leads import Lead
+    from ur_cartesian_driver.planning import PlanningOptions
+
+    # The modules of the tests have no types.
+    beads: Any = import_module('simulated_valve')
+    robot: Any = import_module('robot_in_memory').RobotInMemory('ur5e')
+    drawing = CHECKOUT / 'doc' / 'valves_beads.svg'
+    valve = Lead(
+        name='valve_1',
+        output=OutputKind.STANDARD_DIGITAL,
+        pin=beads.PIN,
+        open=beads.OPEN,
+        close=beads.CLOSE,
+    )
+    options = PlanningOptions(leads=(valve,))
+    rows = [
+        (1e3 * speed, *(1e3 * beads.errors(robot, beads.Bead(speed, length), lead, options)))
+        for lead in ('', 'valve_1')
+        for speed in np.linspace(0.01, 0.25, 25)
+        for length in (0.03, 0.0303, 0.0306, 0.0309)
+    ]
+    without, led = np.split(np.array(rows), 2)
+    figure, (left, right) = pyplot.subplots(1, 2, figsize=(10.0, 3.2), sharex=True)
+    for axes, table, title in (
+        (left, without, 'without lead'),
+        (right, led, 'with lead: valve_1'),
+    ):
+        axes.plot(table[:, 0], table[:, 1], '.', color='#1f77b4', label='begins')
+        axes.plot(table[:, 0], table[:, 2], '.', color='#c8372d', label='ends')
+        axes.set(xlabel='speed [mm/s]', ylabel='behind its place [mm]', title=title)
+        axes.grid(alpha=0.3)
+    half = 0.5 * beads.CYCLE * np.array([0.0, 250.0])
+    for sign in (-1.0, 1.0):
+        right.plot([0.0, 250.0], sign * half, color='#9aa5b1')
+    right.text(30.0, 0.15, 'half a cycle', color='#6b7682')
+    left.legend(loc='upper left')
+    for low, high in ((10, 50), (50, 100), (100, 150), (150, 200), (200, 251)):
+        for name, table in (('without', without), ('with', led)):
+            own = table[(table[:, 0] >= low) & (table[:, 0] < high)]
+            begin, end = np.abs(own[:, 1:]).max(axis=0)
+            length = np.abs(own[:, 2] - own[:, 1]).max()
+            sys.stdout.write(f'{low} to {high} mm/s {name}: {begin:.2f} {end:.2f} {length:.2f}\n')
+    return save_vectors(figure, drawing)
+
+
+def save_vectors(figure: Any, drawing: Path) -> Path:
+    """Save a figure as SVG, the same in each run; return its file."""
+    from matplotlib import rc_context
+
+    figure.tight_layout()
+    with rc_context({'svg.hashsalt': drawing.name}):
+        figure.savefig(drawing, metadata={'Date': None, 'Creator': None})
+    return drawing
+
+
 PICTURES = {
     'primitives': Picture(
         title='Lines, an arc and blends (PRIMITIVES); the speed slider at 50 % for a while',
@@ -390,6 +492,8 @@ if __name__ == '__main__':
         'press': draw_press,
         'path_offset': draw_path_offset,
         'rounded_corners': draw_rounded_corners,
+        'pulses': draw_pulses,
+        'beads': draw_beads,
     }
     for wanted in sys.argv[1:] or (*PICTURES, *others):
         path = others[wanted]() if wanted in others else draw(wanted)

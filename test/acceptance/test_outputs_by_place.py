@@ -3,21 +3,16 @@
 """
 Outputs at places beside points and with leads: the cycle of each edge, against the tool's own way.
 
-The judge knows positions and outputs of the simulated controller in each cycle, and nothing of
-the plan. The way of the tool is the sum of its steps; a point is on it where a step is nearest. A
-slow run tells when the tool would be at each way at full speed: the time of the path. In any run,
-an output is due when no more of this time is left to its place than passes within its lead.
+The judge (``test/support/output_judge.py``) knows nothing of the plan.
 """
 
-from collections import Counter
 from dataclasses import replace
-from math import cos
 
-import numpy as np
+from output_judge import judge_commands, JudgedRun, PathTime, SLIDERS, SLOW
 import pytest
 from random_cases import cases, random_of
 from robot_in_memory import RobotInMemory
-from traced_run import ARM, HOME, OPTIONS, STEP, TracedRun, ZIGZAG
+from traced_run import ARM, HOME, OPTIONS, TOOL, ZIGZAG
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.geometry.pose import Pose
@@ -28,10 +23,8 @@ from ur_cartesian_driver.planning import plan
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
-#: The slider of the runs that tell the time of the path.
-SLOW = 0.2
-#: How late or early, or how far from there [m] an output may switch near a rest.
-REST_CYCLES, REST_BOUND = 10, 1e-4
+#: How late or early an output may be [cycles].
+BOUND = 1.0
 
 
 def command(waypoint, pin, value=1.0, **place):
@@ -80,76 +73,19 @@ def spline(home, commands, period=0.5, **changes):
     )
 
 
-class Run(TracedRun):
-    """One run of a goal with commands."""
-
-    def place(self, wanted):
-        """Return the way to the place of a command."""
-        here = self.way_of(wanted.waypoint)
-        if wanted.fraction:
-            other = wanted.waypoint + (1 if wanted.fraction > 0.0 else -1)
-            return here + abs(wanted.fraction) * (self.way_of(other) - here)
-        return here + wanted.distance
-
-
-class PathTime:
-    """The time of the path at full speed, from a run that the slider slows down for resolution."""
-
-    def __init__(self, slow):
-        ways, first = np.unique(slow.ways, return_index=True)
-        # Rests are no time of the path.
-        moving = np.append(0.0, np.cumsum(np.diff(slow.ways) > 0.0))
-        self._ways, self._times = ways, SLOW * STEP * moving[first]
-
-    def __call__(self, ways):
-        return np.interp(ways, self._ways, self._times)
-
-    def is_near_rest(self, way):
-        """Return whether the tool is so slow there that it makes no way that counts."""
-        k, speeds = int(np.searchsorted(self._ways, way)), np.diff(self._ways)
-        return speeds[max(k - 3, 0) : k + 2].min() < 0.2 * speeds.max()
-
-
-def misses(run, path_time, bound=1.6):
-    """
-    Return by how many cycles each output was late or early, if by more than ``bound``.
-
-    An edge beside the cycle in which the output is due is at most one and a half away; the time of
-    the path is known to a tenth of a cycle.
-
-    Near a rest the speed tells little of the slider, and the tool makes little way: there the
-    bound is wider.
-    """
-    assert Counter(pin for pin, *_ in run.edges) == Counter(
-        wanted.pin for wanted in run.goal.io_commands
-    )
-    at = {pin: cycle for pin, _, cycle in run.edges}
-    times, found = path_time(run.ways), {}
-    # Where the tool nearly rests, its way tells little of the time; no slider makes it faster.
-    rate = np.minimum(np.diff(times, prepend=0.0) / STEP, 1.0)
-    for wanted in run.goal.io_commands:
-        place = run.place(wanted)
-        left = path_time(place) - times
-        ahead = left - max(-wanted.offset, 0.0) * rate
-        k = int(np.flatnonzero((ahead <= 0.0) & ((rate > 0.0) | (left <= 0.0)))[0])
-        due = k - ahead[k] / min(ahead[k] - ahead[k - 1], -1e-12)
-        late = at[wanted.pin] - due
-        off = run.ways[at[wanted.pin]] - np.interp(due, np.arange(len(run.ways)), run.ways)
-        slow = path_time.is_near_rest(place) or path_time.is_near_rest(run.ways[int(due)])
-        if abs(late) > bound and not (slow and (abs(late) < REST_CYCLES or abs(off) < REST_BOUND)):
-            found[wanted.pin] = round(float(late), 2)
-    return found
+def misses(run, path_time, bound=BOUND):
+    return judge_commands(run, path_time, bound).misses
 
 
 def assert_in_time(goal_of, slider):
     robot = RobotInMemory('ur5e')
-    run = Run(robot, goal_of, slider)
+    run = JudgedRun(robot, goal_of, slider)
     assert misses(run, path_time_of(robot, goal_of)) == {}
     return run
 
 
 def path_time_of(robot, goal_of):
-    return PathTime(Run(robot, goal_of, lambda cycle: SLOW))
+    return PathTime(JudgedRun(robot, goal_of, lambda cycle: SLOW))
 
 
 PLACES = (
@@ -162,13 +98,6 @@ PLACES = (
     command(2, 6, distance=0.021, lead=0.04),
     command(4, 7, lead=0.03),
 )
-
-SLIDERS = {
-    'full': lambda cycle: 1.0,
-    'low': lambda cycle: 0.1,
-    'changing': lambda cycle: 0.55 + 0.45 * cos(cycle / 120.0),
-    'steps': lambda cycle: (1.0, 0.2, 0.6)[cycle // 130 % 3],
-}
 
 
 def by_kind(kind, commands=PLACES, speed=0.1):
@@ -231,9 +160,9 @@ def test_a_dwell_and_a_pause_shift_no_output():
 
     robot = RobotInMemory('ur5e')
     path_time = path_time_of(robot, dwelling)
-    full = Run(robot, dwelling)
+    full = JudgedRun(robot, dwelling)
     assert misses(full, path_time) == {}
-    paused = Run(robot, dwelling, act=act)
+    paused = JudgedRun(robot, dwelling, act=act)
     assert len(paused.ways) > len(full.ways) + 150
     assert misses(paused, path_time) == {}
 
@@ -244,7 +173,7 @@ def test_the_longest_lead_is_in_the_refusal():
 
     text = r'io_commands.0..offset is -0.9 s.* the longest lead here is'
     with pytest.raises(InvalidGoal, match=text) as refusal:
-        Run(RobotInMemory('ur5e'), seam(0.9))
+        JudgedRun(RobotInMemory('ur5e'), seam(0.9))
     longest = float(str(refusal.value).partition('longest lead here is ')[2].split()[0])
     assert 0.1 < longest < 0.2
     assert_in_time(seam(longest - 0.001), SLIDERS['full'])
@@ -256,7 +185,7 @@ def test_goals_to_which_points_can_be_appended_have_neither(place):
         return zigzag(home, [command(1, 0, **place)], keep_open=True)
 
     with pytest.raises(NotAvailable, match='a goal with keep_open switches outputs at its points'):
-        Run(RobotInMemory('ur5e'), goal)
+        JudgedRun(RobotInMemory('ur5e'), goal)
 
 
 @pytest.mark.parametrize(
@@ -272,7 +201,7 @@ def test_goals_to_which_points_can_be_appended_have_neither(place):
 )
 def test_places_that_do_not_exist_are_refused(place, field, text):
     with pytest.raises(InvalidGoal, match=f'io_commands.0..{field} .*{text}'):
-        Run(RobotInMemory('ur5e'), by_kind('stops', [command(2, 0, **place)]))
+        JudgedRun(RobotInMemory('ur5e'), by_kind('stops', [command(2, 0, **place)]))
 
 
 def test_a_lead_that_would_close_a_valve_before_it_opens_is_refused():
@@ -280,12 +209,12 @@ def test_a_lead_that_would_close_a_valve_before_it_opens_is_refused():
     with pytest.raises(
         InvalidGoal, match=r'io_commands.1..offset makes a lead of 0.1 s, with which that'
     ):
-        Run(RobotInMemory('ur5e'), by_kind('stops', bead))
+        JudgedRun(RobotInMemory('ur5e'), by_kind('stops', bead))
 
 
 def test_a_named_lead_is_refused_by_its_name():
     valve = Lead(name='gun', output=OutputKind.STANDARD_DIGITAL, pin=0, open=0.9, close=0.0)
-    state = RobotInMemory('ur5e').place(HOME, Pose((0.0, 0.02, 0.12)))
+    state = RobotInMemory('ur5e').place(HOME, TOOL)
     seam = by_kind('stops', [command(3, 1), command(1, 0, distance=-0.045, lead='gun')])
     options = replace(OPTIONS, leads=(valve,))
     with pytest.raises(InvalidGoal, match=r'io_commands.1..lead is 0.9 s.* the longest lead'):
@@ -296,7 +225,7 @@ def test_more_leads_than_the_program_follows_are_refused():
     many = [command(2, pin, distance=0.02, lead=0.1) for pin in range(8)]
     many.append(command(2, 0, distance=0.02, lead=0.1, output=OutputKind.TOOL_DIGITAL))
     with pytest.raises(InvalidGoal, match=r'io_commands.8..offset is one of more than 8 leads'):
-        Run(RobotInMemory('ur5e'), by_kind('stops', many))
+        JudgedRun(RobotInMemory('ur5e'), by_kind('stops', many))
 
 
 def drawn(number):
@@ -320,7 +249,7 @@ def drawn(number):
 
 
 def is_accepted(robot, goal_of):
-    state = robot.place(HOME, Pose((0.0, 0.02, 0.12)))
+    state = robot.place(HOME, TOOL)
     try:
         plan(goal_of(state.actual_tcp_pose), state, ARM, OPTIONS)
     except InvalidGoal:
@@ -335,8 +264,8 @@ def test_random_places_and_leads(number):
     robot = RobotInMemory('ur5e')
     if is_accepted(robot, goal_of):
         # How long the controller takes in a blend is known less well.
-        bound = 2.5 if kind == 'blends' else 1.6
-        assert misses(Run(robot, goal_of, slider), path_time_of(robot, goal_of), bound) == {}
+        bound = 2.5 if kind == 'blends' else BOUND
+        assert misses(JudgedRun(robot, goal_of, slider), path_time_of(robot, goal_of), bound) == {}
 
 
 @pytest.mark.random

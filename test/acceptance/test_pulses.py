@@ -3,20 +3,19 @@
 """
 Pulses along the path: the cycle of each rising edge, against the tool's own way.
 
-The judge knows positions and outputs of the simulated controller in each cycle, and nothing of the
-plan. The way of the tool is the sum of its steps; a pulse is due where that is a multiple of the
-distance behind the place where the tool is nearest to the first point.
+The judge (``test/support/output_judge.py``) knows nothing of the plan.
 """
 
 from dataclasses import replace
-from math import cos, floor
 
+from append_goals import AppendMotion, circle
 import numpy as np
+from output_judge import judge_pulses, JudgedRun, SLIDERS
 import pytest
 from random_cases import cases, random_of
 from robot_cell import run_cell
 from robot_in_memory import RobotInMemory
-from traced_run import ARM, HOME, OPTIONS, STEP, TracedRun, ZIGZAG
+from traced_run import ARM, HOME, OPTIONS, STEP, TOOL, ZIGZAG
 
 from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal
@@ -43,12 +42,8 @@ TRAIN = PulseTrain(
     distance=0.002,
     width=0.004,
 )
-SLIDERS = {
-    'full': lambda cycle: 1.0,
-    'low': lambda cycle: 0.1,
-    'changing': lambda cycle: 0.55 + 0.45 * cos(cycle / 120.0),
-    'steps': lambda cycle: (1.0, 0.2, 0.6)[cycle // 130 % 3],
-}
+#: How late or early a pulse may be [cycles].
+BOUND = 1.0
 
 
 def zigzag(home, trains, kind='stops', speed=0.1, points=ZIGZAG, **changes):
@@ -84,7 +79,7 @@ def zigzag(home, trains, kind='stops', speed=0.1, points=ZIGZAG, **changes):
     )
 
 
-class Run(TracedRun):
+class Run(JudgedRun):
     """One run of a goal with pulses: cycles of the edges by pin, and the count that is told."""
 
     def __init__(self, robot, goal, slider=lambda cycle: 1.0, act=lambda controller, cycle: None):
@@ -95,44 +90,12 @@ class Run(TracedRun):
             act(controller, cycle)
 
         super().__init__(robot, goal, slider, count_and_act)
-        self.rises, self.falls = (
-            [[cycle for pin, up, cycle in self.edges if (pin, up) == (k, rises)] for k in range(8)]
-            for rises in (True, False)
-        )
-
-    def places(self, train):
-        """Return the ways to the pulses of a train (count,)."""
-        begin, end = self.way_of(train.first_waypoint), self.way_of(train.last_waypoint)
-        room = floor((end - begin - train.phase + 2e-6) / train.distance) + 1
-        return begin + train.phase + train.distance * np.arange(train.count or room)
-
-    def lateness(self, train):
-        """Return by how many cycles each pulse was late (count,); negative = early."""
-        places, rises = self.places(train), np.array(self.rises[train.pin])
-        assert len(rises) == len(places)
-        ways, first = np.unique(self.ways, return_index=True)
-        # Beside a rest the tool is at its place for many cycles: the nearest of them counts.
-        last = np.append(first[1:] - 1, len(self.ways) - 1)
-        due = np.interp(places, ways, first)
-        until = np.maximum(due, np.interp(places - 2e-6, ways, last))
-        return rises - np.clip(rises, due, until)
+        self.rises = [self.cycles(pin, rises=True).tolist() for pin in range(8)]
 
 
-def assert_in_place(run, *trains, bound=1.6):
-    """
-    Judge each edge and the widths.
-
-    Near a rest, where the tool is slow, what counts is the way that it is off.
-    """
-    steps = np.diff(run.ways, prepend=0.0)
+def assert_in_place(run, *trains, bound=BOUND):
     for train in trains:
-        rises, late = np.array(run.rises[train.pin]), run.lateness(train)
-        off = run.ways[rises] - run.places(train)
-        near_rest = steps[rises] < 0.2 * steps.max()
-        good = (np.abs(late) < bound) | (near_rest & (np.abs(off) < 1e-4))
-        assert good.all(), (late[~good], off[~good])
-        widths = np.subtract(run.falls[train.pin], run.rises[train.pin])
-        assert set(widths) == {max(round(train.width / STEP), 1)}
+        assert judge_pulses(run, train, bound).misses == {}
     return run
 
 
@@ -252,9 +215,13 @@ def test_pulses_that_cannot_be_given_are_refused(change, field, text):
                     ),
                 )
             },
-            'io_commands.0..pin is 2, but standard digital output 2 gives pulses from point 0',
+            'io_commands.0..pin is 2, but at its place standard digital output 2 gives pulses',
         ),
-        ([TRAIN], {'keep_open': True}, 'pulses is not empty, but the goal has keep_open'),
+        (
+            [TRAIN],
+            {'keep_open': True, 'execution': ExecutionMode.SERVO},
+            'pulses is not empty, but a SERVO goal with keep_open gives no pulses',
+        ),
     ],
 )
 def test_what_drives_an_output_twice_is_refused(trains, changes, text):
@@ -296,6 +263,33 @@ def test_each_pulse_is_reported_and_recorded_with_its_time_and_pose(tmp_path):
     assert np.array_equal(recording.actual_pose[rows, :3], poses)
     times = np.diff([pulse.timestamp for pulse in pulses])
     assert np.allclose(np.diff(recording.time[rows]), times)
+
+
+def test_pulses_go_on_along_appended_points():
+    async def scenario(cell):
+        home = cell.memory.read().actual_tcp_pose
+        goal = Goal(
+            waypoints=tuple(circle(home, 1, 10)),
+            keep_open=True,
+            execution=ExecutionMode.SPLINE,
+            pulses=(replace(CELL_TRAIN, last_waypoint=9),),
+        )
+        motion = AppendMotion(cell, goal)
+        *points, end = circle(home, 11, 10)
+        rest = replace(end, time=end.time + 0.1, twist=(0.0,) * 6)
+        await motion.append([*points, rest], last=True)
+        outcome = await motion.ended()
+        assert outcome.succeeded, outcome
+        return [pulse.pose.position for pulse in cell.owner.pulses], points
+
+    places, points = run_cell(scenario)
+    # The circle has a radius of 50 mm; a chord between two pulses is shorter by 1 um.
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    assert np.abs(steps - 0.004).max() < 2.6 * 0.08 * 0.008
+    assert steps.mean() == pytest.approx(0.004, abs=3e-5)
+    begin, end = (np.array(points[k].pose.position) for k in (0, -1))
+    for place in (begin, end):
+        assert np.linalg.norm(places - place, axis=1).min() < 0.004
 
 
 @pytest.mark.parametrize('end', ['cancel', 'stop', 'protective_stop'])
@@ -355,7 +349,7 @@ def drawn(number):
 
 
 def is_accepted(robot, goal_of):
-    state = robot.place(HOME, Pose((0.0, 0.02, 0.12)))
+    state = robot.place(HOME, TOOL)
     try:
         plan(goal_of(state.actual_tcp_pose), state, ARM, OPTIONS)
     except InvalidGoal:

@@ -171,6 +171,21 @@ def test_outputs_get_the_state_of_the_place_and_the_rest_of_the_commands():
     )
 
 
+@pytest.mark.parametrize('reverse', [False, True])
+def test_an_output_gets_the_value_that_was_due_last(reverse):
+    """The first command was due 0.3 s after the second one, which is 1 cm ahead."""
+    commands = [switch(0, 0.0, offset=0.4), switch(0, 1.0, distance=0.01)]
+    commands = tuple(reversed(commands) if reverse else commands)
+    left = resume(goal(io_commands=commands), at(1, 0.5), overlap=0.0).goal
+    assert left.io_commands == (switch(1, 0.0),)
+
+
+def test_without_speeds_outputs_get_the_value_of_the_last_place():
+    plain = goal(io_commands=(switch(1, 0.0), switch(0, 1.0, lead='valve_1')))
+    plain = replace(plain, segments=tuple(replace(s, velocity=0.0) for s in plain.segments))
+    assert resume(plain, at(2, 0.5), overlap=0.0).goal.io_commands == (switch(1, 0.0),)
+
+
 def test_places_beside_points_stay_where_they_are_on_the_path():
     commands = (
         switch(0, 1.0, distance=0.03),

@@ -24,12 +24,13 @@ from ur_cartesian_driver.motion.goal.goal import (
     Goal,
     IOCommand,
     OutputKind,
+    PulseTrain,
     Segment,
     SegmentType,
     Waypoint,
 )
 from ur_cartesian_driver.motion.goal.leads import Lead
-from ur_cartesian_driver.motion.plan.primitive import SwitchOutput
+from ur_cartesian_driver.motion.plan.primitive import LeadLaw, PulseLaw, SwitchOutput
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append import append_planner
@@ -216,7 +217,7 @@ def test_a_lead_of_an_appended_command_is_refused_by_its_time_or_its_name():
     for name, sentence in (
         (
             'valve',
-            r'io_commands\[0\]\.offset is -0\.02, but a goal with keep_open switches outputs at ',
+            r'io_commands\[0\]\.lead is -0\.02, but a goal with keep_open switches outputs at ',
         ),
         ('other', r"io_commands\[0\]\.lead is 'other', but the driver has only valve"),
         ('no output', r'io_commands\[0\]\.output is 9; allowed are STANDARD_DIGITAL'),
@@ -227,6 +228,129 @@ def test_a_lead_of_an_appended_command_is_refused_by_its_time_or_its_name():
         points = AppendedPoints(**of(goal, 4, COUNT, io_commands=(command,)), last=True)
         with pytest.raises(InvalidGoal, match=sentence):
             plan_append(part.next_goal, points, ARM, options, from_rest=False)
+
+
+#: Places and leads in the middle of parts, and a command that waits for the points after its own.
+PLACED = (
+    {'waypoint': 1, 'distance': 0.004, 'pin': 0},
+    {'waypoint': 2, 'offset': -0.05, 'pin': 1},
+    {'waypoint': 2, 'offset': 0.15, 'fraction': -0.2, 'pin': 2},
+    {'waypoint': 4, 'fraction': 0.7, 'offset': -0.03, 'pin': 3},
+    {'waypoint': 5, 'pin': 4},
+    {'waypoint': 5, 'distance': -0.001, 'pin': 5},
+    {'waypoint': 7, 'distance': 0.002, 'offset': -0.04, 'pin': 6},
+    {'waypoint': 8, 'distance': -0.003, 'pin': 7},
+)
+
+
+def placed(*fields):
+    return tuple(
+        IOCommand(
+            output=OutputKind.STANDARD_DIGITAL, value=1.0, **{'offset': 0.0, 'pin': 0} | each
+        )
+        for each in fields
+    )
+
+
+@pytest.mark.parametrize('sizes', [(3, 3, 3), (6, 3)], ids=str)
+def test_places_and_leads_of_open_splines_are_where_they_are_in_the_whole_goal(sizes):
+    goal = replace(spline(), io_commands=placed(*PLACED))
+    wire, _, _ = in_parts(goal, sizes)
+    known = list(plan(goal, STATE, ARM, OPTIONS).instructions)
+    assert [type(one) for one in wire] == [type(one) for one in known]
+    for one, other in zip(wire, known, strict=True):
+        # Where a part begins, the speeds of a lead are known from one side only.
+        assert_same(one, other, 2e-4 if isinstance(one, LeadLaw) else 1e-6)
+
+
+@pytest.mark.parametrize(
+    ('fields', 'text'),
+    [
+        (
+            {'waypoint': 5, 'distance': 0.001},
+            r'io_commands.1..distance is 0.001, but the path behind point 5 is not known yet; '
+            'send the command with a later point',
+        ),
+        ({'waypoint': 5, 'fraction': 0.5}, 'io_commands.1..fraction is 0.5, but the path behind'),
+        (
+            {'waypoint': 3, 'distance': -0.02},
+            r'io_commands.1..distance is -0.02 m, but the path before point 3 is',
+        ),
+        ({'waypoint': 4, 'offset': -0.9}, 'io_commands.1..offset is -0.9 s, but .* longest lead'),
+    ],
+)
+def test_places_that_an_open_spline_cannot_reach_are_refused(fields, text):
+    goal = replace(spline(), io_commands=placed({'waypoint': 2}))
+    first = plan(replace(goal, **of(goal, 0, 3), keep_open=True), STATE, ARM, OPTIONS)
+    part = plan_first_part(first, ARM, OPTIONS)
+    points = AppendedPoints(**of(goal, 3, 6, io_commands=placed({'waypoint': 4}, fields)))
+    with pytest.raises(InvalidGoal, match=text):
+        plan_append(part.next_goal, points, ARM, OPTIONS, from_rest=False)
+
+
+#: Pulses that go on: the goal that is open ends with their last point.
+PHOTOS = PulseTrain(
+    first_waypoint=1,
+    last_waypoint=2,
+    output=OutputKind.STANDARD_DIGITAL,
+    pin=3,
+    distance=0.002,
+    width=0.004,
+)
+
+
+@pytest.mark.parametrize(
+    'goal', [moves(1), moves(1, radius=0.0), spline()], ids=['blends', 'stops', 'spline']
+)
+def test_pulses_of_open_goals_are_one_record_whatever_is_appended(goal):
+    whole = replace(goal, pulses=(replace(PHOTOS, last_waypoint=COUNT - 1),))
+    known = list(plan(whole, STATE, ARM, OPTIONS).instructions)
+    wire, _, _ = in_parts(replace(goal, pulses=(PHOTOS,)), (3, 3, 3))
+    assert [type(one) for one in wire] == [type(one) for one in known]
+    for one, other in zip(wire, known, strict=True):
+        if isinstance(one, PulseLaw) and isinstance(other, PulseLaw):
+            assert one == replace(other, count=1_000_000, goes_on=True)
+        else:
+            assert_same(one, other)
+
+
+def test_pulses_that_end_before_the_last_point_of_an_open_goal_are_bounded():
+    train = replace(PHOTOS, first_waypoint=0, last_waypoint=1)
+    goal = replace(moves(1, radius=0.0), pulses=(train,))
+    wire, _, _ = in_parts(goal, (3, 6))
+    (law,) = [one for one in wire if isinstance(one, PulseLaw)]
+    assert (law.count, law.goes_on) == (21, False)
+
+
+def test_what_pulses_that_go_on_exclude_is_refused():
+    goal = replace(moves(1), pulses=(replace(PHOTOS, distance=0.001),))
+    first = plan(replace(goal, **of(goal, 0, 3), keep_open=True), STATE, ARM, OPTIONS)
+    part = plan_first_part(first, ARM, OPTIONS)
+    command = placed({'waypoint': 4, 'pin': 3})
+    fast = tuple(
+        replace(segment, velocity=0.5, acceleration=4.0) for segment in goal.segments[3:6]
+    )
+    for changes, text in (
+        ({'io_commands': command}, r'io_commands.0..pin is 3, but .* to the end of the goal'),
+        ({'segments': fast}, r'pulses.0..distance is 1 mm, but from pulse to pulse 6 ms'),
+    ):
+        points = AppendedPoints(**of(goal, 3, 6, **changes))
+        with pytest.raises(InvalidGoal, match=text):
+            plan_append(part.next_goal, points, ARM, OPTIONS, from_rest=False)
+
+
+@pytest.mark.parametrize(
+    ('changes', 'text'),
+    [
+        ({'execution': ExecutionMode.SERVO}, 'but a SERVO goal with keep_open gives no pulses'),
+        ({'replace_horizon': 0.2}, 'but the goal has a replace_horizon'),
+    ],
+)
+def test_open_goals_without_pulses(changes, text):
+    goal = replace(spline(), pulses=(PHOTOS,))
+    goal = replace(goal, **of(goal, 0, 3), keep_open=True, **changes)
+    with pytest.raises(NotAvailable, match=f'pulses is not empty, {text}'):
+        plan(goal, STATE, ARM, OPTIONS)
 
 
 def test_points_are_appended_where_the_limit_of_points_is_the_largest():

@@ -15,6 +15,8 @@ from ur_cartesian_driver.motion.goal.goal import (
     Goal,
     IOCommand,
     OutputKind,
+    ProportionalOutput,
+    PulseTrain,
     Segment,
     SegmentType,
 )
@@ -272,3 +274,91 @@ def test_a_point_where_the_robot_stands_switches_nothing(cell):
     goal = Goal(waypoints=(cell.point(), cell.point(x=0.02, time=1.0)), io_commands=(command(0),))
     with pytest.raises(InvalidGoal, match=r'io_commands\[0\]\.point_index is 0, but no motion'):
         planned(cell, goal)
+
+
+FLOW = ProportionalOutput(first_waypoint=1, last_waypoint=2, pin=1, gain=2.0)
+PHOTOS = PulseTrain(
+    first_waypoint=1,
+    last_waypoint=2,
+    output=OutputKind.STANDARD_DIGITAL,
+    pin=4,
+    distance=0.005,
+    width=0.004,
+)
+FLOWING, GIVING = (
+    f'{name} from point 1 to point 2; use another output, or move the place.'
+    for name in (
+        'standard analog output 1 follows the speed',
+        'standard digital output 4 gives pulses',
+    )
+)
+#: A square with a fourth side.
+WAYS = (*CORNERS, (0.0, 0.0))
+
+
+def with_stretch(cell, stretch, *commands):
+    analog = isinstance(stretch, ProportionalOutput)
+    output = OutputKind.STANDARD_ANALOG if analog else OutputKind.STANDARD_DIGITAL
+    goal = square(cell, *(replace(each, output=output, pin=stretch.pin) for each in commands))
+    segment = replace(goal.segments[0], blend_radius=0.0)
+    return replace(
+        goal,
+        waypoints=tuple(cell.point(x, y) for x, y in WAYS),
+        segments=(segment,) * len(WAYS),
+        **{'proportional_outputs' if analog else 'pulses': (stretch,)},
+    )
+
+
+@pytest.mark.parametrize(('stretch', 'text'), [(FLOW, FLOWING), (PHOTOS, GIVING)])
+@pytest.mark.parametrize(
+    'inside',
+    [
+        command(0, distance=0.06),
+        command(0, offset=0.9),
+        command(3, fraction=-0.999, offset=-0.2),
+        command(2, distance=-0.001),
+        command(3, distance=-0.06),
+    ],
+)
+def test_a_command_within_a_stretch_of_its_output_is_refused_by_its_place(
+    cell, stretch, text, inside
+):
+    with pytest.raises(InvalidGoal) as refusal:
+        planned(cell, with_stretch(cell, stretch, command(0), inside))
+    assert str(refusal.value) == (f'io_commands[1].pin is {stretch.pin}, but at its place {text}')
+
+
+@pytest.mark.parametrize('stretch', [FLOW, PHOTOS])
+def test_commands_beside_a_stretch_are_placed_whatever_their_points(cell, stretch):
+    beside = (
+        command(0, offset=0.1),
+        command(1),
+        command(1, distance=-0.02),
+        command(1, distance=-0.02, offset=-0.1),
+        command(1, distance=0.06),
+        command(2, offset=0.1),
+    )
+    made = planned(cell, with_stretch(cell, stretch, *beside))
+    plain = [
+        record
+        for _, record in records(made)
+        if isinstance(record, SwitchOutput) and not (record.follows_speed or record.begins_pulses)
+    ]
+    assert len(plain) == len(beside) + isinstance(stretch, ProportionalOutput)
+
+
+def test_an_output_holds_the_value_of_a_command_where_it_follows_the_speed_no_more(cell):
+    made = planned(cell, with_stretch(cell, FLOW, command(2, value=0.3)))
+    _, *switches = (record for _, record in records(made))
+    assert [record.value for record in switches] == [1.0, FLOW.idle, 0.3]
+
+
+def test_a_lead_that_reaches_into_another_stretch_of_the_output_is_refused(cell):
+    later = replace(FLOW, first_waypoint=2, last_waypoint=3, begin_lead=0.1)
+    goal = with_stretch(cell, FLOW)
+    with pytest.raises(
+        InvalidGoal,
+        match=r'proportional_outputs.0..pin is 1, but at its end .* from point 2 to point 3;',
+    ):
+        planned(cell, replace(goal, proportional_outputs=(FLOW, later)))
+    planned(cell, replace(goal, proportional_outputs=(replace(later, begin_lead=0.0), FLOW)))

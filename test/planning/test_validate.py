@@ -668,19 +668,6 @@ REFUSALS = [
         'proportional_outputs[1].pin is 1, which another entry uses on the same points; let one',
     ),
     (
-        with_fields(
-            PLAIN,
-            proportional_outputs=(BEAD,),
-            io_commands=(
-                IOCommand(
-                    waypoint=1, offset=0.0, output=OutputKind.STANDARD_ANALOG, pin=1, value=0.5
-                ),
-            ),
-        ),
-        InvalidGoal,
-        'io_commands[0].pin is 1, but that standard analog output follows the speed from point 0',
-    ),
-    (
         with_fields(PLAIN, proportional_outputs=(BEAD,), keep_open=True),
         NotAvailable,
         'proportional_outputs is not empty, but the goal has keep_open; send all points at once',

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Trajectory points and results, against the bytes of the manufacturer's library."""
 
+from dataclasses import replace
 import json
 from pathlib import Path
 import struct
@@ -23,6 +24,7 @@ from ur_cartesian_driver.motion.plan.primitive import (
     CallFunction,
     ChangePayload,
     EndPress,
+    LeadLaw,
     MoveC,
     MoveJ,
     MoveL,
@@ -221,6 +223,15 @@ def test_no_points_are_no_bytes():
     assert encode_points([]) == b''
 
 
+PULSE_LAW = PulseLaw(
+    slot=0,
+    output=OutputKind.STANDARD_DIGITAL,
+    pin=2,
+    distance=0.002,
+    phase=0.0,
+    width=0.004,
+    count=1,
+)
 FIELD_ERRORS = [
     (MoveJ(target=(0.0, 0.0, float('nan'), 0.0, 0.0, 0.0)), 'target[2] is nan'),
     (MoveL(target=Pose(), q_near=(0.0, 0.0, 0.0, 0.0, 9e9, 0.0)), 'words 6-11[4]'),
@@ -242,6 +253,11 @@ FIELD_ERRORS = [
         'delay is -0.1',
     ),
     (SwitchOutput(output=OutputKind.STANDARD_ANALOG, pin=0, value=float('nan')), 'value is nan'),
+    (SpeedLaw(gain=3e3), 'gain is 3000.0'),
+    (LeadLaw(lead=0.1, distance=3e3, speeds=(0.1,) * 12), 'distance is 3000.0'),
+    (LeadLaw(lead=0.1, distance=0.1, speeds=(0.1,) * 8 + (3e3,) * 4), 'speeds[8] is 3000.0'),
+    (replace(PULSE_LAW, distance=3.0), 'distance [mm] is 3000.0'),
+    (replace(PULSE_LAW, phase=3e3), 'phase is 3000.0'),
     (Wait(duration=-1.0), 'duration is -1.0 s'),
     (Wait(duration=3e3), 'duration is 3000.0 s'),
     (

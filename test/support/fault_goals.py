@@ -37,17 +37,19 @@ from ur_cartesian_driver.motion.goal.goal import (
     Press,
     PressFrame,
     ProportionalOutput,
+    PulseTrain,
     SafeOutput,
     ScriptCall,
     Segment,
     Tolerance,
     Waypoint,
 )
+from ur_cartesian_driver.motion.plan.primitive import PulseLaw
 from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.planning import plan
 from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
-from ur_cartesian_driver.protocol.program.registers import OutputInteger
+from ur_cartesian_driver.protocol.program.registers import OutputInteger, PULSE_COUNTS
 from ur_cartesian_driver.protocol.program.reverse import ControlMode, TrajectoryAction
 from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState
@@ -575,6 +577,77 @@ class OutputGoal(BlendGoal):
         return [outputs[AT_CORNER], outputs[AFTER_END]]
 
 
+#: The output that gives pulses while its goal runs, and one that switches ahead of its place.
+PULSED, AHEAD = 4, 2
+
+
+@lru_cache
+def pulse_plan(start):
+    """Return the plan around the square with pulses, and a lead to a place on the last side."""
+    train = PulseTrain(
+        first_waypoint=0,
+        last_waypoint=2,
+        output=OutputKind.STANDARD_DIGITAL,
+        pin=PULSED,
+        distance=0.01,
+        width=0.016,
+    )
+    ahead = IOCommand(
+        waypoint=2,
+        distance=-0.01,
+        offset=-0.05,
+        output=OutputKind.STANDARD_DIGITAL,
+        pin=AHEAD,
+        value=1.0,
+    )
+    return square_plan(start.state, pulses=(train,), io_commands=(ahead,))
+
+
+class PulseGoal(BlendGoal):
+    """Three sides of a square, with pulses, and an output that switches ahead of its place."""
+
+    def __init__(self, cell):
+        self._outputs = cell.robot.controller.io.digital_out.standard
+        self._outputs[AHEAD] = False
+        super().__init__(cell)
+        self._count_before = self._count()
+
+    def plan_from(self, start):
+        return pulse_plan(start)
+
+    def is_in(self, phase):
+        match phase:
+            case 'a pulse is on':
+                return super().is_in('mid-segment') and self._outputs[PULSED]
+            case 'between pulses' | 'cancelling':
+                return super().is_in('mid-segment') and not self._outputs[PULSED]
+        raise AssertionError(phase)
+
+    def record_end(self):
+        self._count_at_end, self._ahead_at_end = self._count(), self._outputs[AHEAD]
+
+    async def check_process(self, context):
+        await super().check_process(context)
+        await self.cell.until(
+            lambda: not self._outputs[PULSED], REACHED_WITHIN, f'pulses, {context}'
+        )
+
+    def check_result(self, row, phase):
+        """Check that all pulses came, or none after the end; and the output with the lead."""
+        succeeded, here = row.code is ErrorCode.SUCCESSFUL, (row.fault, phase)
+        assert self._outputs[AHEAD] == (succeeded or self._ahead_at_end), here
+        assert not self._outputs[PULSED], here
+        if succeeded:
+            (law,) = [one for one in self.plan.instructions if isinstance(one, PulseLaw)]
+            assert (self._count() - self._count_before) % PULSE_COUNTS == law.count, here
+        else:  # a program that starts anew counts from 0
+            assert self._count() in (self._count_at_end, 0), here
+            assert not self._ahead_at_end or row.result_within > IMMEDIATE_END, here
+
+    def _count(self):
+        return self.cell.robot.controller.io.outputs.integers[OutputInteger.PULSES]
+
+
 @lru_cache
 def rounded_output_plan(start, values, execution):
     """Return the same around rounded corners."""
@@ -926,6 +999,7 @@ GOALS = {
     'Appendable goals': AppendGoal,
     'Replaced tails': ReplacedTailGoal,
     'Outputs': OutputGoal,
+    'Pulses': PulseGoal,
     'At a point': RestGoal,
     'At a point, SERVO': ServoRestGoal,
     'Rounded corners': RoundedGoal,

@@ -441,6 +441,23 @@ OUTPUTS = _mode(
     pendant=('protective stop', 'an operator pauses the program'),
 )
 
+PULSES = _mode(
+    'Pulses',
+    'PRIMITIVES with two blends, pulses every 10 mm from the first point to the last, and an '
+    'output that switches 0.05 s ahead of a place on the last side. When a goal does not '
+    'succeed, the pulse that is on ends, no pulse follows, and that output is not switched on; '
+    'a pause ends the pulse, too, and the others come when the program goes on.',
+    {
+        'a pulse is on': 'between the blends, the output of the pulses is on',
+        'between pulses': 'between the blends, it is off',
+        'cancelling': 'CANCEL is on the wire, the arm still moves',
+    },
+    2.0,
+    {},
+    faults=WITH_POINTS,
+    pendant=('protective stop', 'an operator pauses the program'),
+)
+
 AT_A_POINT = _mode(
     'At a point',
     'PRIMITIVES with a `dwell` and an `input_waits` entry, whose input comes 0.4 s after the '
@@ -699,6 +716,7 @@ MODES = (
     APPEND,
     REPLACED_TAILS,
     OUTPUTS,
+    PULSES,
     AT_A_POINT,
     SERVO_AT_A_POINT,
     ROUNDED_CORNERS,

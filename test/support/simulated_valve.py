@@ -2,7 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """A valve that acts late, on an output of the simulated controller, and the beads that it lays."""
 
+from dataclasses import dataclass
+
 import numpy as np
+from traced_run import ARM, HOME, TOOL
+
+from ur_cartesian_driver.path import digital, mm, Path
+from ur_cartesian_driver.planning import plan
+
+#: The output of the valve, and its dead times [s].
+PIN, OPEN, CLOSE = 2, 0.060, 0.035
+CYCLE = ARM.model.control_cycle
 
 
 class SimulatedValve:
@@ -41,3 +51,61 @@ class SimulatedValve:
         tool = np.array(self._tool)
         places = np.column_stack([np.interp(times, self._times, axis) for axis in tool.T])
         return places.reshape(-1, 2, 3)
+
+
+@dataclass(frozen=True)
+class Bead:
+    """A bead along x of the tool: its speed [m/s] and length [m], and how it is executed."""
+
+    speed: float
+    length: float
+    is_rounded: bool = False
+
+    @property
+    def run(self):
+        """The way to gain speed and to lose it, with the way of the lead at full speed [m]."""
+        return mm(6) + self.speed**2 + 0.08 * self.speed
+
+    def path(self, start, lead):
+        """Return a path with the bead at points that it passes, or between its points."""
+        on, off = (digital(PIN), True), (digital(PIN), False)
+        path = Path(start).at(speed=self.speed, acceleration=1.0).by(mm(5), of_tool=True)
+        if self.is_rounded:
+            return (
+                path.by(self.run - mm(5), of_tool=True)
+                .set(*on, lead=lead)
+                .by(self.length, of_tool=True)
+                .set(*off, lead=lead)
+                .by(self.run, of_tool=True)
+                .rounded(mm(1))
+            )
+        return (
+            path.by(2.0 * self.run + self.length - mm(5), of_tool=True)
+            .set(*on, distance=-self.run - self.length, lead=lead)
+            .set(*off, distance=-self.run, lead=lead)
+        )
+
+
+def laid(robot, path, options):
+    """Lay the beads of a path, which begins at the tool; return where they begin and end."""
+    state = robot.place(HOME, TOOL)
+    goal = path(state.actual_tcp_pose).goal()
+    made = plan(goal, state, ARM, options)
+    valve = SimulatedValve(robot.controller, PIN, open=OPEN, close=CLOSE)
+    run = robot.run(list(made.instructions), on_cycle=valve)
+    assert not run.failure
+    return valve.beads()
+
+
+def along(beads, start, axis):
+    """Return the ends of beads along an axis of the tool, from its start on (n, 2) [m]."""
+    direction = start.apply(axis)
+    return (beads - start.position) @ (np.array(direction) - start.position)
+
+
+def errors(robot, bead, lead, options):
+    """Return how far behind the wanted places a bead begins and ends (2,) [m]."""
+    start = robot.place(HOME, TOOL).actual_tcp_pose
+    beads = laid(robot, lambda pose: bead.path(pose, lead), options)
+    assert len(beads) == 1
+    return along(beads, start, (1.0, 0.0, 0.0))[0] - [bead.run, bead.run + bead.length]

@@ -2,18 +2,57 @@
 # SPDX-License-Identifier: Apache-2.0
 """A goal in the simulated controller: where the tool is, and what its outputs are, by cycle."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
+from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 
 ARM, STEP = Arm(robot_model('ur5e')), 0.002
-HOME = (0.3, -1.4, 1.5, -1.6, -1.5, 0.2)
+HOME, TOOL = (0.3, -1.4, 1.5, -1.6, -1.5, 0.2), Pose((0.0, 0.02, 0.12))
 OPTIONS = PlanningOptions(max_tool_speed=1.0)
 #: A zigzag that does not come near itself [m].
 ZIGZAG = ((0.0, 0.03), (0.05, 0.05), (0.07, 0.0), (0.12, 0.02), (0.13, 0.07))
+
+
+def instructions_of(goal, state, sizes=()):
+    """
+    Return the records of a goal, as the robot program gets them.
+
+    :param sizes: as for :class:`TracedRun`. Pulses to the last point are those of an open goal.
+    """
+    if not sizes:
+        return list(plan(goal, state, ARM, OPTIONS).instructions)
+    count, end = len(goal.waypoints), sizes[0]
+    trains = tuple(
+        replace(train, last_waypoint=end - 1) if train.last_waypoint == count - 1 else train
+        for train in goal.pulses
+    )
+    whole = replace(goal, pulses=trains, keep_open=True)
+    part = plan_first_part(
+        plan(replace(whole, **_points(goal, 0, end)), state, ARM, OPTIONS), ARM, OPTIONS
+    )
+    records = list(part.plan.instructions)
+    for size in sizes[1:]:
+        points = AppendedPoints(**_points(goal, end, end + size), last=end + size == count)
+        part = plan_append(part.next_goal, points, ARM, OPTIONS, from_rest=False)
+        records[part.records_before :] = part.plan.instructions
+        end += size
+    return records
+
+
+def _points(goal, begin, end):
+    """Return the fields of a goal that belong to its points from ``begin`` to ``end``."""
+    return {
+        'waypoints': goal.waypoints[begin:end],
+        'segments': goal.segments[begin:end],
+        'io_commands': tuple(c for c in goal.io_commands if begin <= c.waypoint < end),
+    }
 
 
 class TracedRun:
@@ -23,12 +62,20 @@ class TracedRun:
     :param goal: a goal, or a function that makes one from the pose at the start.
     :param slider: the speed slider by cycle.
     :param act: called after each cycle, with the controller and the number of the cycle.
+    :param sizes: the numbers of points that come together, the others appended; empty = all.
     """
 
-    def __init__(self, robot, goal, slider=lambda cycle: 1.0, act=lambda controller, cycle: None):
-        state = robot.place(HOME, Pose((0.0, 0.02, 0.12)))
+    def __init__(
+        self,
+        robot,
+        goal,
+        slider=lambda cycle: 1.0,
+        act=lambda controller, cycle: None,
+        sizes=(),
+    ):
+        state = robot.place(HOME, TOOL)
         self.goal = goal(state.actual_tcp_pose) if callable(goal) else goal
-        self.plan = plan(self.goal, state, ARM, OPTIONS)
+        instructions = instructions_of(self.goal, state, sizes)
         outputs = robot.controller.io.digital_out.standard
         outputs[:] = [False] * 8
         before = list(outputs)
@@ -46,7 +93,7 @@ class TracedRun:
             act(controller, len(positions))
 
         robot.controller.set_slider(slider(0))
-        run = robot.run(list(self.plan.instructions), on_cycle=watch)
+        run = robot.run(instructions, on_cycle=watch)
         assert not run.failure, run.failure
         self.positions = np.array(positions)
         self.ways = np.append(

@@ -224,7 +224,9 @@ class PathWithEvents(PathOfMotions):
             output=output.kind,
             pin=output.pin,
             count=count,
-            **numbers(where, distance=distance, phase=phase, width=width),
+            distance=any_number(where, 'distance', distance),
+            phase=any_number(where, 'phase', phase),
+            width=any_number(where, 'width', width),
         )
         return self._with_event(where, self._points[-1], train)
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import floor, sqrt
+from math import floor, inf, sqrt
 from typing import Any
 
 import numpy as np
@@ -370,9 +370,11 @@ class _Resumption:
     # -- events ----------------------------------------------------------------------------------
 
     def _time_since(self, place: float, field: str, offset: float) -> float:
-        """Return the time from a place to the one of the resumption [s]; 0 = offset <= 0."""
-        if offset <= 0.0:
-            return 0.0
+        """
+        Return the time from a place to the one of the resumption [s]; inf = not known.
+
+        :raises InvalidGoal: it is not known, and the offset is positive.
+        """
         if self.timed:
             return self._time(self.begin) - self._time(place)
         elapsed = 0.0
@@ -382,6 +384,8 @@ class _Resumption:
             if place <= k and k > 0:
                 elapsed += self.segments[k - 1].dwell
             if not self.segments[k].velocity:
+                if offset <= 0.0:
+                    return inf
                 raise InvalidGoal(
                     field,
                     f'is {offset:g} s after its place, but when the arm was there is not known: '

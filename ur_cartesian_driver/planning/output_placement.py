@@ -11,6 +11,8 @@ from typing import Any
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.goal.goal import OutputKind
+from ur_cartesian_driver.motion.goal.output_names import output_name
 from ur_cartesian_driver.motion.plan.plan import PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import OutputRecord, SwitchOutput
 from ur_cartesian_driver.planning.request.point_events.registry import OUTPUT_EVENTS
@@ -55,7 +57,9 @@ def place_outputs(
         for kind in OUTPUT_EVENTS
         for found in kind.place_all(events.get(kind.field, ()), path)
     ]
-    switches.sort(key=lambda found: found.time)
+    # Where a stretch ends, something else may begin.
+    switches.sort(key=lambda found: (found.time, not found.ends_stretch))
+    _check_stretches(switches)
     _check_leads(switches)
     outputs: dict[int, tuple[OutputRecord, ...]] = {}
     notes = dict(segments.notes)
@@ -74,6 +78,36 @@ def place_outputs(
     return replace(segments, outputs=outputs, notes=notes)
 
 
+def _check_stretches(switches: Sequence[PlacedOutput]) -> None:
+    """Refuse what switches an output while the robot program drives that output by a law."""
+    begins: dict[tuple[OutputKind, int], list[PlacedOutput]] = {}
+    for found in switches:
+        if found.stretch is not None:
+            begins.setdefault(_output(found), []).append(found)
+    for found in switches if begins else ():
+        for begin in begins.get(_output(found), ()):
+            stretch = begin.stretch
+            if stretch is None or found.stretch is not None or found.field == begin.field:
+                continue
+            # A slow tool switches an output with a lead later, up to its place.
+            latest = found.time + found.lead
+            if latest > begin.time + SAME_TIME and found.time < stretch.end - SAME_TIME:
+                where = 'at its end' if found.ends_stretch else 'at its place'
+                raise InvalidGoal(
+                    f'{found.field}.pin',
+                    f'is {_output(found)[1]}, but {where} {output_name(*_output(found))} '
+                    f'{stretch.text}',
+                    'use another output, or move the place',
+                )
+
+
+def _output(found: PlacedOutput) -> tuple[OutputKind, int]:
+    """Return the output that a record switches, and its pin."""
+    record = found.records[-1]
+    assert isinstance(record, SwitchOutput)
+    return record.output, record.pin
+
+
 def _check_leads(switches: Sequence[PlacedOutput]) -> None:
     """
     Refuse more leads at one time than the program follows, and one that reverses an order.
@@ -84,11 +118,9 @@ def _check_leads(switches: Sequence[PlacedOutput]) -> None:
         return
     running: list[float] = []
     #: The latest place of each output so far, with the lead to it.
-    latest: dict[tuple[int, int], PlacedOutput] = {}
+    latest: dict[tuple[OutputKind, int], PlacedOutput] = {}
     for found in switches:
-        record = found.records[-1]
-        assert isinstance(record, SwitchOutput)
-        output, place = (record.output, record.pin), found.time + found.lead
+        output, place = _output(found), found.time + found.lead
         before = latest.setdefault(output, found)
         if place < before.time + before.lead - SAME_TIME and before.time < found.time - SAME_TIME:
             raise InvalidGoal(

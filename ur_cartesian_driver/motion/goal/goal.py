@@ -423,6 +423,8 @@ class PulseTrain:
     width: Annotated[float, Range(0.0, MAX_PULSE_WIDTH, 's')] = 0.0
     #: Number of pulses; 0 = as many as there is room for.
     count: Annotated[int, Sent(form=Form.COUNT), Range(0, MAX_PULSE_COUNT)] = 0
+    #: Whether the pulses go on along points that are appended, to the end of the goal.
+    goes_on: Annotated[bool, Mark.NOT_SENT] = field(default=False, compare=False)
 
 
 #: ``Press.first_waypoint`` of the driver's own presses that begin where the motion begins.

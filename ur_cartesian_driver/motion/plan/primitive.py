@@ -203,6 +203,7 @@ class PulseLaw:
     :param distance: way of the tool from pulse to pulse [m].
     :param phase: way from the place of the next output to the first pulse [m].
     :param width: how long a pulse is [s].
+    :param goes_on: whether the pulses that are left at the end of the trajectory are not given.
     """
 
     slot: int
@@ -212,6 +213,7 @@ class PulseLaw:
     phase: float
     width: float
     count: int
+    goes_on: bool = False
 
 
 #: A record that is neither a motion nor a stop.

@@ -17,16 +17,17 @@ the ending of a spline is a piece that brakes after the last point
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import re
 
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.errors import GoalRefused, TooFast
+from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal, TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Int32s
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
-from ur_cartesian_driver.motion.goal.goal import IOCommand, Segment
+from ur_cartesian_driver.motion.goal.goal import IOCommand, PulseTrain, Segment
 from ur_cartesian_driver.motion.goal.goal_columns import goal_table, GoalTable, WaypointRows
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline, SAME_TIME
 from ur_cartesian_driver.motion.plan.move_rows import SplineRows
@@ -56,6 +57,10 @@ from ur_cartesian_driver.planning.request.controlled_frame import retarget_to_tc
 from ur_cartesian_driver.planning.request.field_rules import check_record
 from ur_cartesian_driver.planning.request.ignored_fields import ignored_remarks
 from ur_cartesian_driver.planning.request.joint_points import check_for_arm
+from ur_cartesian_driver.planning.request.point_events.path_clock import PathClock
+from ur_cartesian_driver.planning.request.point_events.pulses import check_speed, Pulses
+from ur_cartesian_driver.planning.request.point_events.switched_outputs import SwitchedOutputs
+from ur_cartesian_driver.planning.request.point_events.timed_path import TimedPath
 from ur_cartesian_driver.planning.spline.spline_planner import (
     end_state,
     plan_spline,
@@ -77,6 +82,7 @@ _STOP_ROWS = 16
 _DIGITS = 9
 #: Pattern of the numbers of points and segments in texts of the planner.
 _NUMBER = re.compile(r'\b(point |points\[|segments\[)(\d+)')
+_COMMAND = re.compile(r'\b(io_commands\[)(\d+)')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -106,10 +112,18 @@ class AppendPlan:
 def plan_first_part(plan: Plan, arm: Arm, options: PlanningOptions) -> AppendPlan:
     """Return the first part of a goal, with its ending, from the plan of the goal."""
     goal = plan.goal
+    pulses = Pulses().of(goal)
     base = AppendableGoal(
         goal=replace(
-            goal, waypoints=(), segments=(), io_commands=(), age=None, execution=plan.execution
+            goal,
+            waypoints=(),
+            segments=(),
+            io_commands=(),
+            pulses=(),
+            age=None,
+            execution=plan.execution,
         ),
+        pulses=tuple((f'pulses[{i}]', each) for i, each in enumerate(pulses) if each.goes_on),
         T_flange_active=plan.T_flange_active,
         T_flange_tcp=plan.T_flange_tcp,
         q_rest=plan.start,
@@ -119,7 +133,8 @@ def plan_first_part(plan: Plan, arm: Arm, options: PlanningOptions) -> AppendPla
     )
     planner = _PartPlanner(base, appended, arm, options)
     if plan.execution.traits.is_spline:
-        return planner.spline_part(plan, SplineState(q=plan.start), end_state(plan), 0)
+        begin = SplineState(q=plan.start)
+        return planner.spline_part(plan, begin, end_state(plan), 0, pulses)
     return planner.moves_part(plan, 0, 0.0)
 
 
@@ -299,7 +314,7 @@ class _PartPlanner:
             _output_key(record)
             for segment in plan.segments[:-1]
             for record in segment.outputs
-            if isinstance(record, SwitchOutput)
+            if isinstance(record, SwitchOutput) and not record.begins_pulses
         )
         still = []
         for end_time, command in sorted(commands, key=lambda one: one[0]):
@@ -380,7 +395,12 @@ class _PartPlanner:
         )
 
     def spline_part(
-        self, plan: Plan, begin: SplineState, end: SplineState, records_before: int
+        self,
+        plan: Plan,
+        begin: SplineState,
+        end: SplineState,
+        records_before: int,
+        pulses: Sequence[PulseTrain] = (),
     ) -> AppendPlan:
         """
         Return a part whose ending is a stopping piece, if the arm moves at its last point.
@@ -388,10 +408,12 @@ class _PartPlanner:
         If outputs are due at the last point or later, the piece to that point also belongs to the
         ending: the outputs follow that piece on the wire, and their triggers depend on the next
         points.
+
+        :param pulses: those that begin in this part.
         """
         start_time = begin.time
         closing = self._stop(end) if end.is_moving and not self._appended.last else None
-        complete, due_commands = self._place_outputs(plan, closing, start_time)
+        complete, due_commands = self._place_outputs(plan, closing, start_time, pulses)
         pending = tuple(
             (time, command)
             for time, command in due_commands
@@ -448,6 +470,7 @@ class _PartPlanner:
         plan: Plan,
         closing: tuple[PlannedRows, ReferencePath] | None,
         start_time: float,
+        pulses: Sequence[PulseTrain],
     ) -> tuple[Plan, list[tuple[float, IOCommand]]]:
         """Return a plan with its stop and outputs, and the commands with their due times [s]."""
         rows, reference = plan.rows, plan.reference
@@ -458,23 +481,58 @@ class _PartPlanner:
             # The stop leads to no point: outputs that are due during it come after the last point.
             waypoints = np.append(waypoints, stop.waypoints + 1)
         ends = _end_times(waypoints, rows.durations, start_time)
+        bare = replace(rows, waypoints=waypoints, outputs={})
+        timed_path = TimedPath(bare, reference, None, start_time)
+        pending, new = self._before.outputs, self._appended.io_commands
         due_commands = [
-            *self._before.outputs,
-            *((ends[c.waypoint] + c.offset, c) for c in self._appended.io_commands),
+            *pending,
+            *(
+                (self._due_time(f'io_commands[{i}]', c, timed_path, ends), c)
+                for i, c in enumerate(new)
+            ),
         ]
         commands = []
-        for time, command in due_commands:
+        for time, command in pending:
             waypoint = max(command.waypoint, int(waypoints[0]))
             offset = max(0.0, time - ends[waypoint])
-            commands.append(replace(command, waypoint=waypoint, offset=offset))
-        found = place_outputs(
-            replace(rows, waypoints=waypoints, outputs={}),
-            reference,
-            {'io_commands': commands},
-            start_time=start_time,
-        )
+            commands.append(
+                replace(command, waypoint=waypoint, offset=offset, distance=0.0, fraction=0.0)
+            )
+        try:
+            found = place_outputs(
+                bare,
+                reference,
+                {'io_commands': (*commands, *new), 'pulses': pulses},
+                start_time=start_time,
+                control_cycle=self._arm.model.control_cycle,
+            )
+        except GoalRefused as refusal:
+            raise refusal.reworded(_renumber_commands(str(refusal), -len(pending))) from None
         rows = replace(rows, outputs=found.outputs)
         return replace(plan, segments=rows, reference=reference), due_commands
+
+    def _due_time(
+        self, field: str, command: IOCommand, path: TimedPath, ends: Mapping[int, float]
+    ) -> float:
+        """
+        Return when a new command is due [s].
+
+        :raises InvalidGoal: its place is behind the last point, on a path that may change.
+        """
+        if not (command.distance or command.fraction or command.offset < 0.0):
+            return ends[command.waypoint] + command.offset
+        (found,) = SwitchedOutputs().place(command, field, path)
+        last = self._points - 1
+        place = found.time + found.lead - max(command.offset, 0.0)
+        if place > ends[last] + SAME_TIME and not self._appended.last:
+            name = 'distance' if command.distance else 'fraction'
+            raise InvalidGoal(
+                f'{field}.{name}',
+                f'is {getattr(command, name):g}, but the path behind point {last} is not known '
+                'yet',
+                'send the command with a later point, as a place before it',
+            )
+        return found.time
 
     # -- both ------------------------------------------------------------------------------------
 
@@ -493,6 +551,15 @@ class _PartPlanner:
 
         :param ending: the number of motions of the ending.
         """
+        for field, train in self._before.pulses:
+            times = plan.reference.time
+            check_speed(
+                train,
+                field,
+                PathClock(plan.reference),
+                self._arm.model.control_cycle,
+                (float(times[0]), float(times[-1])),
+            )
         last, rows = self._appended.last, plan.rows
         records = records_before + int(rows.records.sum())
         ending_records = int(rows.records[len(rows) - ending :].sum())
@@ -567,6 +634,11 @@ def _renumber_plan(plan: Plan, first: int, waypoint: int, start_time: float) -> 
 def _renumber_text(text: str, first: int) -> str:
     """Return a text with its points renumbered from the start of the goal."""
     return _NUMBER.sub(lambda found: f'{found[1]}{int(found[2]) + first}', text)
+
+
+def _renumber_commands(text: str, first: int) -> str:
+    """Return a text with its output commands renumbered."""
+    return _COMMAND.sub(lambda found: f'{found[1]}{int(found[2]) + first}', text)
 
 
 def _end_times(waypoints: Int32s, durations: Floats, start_time: float) -> dict[int, float]:

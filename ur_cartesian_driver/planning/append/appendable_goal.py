@@ -14,13 +14,21 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.motion.goal.field_annotations import shifted
-from ur_cartesian_driver.motion.goal.goal import FreeAxis, Goal, IOCommand, Segment, Waypoint
+from ur_cartesian_driver.motion.goal.goal import (
+    FreeAxis,
+    Goal,
+    IOCommand,
+    PulseTrain,
+    Segment,
+    Waypoint,
+)
 from ur_cartesian_driver.motion.goal.goal_columns import (
     goal_table,
     rows_where,
     SegmentRows,
     WaypointRows,
 )
+from ur_cartesian_driver.motion.goal.output_names import output_name
 from ur_cartesian_driver.motion.plan.plan import PlannedRows, PlannedSegment, ReferencePath
 from ur_cartesian_driver.planning.append.planned_part import PlannedPart
 from ur_cartesian_driver.planning.geometry.curves import SAME_ANGLE, SAME_POSITION
@@ -122,6 +130,8 @@ class AppendableGoal:
     #: The planned parts of a spline that are not passed, in the order of planning; each is valid
     #: until the next one begins.
     parts: tuple[PlannedPart, ...] = ()
+    #: The pulses that go on along appended points, each with its name in a refusal.
+    pulses: tuple[tuple[str, PulseTrain], ...] = ()
     #: All commands on ``parts``, each with the motion time when it is due [s].
     commands: tuple[tuple[float, IOCommand], ...] = ()
 
@@ -154,6 +164,14 @@ def check_appended_points(
                 f'request are {first} to {first + count - 1}',
                 'name one of these',
             )
+        for _, train in appendable.pulses:
+            if (train.output, train.pin) == (command.output, command.pin):
+                raise InvalidGoal(
+                    f'io_commands[{i}].pin',
+                    f'is {command.pin}, but {output_name(train.output, train.pin)} gives pulses '
+                    'to the end of the goal',
+                    'use another output',
+                )
     # Only the new commands are checked, so that refusals number them as in this request.
     check_outputs(
         goal_table(

@@ -43,8 +43,9 @@ offset, minimum, maximum and the time constant of the filter [s]. Kind 6 gives t
 output: words 0 - 11 are the planned speeds from that output's place back to its trigger pose, word
 13 is the lead [s], 15 the distance between place and trigger pose [m or rad], and 17 is 1 if the
 tool only turns. Kind 7 gives the law of the pulses that begin with the next record of kind 8:
-words 0 - 6 are the distance between pulses [mm], the way to the first one [m], their
-width [s], their number in millions, the slot of their count, and kind and pin of the output.
+words 0 - 7 are the distance between pulses [mm], the way to the first one [m], their width [s],
+their number in millions, the slot of their count, kind and pin of the output, and 1 if those that
+are left at the end of the trajectory are not given.
 
 The stops, which only our own program knows, are motions during which the arm stands still.
 WAIT waits: word 18 is the time from the end of the previous motion until the next one may begin.
@@ -93,6 +94,7 @@ from ur_cartesian_driver.motion.plan.primitive import (
     ChangePayload,
     EndPress,
     Instruction,
+    LEAD_PIECES,
     LeadLaw,
     MoveC,
     MoveJ,
@@ -220,8 +222,8 @@ def _indexed(name: str, count: int = 6) -> tuple[str, ...]:
     return tuple(f'{name}[{i}]' for i in range(count))
 
 
-def _stop_names(*groups: Sequence[str], time: str = 'word 18') -> tuple[str, ...]:
-    """Return the field names of a stop; groups name the words from 0, 6 and 12 on."""
+def _group_names(*groups: Sequence[str], time: str = 'word 18') -> tuple[str, ...]:
+    """Return the field names of a record; groups name the words from 0, 6 and 12 on."""
     names = [f'word {i}' for i in range(18)]
     for first, group in zip((0, 6, 12), groups, strict=False):
         names[first : first + len(group)] = group
@@ -265,23 +267,36 @@ _OUTPUT_NAMES = (
 _NAMES: Mapping[float, Sequence[str]] = {
     MotionType.SPLINE: _SPLINE_NAMES,
     MotionType.SWITCH_OUTPUT: _OUTPUT_NAMES,
-    MotionType.WAIT: _stop_names(time='duration'),
-    MotionType.AWAIT_INPUT: _stop_names(
+    MotionType.WAIT: _group_names(time='duration'),
+    MotionType.AWAIT_INPUT: _group_names(
         (), (), ('input', 'pin', 'threshold', 'below', 'go_on'), time='timeout'
     ),
-    MotionType.CHANGE_PAYLOAD: _stop_names(
+    MotionType.CHANGE_PAYLOAD: _group_names(
         ('mass', *_indexed('center_of_gravity', 3)), _indexed('inertia'), time='transition_time'
     ),
-    MotionType.CALL_FUNCTION: _stop_names(_indexed('arguments'), (), ('number',)),
-    MotionType.PRESS_LAW: _stop_names(
+    MotionType.CALL_FUNCTION: _group_names(_indexed('arguments'), (), ('number',)),
+    MotionType.PRESS_LAW: _group_names(
         _indexed('wrench'),
         _indexed('limits'),
         ('damping', 'gain_scaling', 'zero_sensor', 'contact'),
     ),
-    MotionType.BEGIN_PRESS: _stop_names(
+    MotionType.BEGIN_PRESS: _group_names(
         _indexed('T_base_task'), _indexed('compliant'), ('follows_tool',)
     ),
-    MotionType.END_PRESS: _stop_names(),
+    MotionType.END_PRESS: _group_names(),
+}
+#: The same for a SWITCH_OUTPUT that is a law, by its word 12.
+_LAW_NAMES: Mapping[float, Sequence[str]] = {
+    FollowKind.LAW: _group_names(('gain', 'offset', 'minimum', 'maximum', 'filter_time')),
+    FollowKind.LEAD: _group_names(
+        _indexed('speeds', LEAD_PIECES + 1), (), ('kind', 'lead', 'word 14', 'distance')
+    ),
+    FollowKind.PULSE_LAW: _group_names(
+        (
+            *('distance [mm]', 'phase', 'width', 'count [millions]', 'slot', 'output', 'pin'),
+            'goes_on',
+        )
+    ),
 }
 
 #: Class -> its motion type for a target in joint positions, and its type for a target pose.
@@ -458,7 +473,8 @@ def _lead_fields(law: LeadLaw) -> PointFields:
 def _pulse_fields(law: PulseLaw) -> PointFields:
     numbers = (1e3 * law.distance, law.phase, law.width, 1e-6 * law.count)
     output, switch = (law.slot, law.output, law.pin), (FollowKind.PULSE_LAW, 0, 1, 0, 1, 0)
-    return (*numbers, *output, *(0.0,) * 5, *switch, 0, 0, MotionType.SWITCH_OUTPUT)
+    rest = (law.goes_on, *(0.0,) * 4)
+    return (*numbers, *output, *rest, *switch, 0, 0, MotionType.SWITCH_OUTPUT)
 
 
 def _stop_fields(stop: Stop) -> PointFields:
@@ -499,7 +515,7 @@ def check_fields(fields: PointFields) -> None:
     """
     duration, blend, kind = fields[18], fields[19], fields[20]
     if kind in _WITH_DELAY and not duration >= 0.0:
-        name = field_names(kind)[PointField.DURATION]
+        name = field_names(fields)[PointField.DURATION]
         raise LocalProtocolError(f'{name} is {duration!r} s, but must not be negative.')
     if kind == MotionType.SPLINE or kind in _WITH_DELAY:
         return
@@ -518,8 +534,11 @@ def check_fields(fields: PointFields) -> None:
         )
 
 
-def field_names(kind: float) -> Sequence[str]:
-    """Return the names of the 21 numbers of a motion type, for errors."""
+def field_names(fields: Sequence[float] | Floats) -> Sequence[str]:
+    """Return the names of the 21 numbers of a point, for errors."""
+    kind = float(fields[PointField.TYPE])
+    if kind == MotionType.SWITCH_OUTPUT:
+        return _LAW_NAMES.get(float(fields[PointField.OUTPUT_KIND]), _OUTPUT_NAMES)
     return _NAMES.get(kind, _MOVE_NAMES)
 
 

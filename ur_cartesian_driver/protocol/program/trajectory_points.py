@@ -160,7 +160,7 @@ def _encode_chunk(fields: Floats, first: int, dialect: Dialect) -> bytes:
     fits = (scaled > INT32_MIN - 0.5) & (scaled < INT32_MAX + 0.5)  # NaN does not fit
     if not fits.all():
         row, column = (int(i) for i in np.argwhere(~fits)[0])
-        name = field_names(fields[row, PointField.TYPE])[column]
+        name = field_names(fields[row])[column]
         error = range_error(float(fields[row, column]), name, int(scales[row, column]))
         raise LocalProtocolError(f'Point {first + row}: {error}')
     return dialect.arrange(_round_half_away(scaled).astype('>i4')).tobytes()

@@ -143,7 +143,7 @@ class Dialect:
             raise self._unsupported(f'{MotionType(int(kind)).name} (motion type {kind:g})')
         if not self.supports_q_near and fields[14] and kind in MOVE_TYPES:
             raise self._unsupported('q_near')
-        name = field_names(kind)[PointField.DURATION]
+        name = field_names(fields)[PointField.DURATION]
         if 0.0 < duration < self.min_duration:
             raise LocalProtocolError(
                 f'{name} is {duration!r} s, but wire dialect {self.name} has a resolution of '

@@ -77,11 +77,16 @@ class PathClock:
         turn = self.turn(time) - self.turn(time - span)
         turns = arc_length < _MIN_LENGTH_PER_TURN * turn
         values, length = (self._turns, turn) if turns else (self._arc_lengths, arc_length)
-        times = time - span * np.arange(pieces + 1) / pieces
-        speeds = np.array([self._speed(values, each) for each in times.tolist()])
-        # The robot program takes the acceleration between two speeds for constant.
-        found = float((speeds[1:] + speeds[:-1]).sum()) * span / (2.0 * pieces)
-        return length, speeds * (length / found if found > 0.0 else 0.0), turns
+        times = (time - span * np.arange(pieces + 1) / pieces).tolist()
+        speeds = np.array([self._speed(values, each) for each in times])
+        # The robot program takes the acceleration between two speeds for constant. Where it is
+        # not, the speeds beside give the piece its length; but those at begin and end are exact:
+        # at the begin the program measures how fast the time of the path runs.
+        lengths = np.array([self._between(values, each) for each in times])
+        lacking = -np.diff(lengths) * (pieces / span) - 0.5 * (speeds[1:] + speeds[:-1])
+        speeds[1:-1] += 0.5 * (lacking[1:] + lacking[:-1])
+        speeds[[1, -2]] += 0.5 * lacking[[0, -1]]
+        return length, np.maximum(speeds, 0.0), turns
 
     def max_speed(self, begin: float, end: float) -> float:
         """Return the largest speed of the tool from one time to another [m/s]."""

@@ -15,6 +15,7 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
 from ur_cartesian_driver.planning.request.point_events.output_event import OutputEvent
 from ur_cartesian_driver.planning.request.point_events.timed_path import (
+    DrivenStretch,
     PlacedOutput,
     SAME_TIME,
     TimedPath,
@@ -27,7 +28,7 @@ class ProportionalOutputs(OutputEvent[ProportionalOutput]):
     field = 'proportional_outputs'
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Refuse entries, or an entry and a command, that drive one output at the same time."""
+        """Refuse entries that drive one output at the same points."""
         super().check(goal, options)
         if goal.proportional_outputs and goal.keep_open:
             raise NotAvailable(
@@ -53,15 +54,6 @@ class ProportionalOutputs(OutputEvent[ProportionalOutput]):
                     f'is {output.pin}, which another entry uses on the same points',
                     'let one end where the other begins',
                 )
-            for k, command in enumerate(goal.io_commands):
-                is_same = (command.output, command.pin) == (OutputKind.STANDARD_ANALOG, output.pin)
-                if is_same and first <= command.waypoint < last:
-                    raise InvalidGoal(
-                        f'io_commands[{k}].pin',
-                        f'is {command.pin}, but that standard analog output follows the speed '
-                        f'from point {first} to point {last}',
-                        'use the other one, or end it before',
-                    )
 
     def check_event(self, where: str, output: ProportionalOutput) -> None:
         """Refuse a maximum that is not above the minimum."""
@@ -95,7 +87,7 @@ class ProportionalOutputs(OutputEvent[ProportionalOutput]):
         )
         name = f'standard analog output {output.pin}'
         begin = _ahead(
-            # Not 0: in a stop, the robot program switches waiting outputs of value 0.
+            # A stop carries out waiting records of value 0, and must not carry out this one.
             replace(switch, value=1.0, follows_speed=True),
             (output.first_waypoint, output.begin_lead, f'{field}.begin_lead'),
             path,
@@ -113,7 +105,12 @@ class ProportionalOutputs(OutputEvent[ProportionalOutput]):
                 f'is {output.end_lead:g} s, so the output would end before it begins',
                 'reduce it',
             )
-        return [replace(begin, records=(law, *begin.records)), end]
+        text = f'from point {output.first_waypoint} to point {output.last_waypoint}'
+        stretch = DrivenStretch(end=end.time, text=f'follows the speed {text}')
+        return [
+            replace(begin, field=field, records=(law, *begin.records), stretch=stretch),
+            replace(end, field=field, ends_stretch=True),
+        ]
 
 
 def _ahead(
@@ -144,6 +141,7 @@ def _ahead(
                 'reduce it, or add a point before',
             )
     return PlacedOutput(
+        field=field,
         time=end if time is None else time,
         after_index=after,
         report_index=point.row,

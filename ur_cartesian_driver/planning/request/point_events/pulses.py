@@ -6,17 +6,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import ceil, floor
+from math import ceil, floor, inf
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.goal.goal import OutputKind, PulseTrain
+from ur_cartesian_driver.motion.goal.goal import Goal, MAX_PULSE_COUNT, OutputKind, PulseTrain
 from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.goal.output_names import output_fault, output_name, pulse_outputs
 from ur_cartesian_driver.motion.plan.primitive import PulseLaw, SwitchOutput
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
 from ur_cartesian_driver.planning.request.point_events.output_event import OutputEvent
+from ur_cartesian_driver.planning.request.point_events.path_clock import PathClock
 from ur_cartesian_driver.planning.request.point_events.timed_path import (
+    DrivenStretch,
     PassedPoint,
     PlacedOutput,
     TimedPath,
@@ -37,12 +40,10 @@ class Pulses(OutputEvent[PulseTrain]):
     field = 'pulses'
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Refuse entries on the same part, and what else drives their outputs there."""
+        """Refuse entries for one output on the same part, and presses there."""
         super().check(goal, options)
         if goal.pulses and goal.keep_open:
-            raise NotAvailable(
-                self.field, 'is not empty, but the goal has keep_open', 'send all points at once'
-            )
+            _check_open(goal)
         points = len(goal.waypoints)
         for i, train in enumerate(goal.pulses):
             field, first, last = f'{self.field}[{i}]', train.first_waypoint, train.last_waypoint
@@ -60,6 +61,14 @@ class Pulses(OutputEvent[PulseTrain]):
                 f'pulses of {MAX_PULSE_TRAINS} in a goal',
                 'split the goal',
             )
+
+    def of(self, goal: Goal) -> Sequence[PulseTrain]:
+        """Return the entries; one to the last point of an open goal goes on along later points."""
+        last = len(goal.waypoints) - 1
+        return tuple(
+            replace(train, goes_on=goal.keep_open and train.last_waypoint == last)
+            for train in goal.pulses
+        )
 
     def check_event(self, where: str, train: PulseTrain) -> None:
         """Refuse an analog output, or one that the robot does not have."""
@@ -96,10 +105,9 @@ class Pulses(OutputEvent[PulseTrain]):
                 ('last_point', train.last_waypoint),
             )
         )
-        count = _count(train, field, path.arc_length_of(train.last_waypoint) - path.arc_length_of(
-            train.first_waypoint
-        ))  # fmt: skip
-        _check_speed(train, field, path, begin.time, end.time)
+        length = path.arc_length_of(train.last_waypoint) - path.arc_length_of(train.first_waypoint)
+        count = (train.count or MAX_PULSE_COUNT) if train.goes_on else _count(train, field, length)
+        check_speed(train, field, path.clock, path.control_cycle, (begin.time, end.time))
         law = PulseLaw(
             slot=0,
             output=train.output,
@@ -108,27 +116,54 @@ class Pulses(OutputEvent[PulseTrain]):
             phase=train.phase,
             width=train.width,
             count=count,
+            goes_on=train.goes_on,
         )
-        # Not 0: in a stop, the robot program switches waiting outputs of value 0.
+        # A stop carries out waiting records of value 0, and must not carry out this one.
         record = SwitchOutput(
             output=train.output, pin=train.pin, value=1.0, begins_pulses=True
         )  # fmt: skip
+        stretch = DrivenStretch(
+            end=inf if train.goes_on else end.time + max(train.width, path.control_cycle),
+            text=f'gives pulses from point {train.first_waypoint} to '
+            + ('the end of the goal' if train.goes_on else f'point {train.last_waypoint}'),
+        )
+        number = f'{count} pulses' if train.count or not train.goes_on else 'pulses'
+        to = ' to the end of the goal' if train.goes_on else ''
         return [
             PlacedOutput(
+                field=field,
+                stretch=stretch,
                 time=begin.time if begin.trigger_time is None else begin.trigger_time,
                 after_index=begin.after,
                 report_index=begin.row,
                 records=(law, path.triggered(record, begin.trigger_time, begin.after)),
-                text=f'begins {count} pulses of {output_name(train.output, train.pin)}, every '
-                f'{1e3 * train.distance:.4g} mm, {begin.where}',
+                text=f'begins {number} of {output_name(train.output, train.pin)}, every '
+                f'{1e3 * train.distance:.4g} mm{to}, {begin.where}',
             )
         ]
+
+
+def _check_open(goal: GoalTable) -> None:
+    """Refuse pulses in a goal to which points can be appended but no outputs."""
+    mode = resolve_execution_mode(goal)
+    if mode.traits.streams_setpoints:
+        raise NotAvailable(
+            'pulses',
+            f'is not empty, but a {mode.name} goal with keep_open gives no pulses',
+            'set execution to SPLINE or PRIMITIVES, or send all points at once',
+        )
+    if goal.replace_horizon:
+        raise NotAvailable(
+            'pulses',
+            'is not empty, but the goal has a replace_horizon, so its path may change',
+            'set replace_horizon to 0, or send all points at once',
+        )
 
 
 def _check_others(
     goal: GoalTable, field: str, train: PulseTrain, before: Sequence[PulseTrain]
 ) -> None:
-    """Refuse what else drives the output of an entry on its part of the path, and presses."""
+    """Refuse other pulses of the output on the part of the path of an entry, and presses."""
     first, last = train.first_waypoint, train.last_waypoint
     name = output_name(train.output, train.pin)
     for other in before:
@@ -141,14 +176,6 @@ def _check_others(
                 f'{field}.pin',
                 f'is {train.pin}, but {name} already gives pulses on the same points',
                 'let one end where the other begins',
-            )
-    for k, command in enumerate(goal.io_commands):
-        is_same = (command.output, command.pin) == (train.output, train.pin)
-        if is_same and first <= command.waypoint <= last:
-            raise InvalidGoal(
-                f'io_commands[{k}].pin',
-                f'is {command.pin}, but {name} gives pulses from point {first} to point {last}',
-                'use another output',
             )
     for k, press in enumerate(goal.presses):
         if first < press.last_waypoint and press.first_waypoint < last:
@@ -190,12 +217,19 @@ def _count(train: PulseTrain, field: str, length: float) -> int:
     return train.count or most
 
 
-def _check_speed(train: PulseTrain, field: str, path: TimedPath, begin: float, end: float) -> None:
-    """Refuse a distance that the tool passes before the pulse and a cycle behind it are over."""
-    cycle = path.control_cycle
+def check_speed(
+    train: PulseTrain, field: str, clock: PathClock, cycle: float, times: tuple[float, float]
+) -> None:
+    """
+    Refuse a distance that the tool passes before the pulse and a cycle behind it are over.
+
+    :param cycle: cycle of the controller [s].
+    :param times: when the pulses begin and end [s].
+    :raises InvalidGoal: the text names the smallest distance and the highest speed.
+    """
     # The output is off for at least one cycle.
     period = cycle * (max(ceil(train.width / cycle - 0.5), 1) + 1)
-    speed = path.clock.max_speed(begin, end)
+    speed = clock.max_speed(*times)
     if speed * period > train.distance * (1.0 + _SAME_SPEED):
         raise InvalidGoal(
             f'{field}.distance',

@@ -45,7 +45,8 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
             )
         for field, waypoint in self.places(goal):
             check_point(field, waypoint, goal)
-        if goal.keep_open:
+        # The path to the last point of an open spline does not change any more.
+        if goal.keep_open and (goal.replace_horizon or not mode.traits.is_spline):
             for i, command in enumerate(goal.io_commands):
                 _check_open(f'{self.field}[{i}]', command)
 
@@ -62,19 +63,17 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
 
     def left(self, events: Sequence[IOCommand], rest: GoalRest) -> Sequence[IOCommand]:
         """Return commands that restore the outputs at the resumption, and the commands ahead."""
-        state: dict[tuple[int, int], IOCommand] = {}
-        left = []
-        places = [_place(command, rest) for command in events]
-        for place, _, i in sorted(
-            (place, command.offset, i)
-            for i, (place, command) in enumerate(zip(places, events, strict=True))
-        ):
-            command = events[i]
+        left, passed = [], []
+        for i, command in enumerate(events):
+            place = _place(command, rest)
             if place > rest.begin + NO_FRACTION:
                 left.append(_ahead(command, place, rest))
                 continue
             field, offset = f'io_commands[{i}].offset', command.offset
-            due = offset - rest.time_since(place, field, offset)
+            passed.append((offset - rest.time_since(place, field, offset), place, i))
+        state: dict[tuple[int, int], IOCommand] = {}
+        for due, _, i in sorted(passed):
+            command = events[i]
             command = replace(
                 command,
                 waypoint=rest.first,
@@ -92,7 +91,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
     def place(self, command: IOCommand, field: str, path: TimedPath) -> list[PlacedOutput]:
         """Return the record that switches the output, with its time and place."""
         point, lead = self._passed(command, field, path), max(-command.offset, 0.0)
-        lead_field = f'{field}.lead' if command.lead_name else f'{field}.offset'
+        lead_field = _lead_field(field, command)
         time, last = point.time + max(command.offset, 0.0), len(path.ends) - 1
         late, delay, trigger_time, law = time - float(path.ends[last]), 0.0, None, None
         rest = path.rests.get(command.waypoint)
@@ -121,6 +120,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
         )
         return [
             PlacedOutput(
+                field=field,
                 lead=lead,
                 lead_field=lead_field,
                 time=time if trigger_time is None else trigger_time,
@@ -146,19 +146,25 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
 
 
 def _check_open(where: str, command: IOCommand) -> None:
-    """Refuse places and leads in a goal to which points can be appended."""
-    for name, value in (
-        ('distance', command.distance),
-        ('fraction', command.fraction),
-        ('offset', min(command.offset, 0.0)),
+    """Refuse places and leads in a goal whose path changes when points are appended."""
+    for field, value in (
+        (f'{where}.distance', command.distance),
+        (f'{where}.fraction', command.fraction),
+        (_lead_field(where, command), min(command.offset, 0.0)),
     ):
         if value:
             raise NotAvailable(
-                f'{where}.{name}',
+                field,
                 f'is {value:g}, but a goal with keep_open switches outputs at its points or '
-                'later: points that are yet to come change the path and its times',
-                'add a point there, or send all points at once',
+                'later, unless it is a SPLINE without replace_horizon: points that are yet to '
+                'come change the path and its times',
+                'add a point there, or set execution to SPLINE',
             )
+
+
+def _lead_field(where: str, command: IOCommand) -> str:
+    """Return the field that gives the lead of a command."""
+    return f'{where}.lead' if command.lead_name else f'{where}.offset'
 
 
 def _place(command: IOCommand, rest: GoalRest) -> float:

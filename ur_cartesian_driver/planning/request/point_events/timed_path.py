@@ -52,9 +52,21 @@ _BEYOND = 1e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DrivenStretch:
+    """A stretch of the path on which the robot program drives an output by a law."""
+
+    #: When nothing drives the output any more at full speed [s].
+    end: float
+    #: The law and the points between which it holds, as part of a sentence.
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PlacedOutput:
     """The records of one output, with their place in the plan."""
 
+    #: Name of the event in a refusal.
+    field: str
     #: When the output is switched at full speed [s].
     time: float
     #: The row of the segment after which the records are sent.
@@ -63,6 +75,10 @@ class PlacedOutput:
     report_index: int
     records: tuple[OutputRecord, ...]
     text: str
+    #: The stretch that begins here, if one does.
+    stretch: DrivenStretch | None = None
+    #: Whether a stretch ends here.
+    ends_stretch: bool = False
     #: How much later the tool is at the place of the output, at full speed [s].
     lead: float = 0.0
     #: The field that gives the lead, in a refusal.

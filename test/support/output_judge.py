@@ -1,0 +1,223 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The cycle in which each output of a run is due, against the tool's own way.
+
+The judge knows positions and outputs of the simulated controller in each cycle, and nothing of
+the plan. The way of the tool is the sum of its steps; a point is on it where a step is nearest. A
+slow run tells when the tool would be at each way at full speed: the time of the path. In any run,
+an output is due when no more of this time is left to its place than passes within its lead; a
+pulse is due where the way is a multiple of the distance behind the place where its train begins.
+
+An output takes effect at the end of a cycle, so the nearest cycle is up to half a cycle beside the
+time at which the output is due. Places come to the robot in whole micrometres, and leads with
+speeds at a few places: for a slow tool, that is more than a cycle.
+"""
+
+from collections import Counter
+from dataclasses import dataclass, field
+from math import cos, floor
+
+import numpy as np
+from traced_run import STEP, TracedRun
+
+#: The slider of the runs that tell the time of the path.
+SLOW = 0.4
+#: How late or early, or how far from there [m] an output may switch near a rest.
+REST_CYCLES, REST_BOUND = 10, 1e-4
+#: How far beside its place an output may always switch [m]: a cycle of a tool with 10 mm/s.
+RESOLUTION = 2e-5
+#: The same with a lead over a stop or a corner, or while the slider moves [m].
+WIDE_BOUND = 1e-4
+#: Change of the slider in some cycles that does not count.
+SLIDER_RESTS = 0.005
+#: By how much the tool's way may be longer or shorter than the plan knows [m]: a pulse that is
+#: nearer to the last point may come or not.
+ROUNDING = 1e-5
+#: For so long after it goes on [cycles] the program waits until the arm moves.
+GOING_ON = 8
+
+SLIDERS = {
+    'full': lambda cycle: 1.0,
+    'low': lambda cycle: 0.1,
+    'changing': lambda cycle: 0.55 + 0.45 * cos(cycle / 120.0),
+    'steps': lambda cycle: (1.0, 0.2, 0.6)[cycle // 130 % 3],
+}
+
+
+class JudgedRun(TracedRun):
+    """One run of a goal, and the places of its outputs and pulses on the tool's way."""
+
+    def place(self, wanted):
+        """Return the way to the place of a command."""
+        here = self.way_of(wanted.waypoint)
+        if wanted.fraction:
+            other = wanted.waypoint + (1 if wanted.fraction > 0.0 else -1)
+            return here + abs(wanted.fraction) * (self.way_of(other) - here)
+        return here + wanted.distance
+
+    def places(self, train):
+        """Return the ways to the pulses of a train (count,)."""
+        begin, end = self.way_of(train.first_waypoint), self.way_of(train.last_waypoint)
+        room = floor((end - begin - train.phase - ROUNDING) / train.distance) + 1
+        return begin + train.phase + train.distance * np.arange(train.count or room)
+
+    def cycles(self, pin, rises):
+        """Return the cycles in which an output rises, or falls (n,)."""
+        return np.array([k for number, up, k in self.edges if (number, up) == (pin, rises)])
+
+
+class PathTime:
+    """The time of the path at full speed, from a run that the slider slows down for resolution."""
+
+    def __init__(self, slow):
+        ways, first = np.unique(slow.ways, return_index=True)
+        # Rests are no time of the path.
+        moving = np.append(0.0, np.cumsum(np.diff(slow.ways) > 0.0))
+        self._ways, self._times = ways, SLOW * STEP * moving[first]
+
+    def __call__(self, ways):
+        return np.interp(ways, self._ways, self._times)
+
+    def is_near_rest(self, way):
+        """Return whether the tool is so slow there that it makes no way that counts."""
+        k, speeds = int(np.searchsorted(self._ways, way)), np.diff(self._ways)
+        return speeds[max(k - 3, 0) : k + 2].min() < 0.2 * np.median(speeds)
+
+    def slows_between(self, begin, end):
+        """Return whether the tool is much slower somewhere on a part of its way."""
+        first, last = (int(np.searchsorted(self._ways, way)) for way in (begin, end))
+        speeds = np.diff(self._ways)
+        return bool(speeds[first:last].min(initial=np.inf) < 0.6 * np.median(speeds))
+
+
+@dataclass
+class Verdict:
+    """How late outputs or pulses were [cycles], and which of them were too late or too early."""
+
+    #: Negative = early; without those near a rest, where way tells little of time.
+    late: list = field(default_factory=list)
+    #: How far behind their places the tool was then [m].
+    off: list = field(default_factory=list)
+    #: How late those were that were due while the program was paused [cycles].
+    delayed: list = field(default_factory=list)
+    misses: dict = field(default_factory=dict)
+
+
+def judge_commands(run, path_time, bound, pauses=()):
+    """
+    Judge the edges of the commands of a run.
+
+    Near a rest the speed tells little of the slider, and the tool makes little way: there the
+    bound is wider. So it is with a lead over a stop or a corner, which may be shorter than the
+    pieces in which the lead comes to the robot, and while the slider moves. What is due in a
+    pause, in which the tool coasts on, comes when it has ended.
+
+    :param pauses: cycles in which the program is paused, and goes on.
+    """
+    verdict, wanted_pins = Verdict(), Counter(wanted.pin for wanted in run.goal.io_commands)
+    assert Counter(pin for pin, *_ in run.edges if pin in wanted_pins) == wanted_pins
+    at = {pin: cycle for pin, _, cycle in run.edges}
+    times = path_time(run.ways)
+    # Where the tool nearly rests, its way tells little of the time; no slider makes it faster.
+    rate = np.minimum(np.diff(times, prepend=0.0) / STEP, 1.0)
+    for wanted in run.goal.io_commands:
+        place, edge = run.place(wanted), at[wanted.pin]
+        left = path_time(place) - times
+        # What the program decides is carried out a cycle later. In the meantime the slider moves,
+        # or ceases to.
+        before = np.roll(rate, 2)
+        seen = rate, np.roll(rate, 1), before, 3.0 * before - 2.0 * np.roll(rate, 3)
+        dues = [_due(left, rate, each, max(-wanted.offset, 0.0)) for each in seen]
+        due = min(dues, key=lambda each: abs(edge - each))
+        late = edge - due
+        paused = [end for begin, end in pauses if begin - 1 <= due <= end + GOING_ON]
+        if paused:
+            # A lead that coasting shortens to nothing may be due again, up to the place itself.
+            reached = int(np.searchsorted(run.ways, place))
+            verdict.delayed.append(late)
+            if not (late > -bound and edge <= max(paused[0] + GOING_ON, reached + bound)):
+                verdict.misses[wanted.pin] = round(float(late), 2)
+            continue
+        off = run.ways[edge] - np.interp(due, np.arange(len(run.ways)), run.ways)
+        slow = path_time.is_near_rest(place) or path_time.is_near_rest(run.ways[int(due)])
+        if not slow:
+            verdict.late.append(late)
+            verdict.off.append(off)
+        near = slow and (abs(late) < REST_CYCLES or abs(off) < REST_BOUND)
+        is_wide = wanted.offset < 0.0 and (
+            path_time.slows_between(run.ways[edge], place)
+            or np.ptp(rate[max(edge - 6, 0) : edge + 1]) > SLIDER_RESTS
+        )
+        within = WIDE_BOUND if is_wide else RESOLUTION
+        if abs(late) > bound + 2.0 * is_wide and not near and abs(off) > within:
+            verdict.misses[wanted.pin] = round(float(late), 2)
+    return verdict
+
+
+def _due(left, rate, seen, lead):
+    """
+    Return the time at which an output is due [cycles].
+
+    :param left: time of the path to its place by cycle [s].
+    :param rate: how fast this time passes.
+    :param seen: the same as the program has seen it.
+    """
+    ahead = left - lead * seen
+    k = int(np.flatnonzero((ahead <= 0.0) & ((rate > 0.0) | (left <= 0.0)))[0])
+    return k - ahead[k] / min(ahead[k] - ahead[k - 1], -1e-12)
+
+
+def _lost(run, pauses):
+    """Return by cycle how much longer the way coasted in pauses was than its chords (n,) [m]."""
+    lost = np.zeros(len(run.ways))
+    for begin, end in pauses:
+        if end < len(lost):
+            chord = np.linalg.norm(run.positions[end] - run.positions[begin - 1])
+            lost[begin:] += run.ways[end] - run.ways[begin - 1] - chord
+    return lost
+
+
+def judge_pulses(run, train, bound, pauses=()):
+    """
+    Judge the pulses of a train: their number, the cycle of each, and the widths.
+
+    Near a rest, where the tool is slow, what counts is the way that it is off. The pulses of the
+    way that the tool coasts in a pause come behind it, as fast as their width allows; of that way
+    the program knows the chord only.
+    """
+    verdict, places = Verdict(), run.places(train)
+    counted = run.ways - _lost(run, pauses)
+    rises, width = run.cycles(train.pin, rises=True), max(round(train.width / STEP), 1)
+    following = places[-1] + train.distance
+    if not train.count and following < run.way_of(train.last_waypoint) + ROUNDING:
+        if len(rises) > len(places):
+            places = np.append(places, following)
+    assert len(rises) == len(places), (len(rises), len(places))
+    assert set(run.cycles(train.pin, rises=False) - rises) <= {width} or pauses
+    ways, first = np.unique(counted, return_index=True)
+    # Beside a rest the tool is at its place for many cycles: the nearest of them counts.
+    last = np.append(first[1:] - 1, len(counted) - 1)
+    due = np.interp(places, ways, first)
+    until = np.maximum(due, np.interp(places - 2e-6, ways, last))
+    steps = np.diff(run.ways, prepend=0.0)
+    waits = -np.inf
+    for place, rise, begin, end in zip(places, rises, due, until, strict=True):
+        late = rise - np.clip(rise, begin, end)
+        paused = [play for stop, play in pauses if stop - 1 <= begin <= play + GOING_ON]
+        if paused or begin < waits - 0.5:
+            verdict.delayed.append(late)
+            latest = max(begin, waits, *(play + GOING_ON for play in paused))
+            if not begin - bound < rise < latest + bound:
+                verdict.misses[round(float(place), 5)] = round(float(late), 2)
+            waits = rise + width + 1
+            continue
+        waits = -np.inf
+        off = counted[rise] - place
+        near_rest = steps[rise] < 0.2 * np.median(steps[rises])
+        if not near_rest:
+            verdict.late.append(late)
+            verdict.off.append(off)
+        if abs(late) > bound and abs(off) > (REST_BOUND if near_rest else RESOLUTION):
+            verdict.misses[round(float(place), 5)] = round(float(late), 2)
+    return verdict

@@ -1,0 +1,180 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Random goals with outputs by place, leads that overtake one another, and pulses, in one run."""
+
+from math import log10
+
+from output_judge import judge_commands, judge_pulses, JudgedRun, PathTime, SLIDERS, SLOW
+from random_cases import random_of
+from traced_run import HOME, instructions_of, TOOL, ZIGZAG
+
+from ur_cartesian_driver.motion.errors import GoalRefused
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
+    Goal,
+    IOCommand,
+    OutputKind,
+    PulseTrain,
+    Segment,
+    Waypoint,
+)
+from ur_cartesian_driver.path import PathPlace, resume
+
+KINDS = ('stops', 'dwells', 'rounded', 'spline', 'appended', 'resumed')
+LAST = len(ZIGZAG) - 1
+#: How late or early an output may be [cycles]; where points are appended, the speed at the begin
+#: of a lead is known less well: one more.
+BOUND = 1.0
+
+
+class Case:
+    """A random goal and how it is run."""
+
+    def __init__(self, number, attempt):
+        self.random = draw = random_of('outputs', number, attempt)
+        self.kind = KINDS[number % len(KINDS)]
+        self.shape = draw.choice(KINDS[:4]) if self.kind == 'resumed' else self.kind
+        #: From 1 to 250 mm/s; a slow tool makes a smaller zigzag.
+        self.speed = 10.0 ** draw.uniform(-3.0, log10(0.25))
+        self.size = min(1.0, 8.0 * self.speed)
+        self.sizes = draw.choice([(2, 3), (3, 2), (2, 1, 2)]) if self.kind == 'appended' else ()
+        self.stopped = PathPlace(point=draw.randint(1, 3), fraction=draw.uniform(0.2, 0.8))
+        self.slider = self._slider()
+        self.pauses = self._pauses()
+        self.commands, self.pulses = self._commands(), self._pulses()
+
+    def goal(self, home):
+        """Return the goal, which begins at a pose."""
+        x, y, z = home.position
+        timed = self.shape in ('spline', 'appended')
+        period = 0.06 * self.size / self.speed
+        places = [(self.size * dx, self.size * dy) for dx, dy in ((0.0, 0.0), *ZIGZAG)]
+        goal = Goal(
+            waypoints=tuple(
+                Waypoint(
+                    pose=Pose((x + dx, y + dy, z), home.quaternion),
+                    time=period * (k + 1) if timed else 0.0,
+                    twist=self._twist(places, k, period) if timed else (0.0,) * 6,
+                )
+                for k, (dx, dy) in enumerate(places[1:])
+            ),
+            segments=()
+            if timed
+            else tuple(
+                Segment(
+                    velocity=self.speed,
+                    acceleration=1.2,
+                    dwell=0.1 if self.shape == 'dwells' and k < LAST else 0.0,
+                )
+                for k in range(LAST + 1)
+            ),
+            execution=ExecutionMode.SPLINE if timed else ExecutionMode.AUTO,
+            corner_deviation=0.001 * self.size if self.shape == 'rounded' else 0.0,
+            io_commands=self.commands,
+            pulses=self.pulses,
+        )
+        if self.kind != 'resumed':
+            return goal
+        return resume(goal, self.stopped, overlap=0.01 * self.size, approach=0.01).goal
+
+    def act(self, controller, cycle):
+        """Pause the program, and let it go on."""
+        for begin, end in self.pauses:
+            if cycle == begin:
+                controller.programs.pause()
+            elif cycle == end:
+                controller.programs.play()
+
+    def _twist(self, places, k, period):
+        """Return the velocity with which the tool passes a point: as from the one to the other."""
+        if k == LAST:
+            return (0.0,) * 6
+        (ax, ay), (bx, by) = places[k], places[k + 2]
+        return ((bx - ax) / (2.0 * period), (by - ay) / (2.0 * period), 0.0, 0.0, 0.0, 0.0)
+
+    def _slider(self):
+        """Return the speed slider by cycle."""
+        name = self.random.choice([*SLIDERS, 'a person'])
+        if name != 'a person':
+            return SLIDERS[name]
+        settings = [self.random.uniform(0.1, 1.0) for _ in range(8)]
+        period = self.random.randint(20, 400)
+        return lambda cycle: settings[cycle // period % 8]
+
+    def _pauses(self):
+        """Return the cycles in which the program is paused, and goes on."""
+        cycles = int(0.28 * self.size / self.speed / 0.002)
+        begins = sorted(self.random.randint(50, cycles) for _ in range(self.random.randint(0, 2)))
+        pauses = [(begin, begin + self.random.randint(60, 200)) for begin in begins]
+        return [each for k, each in enumerate(pauses) if not k or each[0] > pauses[k - 1][1] + 200]
+
+    def _commands(self):
+        """Return commands beside points; with leads that overtake one another if two are near."""
+        draw, commands = self.random, []
+        beside = draw.randint(1, 3), draw.uniform(-0.02, 0.02)
+        for pin in range(4):
+            waypoint, distance = beside
+            place = {'distance': (distance + 0.001 * pin) * self.size}
+            if draw.random() < 0.5:
+                waypoint = draw.randint(1, 3)
+                place = draw.choice(
+                    [
+                        {'distance': draw.uniform(-0.03, 0.03) * self.size},
+                        {'fraction': draw.uniform(-0.9, 0.9)},
+                        {},
+                    ]
+                )
+            lead = draw.choice([0.0, draw.uniform(0.002, 0.2)])
+            commands.append(
+                IOCommand(
+                    waypoint=waypoint,
+                    offset=-lead,
+                    output=OutputKind.STANDARD_DIGITAL,
+                    pin=pin,
+                    value=1.0,
+                    **place,
+                )
+            )
+        return tuple(commands)
+
+    def _pulses(self):
+        draw, trains = self.random, []
+        for pin in (4, 5):
+            first = draw.randint(0, 2 if not self.sizes else self.sizes[0] - 2)
+            width = draw.choice([0.0, 0.004, 0.01])
+            room = 1.2 * self.speed * (width + 0.004)
+            trains.append(
+                PulseTrain(
+                    first_waypoint=first,
+                    last_waypoint=LAST if self.sizes else draw.randint(first + 1, LAST),
+                    output=OutputKind.STANDARD_DIGITAL,
+                    pin=pin,
+                    distance=max(draw.uniform(0.0005, 0.006) * self.size, room),
+                    phase=draw.uniform(0.0, 0.01) * self.size,
+                    width=width,
+                )
+            )
+        return tuple(trains)
+
+
+def accepted(number, robot):
+    """Return the first case of a number that the planner accepts, and how many it refused."""
+    for attempt in range(100):
+        case, state = Case(number, attempt), robot.place(HOME, TOOL)
+        try:
+            instructions_of(case.goal(state.actual_tcp_pose), state, case.sizes)
+        except GoalRefused:
+            continue
+        return case, attempt
+    raise AssertionError('no case of this number is accepted')
+
+
+def verdicts(case, robot):
+    """Run a case; return the verdict on its commands, and one on each train."""
+    slow = JudgedRun(robot, case.goal, lambda cycle: SLOW, sizes=case.sizes)
+    run = JudgedRun(robot, case.goal, case.slider, case.act, sizes=case.sizes)
+    return (
+        judge_commands(run, PathTime(slow), BOUND + (case.kind == 'appended'), case.pauses),
+        *(judge_pulses(run, train, BOUND, case.pauses) for train in run.goal.pulses),
+    )
