@@ -54,6 +54,20 @@ def test_motions_begin_and_end_between_packets(seed):
     assert found.static_error.value == pytest.approx(STATIC, rel=0.005)
 
 
+def test_a_long_rest_before_the_first_motion_is_passed_over():
+    moves = recording(0.002, np.random.default_rng(3), noise=1e-6)
+    rest = 10_500  # more cycles than are looked at
+    held = ArmSamples(
+        name='arm',
+        time=np.concatenate([0.002 * np.arange(rest), 0.002 * rest + moves.time]),
+        target_q=np.concatenate([np.tile(moves.target_q[0], (rest, 1)), moves.target_q]),
+        actual_q=np.concatenate([np.tile(moves.actual_q[0], (rest, 1)), moves.actual_q]),
+    )
+    found = find_arm_errors(held)
+    assert found is not None
+    assert found.lag.value == pytest.approx(LAG, rel=0.01)
+
+
 def test_the_interval_at_rest_contains_the_resolution_of_the_joints():
     """A joint at rest keeps the error of its place between two steps, however long it rests."""
     errors = []

@@ -30,6 +30,14 @@ def test_text_is_read_with_any_delimiter(tmp_path, delimiter):
     assert samples.cycle == pytest.approx(0.002)
 
 
+def test_a_mark_of_utf_8_is_no_part_of_a_title(tmp_path):
+    """Excel writes one."""
+    path, packed = tmp_path / 'moves.csv', tmp_path / 'moves.csv.gz'
+    path.write_text(text(','), encoding='utf-8-sig')
+    packed.write_bytes(gzip.compress(text(',').encode('utf-8-sig')))
+    assert len(read_samples(path).time) == len(read_samples(packed).time) == len(ROWS)
+
+
 def test_packed_text_and_titles_with_units_are_read(tmp_path):
     names = ['time [s]', *(f'target_q_{i} [rad]' for i in range(6))]
     names += [f'target_TCP_pose_{i}' for i in range(6)]
@@ -75,8 +83,8 @@ def mixed():
         ('\n', 'is empty'),
         ('a b\n1 2\n', 'has no column timestamp: record the RTDE outputs'),
         (text(names=['time', 'x', *NAMES[2:]]), 'has no column target_q_0'),
-        (text(rows=ROWS[:0]), 'is too short: it has 0 packets, not 50'),
-        (text(rows=ROWS[:9]), 'is too short: it has 9 packets, not 50'),
+        (text(rows=ROWS[:0]), 'is too short: it has 0 packets, 50 are needed'),
+        (text(rows=ROWS[:9]), 'is too short: it has 9 packets, 50 are needed'),
         (text()[:-100] + '\n', 'is damaged below its titles: '),
         (text().replace('0.1', 'x', 1), 'is damaged below its titles: could not convert'),
         (text().replace('0.1 ', 'nan ', 1), 'packet 1 has no number in target_q'),

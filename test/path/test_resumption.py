@@ -175,7 +175,9 @@ def test_outputs_get_the_state_of_the_place_and_the_rest_of_the_commands():
 def test_an_output_gets_the_value_that_was_due_last(reverse):
     """The first command was due 0.3 s after the second one, which is 1 cm ahead."""
     commands = (switch(0, 0.0, offset=0.4), switch(0, 1.0, distance=0.01))
-    left = resume(goal(io_commands=commands[::-1] if reverse else commands), at(1, 0.5), overlap=0.0).goal
+    left = resume(
+        goal(io_commands=commands[::-1] if reverse else commands), at(1, 0.5), overlap=0.0
+    ).goal
     assert left.io_commands == (switch(1, 0.0),)
 
 

@@ -5,8 +5,8 @@ The errors of an arm against its targets: lag, friction, ringing and noise.
 
 The measured joint less its target is modelled as the sum of three linear filters: a first-order
 lag of the target's speed, an error that follows the direction of motion within a time constant,
-and a damped oscillator that the acceleration excites. They are computed by convolution on the
-cycles of the controller, whatever packets are missing.
+and a damped oscillator that the acceleration excites. The filters are convolved on the cycles of
+the controller, so missing packets do no harm.
 """
 
 from __future__ import annotations
@@ -26,22 +26,25 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 
 Spectrum: TypeAlias = NDArray[np.complex128]
 
-#: Joints that turn less show nothing [rad].
+#: Joints that turn less than this are ignored [rad].
 _MIN_TURN = 0.02
-#: Cycles of a recording that are used at most.
-_MAX_CYCLES = 10_000
-#: More than this [rad], and as many times the noise, is left where the arm has other laws.
+#: Cycles of a recording that are used at most, and those of them before the first motion.
+_MAX_CYCLES, _REST_BEFORE = 10_000, 100
+#: The model fits if the root mean square of the residual is below this [rad], or below so many
+#: times the noise.
 _MISFIT, _ROUGH = 2e-5, 1.5
-#: A measured position scatters at least as much [rad].
+#: Least standard deviation that is assumed of a measured position [rad].
 _FLOOR = 1e-7
-_LAG, _SETTLING, _FREQUENCY, _DECAY, _FRICTION, _STATIC, _BEND, _BEND_LATER = range(8)
+_LAG, _SETTLING, _FREQUENCY, _DECAY, _FRICTION, _STATIC, _ACCELERATION, _ACCELERATION_LATER = (
+    range(8)
+)
 #: Where the fit begins, and the frequencies that it begins from [Hz].
 _LAG_START, _SETTLING_START, _DECAY_START, _FREQUENCIES = 7e-4, 0.02, 6.0, (5.0, 8.0, 12.0, 18.0)
-#: Longest answer of a filter [s]; transforms have a multiple of this size.
+#: Longest impulse response [s]; the size of transforms is a multiple of this step.
 _LONGEST_KERNEL, _SIZE_STEP = 2.5, 512
-#: Logarithm that no time or frequency has.
+#: Greater logarithms of times and frequencies are rejected.
 _NO_BOUND = 9.0
-#: Parts of a cycle in which motions begin and end.
+#: Parts of a cycle, to place where motions begin and end.
 _PARTS = 16
 #: Lags for autocovariances of squared third differences.
 _LAGS = 6
@@ -52,11 +55,11 @@ class ArmErrors:
     """
     The errors of an arm that were found.
 
-    :param settling: time constant between friction and static error [s].
+    :param settling: time constant with which the error goes from friction to static error [s].
     :param cycle: time from packet to packet [s].
     :param joints: number of joints that moved.
-    :param rms: root mean square of what is left [rad].
-    :param noise: standard deviation of the white noise in it [rad].
+    :param rms: root mean square of the residual [rad].
+    :param noise: standard deviation of the white noise in the residual [rad].
     """
 
     lag: Measured
@@ -72,8 +75,8 @@ class ArmErrors:
     noise: float
 
     @property
-    def is_known_law(self) -> bool:
-        """Whether hardly more than noise is left."""
+    def fits_model(self) -> bool:
+        """Whether the residual is hardly more than noise."""
         return self.rms < max(_MISFIT, _ROUGH * self.noise)
 
 
@@ -82,10 +85,11 @@ class _Grid:
     """
     Joints that move, on the cycles of the controller.
 
-    :param qd: (j, m) target speed [rad/s]; ``qdd``: (j, m) target acceleration [rad/s^2],
-        of the cycles before and after each packet.
+    :param qd: (j, m) target speed at each packet [rad/s]; ``qdd``: (j, m) target acceleration
+        [rad/s^2]; both from the cycles on either side.
     :param turning: (j, m) mean direction in the cycle before each packet; 0 at rest.
-    :param turned: (j, m) mean direction of the last motion in that cycle; 0 in motion.
+    :param last_direction: (j, m) direction of the motion that ended last, the mean of that cycle;
+        0 while moving.
     :param unmoved: (j, m) share of that cycle before the first motion.
     :param rows: (n,) cycle of each packet.
     :param error: (j, n) measured less target [rad].
@@ -95,7 +99,7 @@ class _Grid:
     qd: Floats
     qdd: Floats
     turning: Floats
-    turned: Floats
+    last_direction: Floats
     unmoved: Floats
     rows: Indices
     error: Floats
@@ -103,7 +107,7 @@ class _Grid:
 
 def find_arm_errors(samples: ArmSamples) -> ArmErrors | None:
     """
-    Find the errors of all joints that move, by the same laws for all of them.
+    Find the errors of all joints that move, with one set of parameters for all of them.
 
     :returns: None if no measured joints were recorded, none move, or there is too little data.
     """
@@ -119,7 +123,7 @@ def find_arm_errors(samples: ArmSamples) -> ArmErrors | None:
         lag=found.measured(_LAG),
         friction=found.measured(_FRICTION),
         static_error=replace(static, error=hypot(static.error, doubt)),
-        acceleration_error=found.combination({_BEND: 1.0, _BEND_LATER: 1.0}),
+        acceleration_error=found.combination({_ACCELERATION: 1.0, _ACCELERATION_LATER: 1.0}),
         ringing_frequency=_exponential(found, _FREQUENCY),
         ringing_decay=_exponential(found, _DECAY),
         settling=_exponential(found, _SETTLING),
@@ -132,17 +136,17 @@ def find_arm_errors(samples: ArmSamples) -> ArmErrors | None:
 
 def _rest_doubt(grid: _Grid, resolution: float, noise: float) -> float:
     """
-    Return the error of the static error by the resolution of joints at rest [rad].
+    Return the uncertainty of the static error that is due to the encoders' resolution [rad].
 
-    A joint that moves passes all steps of its encoder. One that rests keeps the error of its place
-    between two steps, however long it rests: evenly distributed noise of the width w leaves
-    r^2/(sqrt(180) w) of a step r, root mean square (its Fourier series, each term at its largest).
+    A joint that moves passes all steps r of its encoder. One that rests keeps one quantization error
+    throughout; uniform noise of the width w dithers it down to a root mean square of
+    r^2/(sqrt(180) w) at most (the Fourier series, each term at its largest).
 
     :param noise: standard deviation of measured positions, with the resolution [rad].
     """
     width = sqrt(max(12.0 * noise**2 - resolution**2, 0.0))
     left = min(resolution / sqrt(12.0), resolution**2 / max(sqrt(180.0) * width, 1e-12))
-    rests = np.abs(grid.turned) == 1.0
+    rests = np.abs(grid.last_direction) == 1.0
     edges = np.diff(np.pad(rests.astype(np.int8), ((0, 0), (1, 1))), axis=1)
     lengths = np.nonzero(edges == -1)[1] - np.nonzero(edges == 1)[1]
     return left * float(np.linalg.norm(lengths)) / max(int(lengths.sum()), 1)
@@ -161,7 +165,10 @@ def _grid(samples: ArmSamples) -> _Grid | None:
     time, cycle = samples.time, samples.cycle
     bounds = np.concatenate([[0], np.flatnonzero(np.diff(time) > LONGEST_GAP) + 1, [len(time)]])
     longest = int(np.argmax(np.diff(bounds)))
-    part = slice(bounds[longest], bounds[longest + 1])
+    begin, end = int(bounds[longest]), int(bounds[longest + 1])
+    steps = np.abs(np.diff(samples.target_q[begin:end], axis=0)).max(axis=1, initial=0.0)
+    first_motion = int(np.argmax(steps > REST_SPEED * cycle))
+    part = slice(begin + max(0, first_motion - _REST_BEFORE), end)
     time = time[part]
     rows = np.round((time - time[0]) / cycle).astype(np.intp)
     kept = rows < _MAX_CYCLES
@@ -173,13 +180,13 @@ def _grid(samples: ArmSamples) -> _Grid | None:
     cycles = np.arange(rows[-1] + 1)
     q = np.stack([np.interp(cycles, rows, target[:, joint]) for joint in moves])
     step = np.diff(q, axis=1, prepend=q[:, :1], append=q[:, -1:]) / cycle
-    turning, turned, unmoved = _directions(step)
+    turning, last_direction, unmoved = _directions(step)
     return _Grid(
         cycle=cycle,
         qd=0.5 * (step[:, 1:] + step[:, :-1]),
         qdd=np.diff(step, axis=1) / cycle,
         turning=turning,
-        turned=turned,
+        last_direction=last_direction,
         unmoved=unmoved,
         rows=rows,
         error=(actual - target)[:, moves].T,
@@ -197,7 +204,7 @@ def _directions(step: Floats) -> tuple[Floats, Floats, Floats]:
     """
     ends = _end_speeds(step)
     before, after, mean = ends[:, :-1], ends[:, 1:], step[:, 1:-1]
-    # The speed changes evenly within a share of the cycle, at the end at which it is faster.
+    # The ramp fills a share of the cycle, beside its faster end; else the slower speed holds.
     change = np.where(after == before, 1.0, after - before)
     rises = np.abs(after) > np.abs(before)
     off = np.where(rises, mean - before, after - mean)
@@ -216,22 +223,22 @@ def _directions(step: Floats) -> tuple[Floats, Floats, Floats]:
         np.where(moving | (last < 0), 0.0, sign),
         (last < 0).astype(np.float64),
     )
-    # In front of the first packet the joint rests.
-    turning, turned, unmoved = (
+    # The first cycle is repeated before the first packet.
+    turning, last_direction, unmoved = (
         np.pad(part.reshape(shape).mean(axis=2), ((0, 0), (1, 0)), 'edge') for part in parts
     )
-    return turning, turned, unmoved
+    return turning, last_direction, unmoved
 
 
 def _end_speeds(step: Floats) -> Floats:
-    """Return the speeds at packets (j, m), from the side on which the acceleration is even."""
+    """Return the speeds at packets (j, m), extrapolated from the side with the smoother speed."""
     padded = np.pad(step, ((0, 0), (2, 2)), 'edge')
     bend = np.abs(np.diff(padded, 2, axis=1))
     count = step.shape[1] - 1
     left = 1.5 * padded[:, 2 : 2 + count] - 0.5 * padded[:, 1 : 1 + count]
     right = 1.5 * padded[:, 3 : 3 + count] - 0.5 * padded[:, 4 : 4 + count]
     is_left = bend[:, :count] < bend[:, 3 : 3 + count]
-    # Beyond an end, a line through the speeds has the other sign.
+    # Where a motion begins or ends, the line overshoots: keep between 0 and twice the means beside.
     beside = 2.0 * np.stack([step[:, :-1], step[:, 1:], np.zeros_like(left)])
     speeds: Floats = np.clip(
         np.where(is_left, left, right), beside.min(axis=0), beside.max(axis=0)
@@ -253,13 +260,15 @@ class _Model:
         joints, count = grid.qd.shape
         self._kernel_length = min(count, round(_LONGEST_KERNEL / grid.cycle))
         self._size = -(-(count + self._kernel_length) // _SIZE_STEP) * _SIZE_STEP
-        # A drag that has rested at 1 for long differs from it by the travel since.
         self._speed = self._spectrum(-grid.qd)
+        # Filters start from 0, but the joints were unmoved (1) before: its change is filtered, and
+        # the 1 is added afterwards.
         self._inputs = [
-            self._spectrum(each) for each in (-grid.turning, -grid.turned, grid.unmoved - 1.0)
+            self._spectrum(each)
+            for each in (-grid.turning, -grid.last_direction, grid.unmoved - 1.0)
         ]
-        # Differences of packets, and even changes between them, each take (w cycle)^2 / 12 of an
-        # acceleration that swings with w; its own differences give that back.
+        # Differencing and linear interpolation each attenuate the frequency w by (w cycle)^2 / 12;
+        # a sixth of the second difference restores both.
         bends = np.diff(np.pad(grid.qdd, ((0, 0), (1, 1)), 'edge'), 2, axis=1)
         self._acceleration = self._spectrum(bends / 6.0 - grid.qdd)
         self._joints = joints
@@ -270,11 +279,11 @@ class _Model:
             return np.full(self._grid.error.size, NOWHERE)
         settling, frequency, decay = logarithms
         whole = self._speed * self._transfer(self._lag_kernel(lag))
-        whole = whole + self._drag(parameters) * self._transfer(self._drag_kernel(settling))
+        whole = whole + self._friction(parameters) * self._transfer(self._drag_kernel(settling))
         whole = whole + self._bend(parameters) * self._transfer(
             self._ring_kernel(frequency, decay)
         )
-        first = np.repeat(parameters[_BEND_LATER + 1 :], len(self._grid.rows))
+        first = np.repeat(parameters[_ACCELERATION_LATER + 1 :], len(self._grid.rows))
         return self._packets(whole) + first
 
     def columns(self, parameters: Floats) -> Floats:
@@ -294,7 +303,7 @@ class _Model:
     def derivatives(self, parameters: Floats) -> Floats:
         """Return the derivatives by all parameters (j n, k)."""
         lag, settling, frequency, decay = parameters[:4]
-        drag, bend = self._drag(parameters), self._bend(parameters)
+        drag, bend = self._friction(parameters), self._bend(parameters)
         shapes = (
             (self._speed, _slope(self._lag_kernel, max(lag, 1e-5), 1e-6)),
             (drag, _slope(self._drag_kernel, settling, 1e-4)),
@@ -326,7 +335,7 @@ class _Model:
         omega, decay = 2.0 * pi * exp(log_frequency), exp(log_decay)
         cycle, square = self._grid.cycle, omega**2 + decay**2
         t = cycle * np.arange(self._kernel_length + 1)
-        # The answer to an input that rises from 0 by 1 per second.
+        # The response to a unit ramp.
         swing = (omega - decay**2 / omega) * np.sin(omega * t) - 2.0 * decay * np.cos(omega * t)
         rise = t - (2.0 * decay + np.exp(-decay * t) * swing) / square
         kernel: Floats = np.diff(rise, 2, prepend=0.0) / cycle
@@ -339,17 +348,16 @@ class _Model:
         delay: Spectrum = np.exp(-2j * pi * turns)
         return delay
 
-    def _drag(self, parameters: Floats) -> Spectrum:
+    def _friction(self, parameters: Floats) -> Spectrum:
         friction, static, unmoved = self._inputs
-        own = parameters[_BEND_LATER + 1 :, None]
+        own = parameters[_ACCELERATION_LATER + 1 :, None]
         moving, resting = parameters[_FRICTION] * friction, parameters[_STATIC] * static
         drag: Spectrum = moving + resting + own * unmoved
         return drag
 
     def _bend(self, parameters: Floats) -> Spectrum:
-        # When the acceleration of two packets acts within the cycles around them is not known; a
-        # mixture of two cycles is a delay in between.
-        now, later = parameters[_BEND], parameters[_BEND_LATER]
+        # The delay of the acceleration is an unknown fraction of a cycle: a mixture of none and one.
+        now, later = parameters[_ACCELERATION], parameters[_ACCELERATION_LATER]
         bend: Spectrum = self._acceleration * (now + later * self._later)
         return bend
 
@@ -368,7 +376,7 @@ class _Model:
 
 
 def _best(grid: _Grid) -> Fit | None:
-    """Fit from the frequency of the ringing that leaves least."""
+    """Fit, starting from the frequency of ringing with the smallest residual."""
     model, measured = _Model(grid), grid.error.ravel()
     starts = []
     for frequency in _FREQUENCIES:
@@ -397,7 +405,7 @@ def _slope(kernel: Callable[[float], Floats], at: float, step: float) -> Floats:
 
 
 def resolution_of(actual_q: Floats) -> float:
-    """Return the step between measured positions [rad]; 0 if they have none."""
+    """Return the step between measured positions [rad]; 0 if no regular step is found."""
     smallest = []
     for column in actual_q.T:
         steps = np.diff(np.unique(column))
@@ -415,8 +423,8 @@ def find_noise(samples: ArmSamples) -> Measured | None:
     """
     Return the noise of measured joints, peak to peak, as if it were evenly distributed [rad].
 
-    Third differences of the error contain nothing else: s^2 = mean(d^2) / 20. The resolution of a
-    joint that moves adds r^2/12 to the w^2/12 of the noise.
+    Third differences d of the error are almost pure noise, with the variance mean(d^2) / 20. The
+    resolution of a joint that moves adds r^2/12 to the w^2/12 of the noise.
     """
     if samples.actual_q is None:
         return None

@@ -18,7 +18,7 @@ from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.rotation_rows import exp_rows
 
-#: Fewer packets show no motion.
+#: Recordings with fewer packets are refused.
 MIN_ROWS = 50
 
 
@@ -56,8 +56,8 @@ def read_samples(path: Path) -> ArmSamples:
     """
     Read a recording: ours (``.npz``, ``.part``), or rows of text with a title for each column.
 
-    Titles are the names of RTDE with the number of the element, ``target_q_0``, as the
-    manufacturer's recorder writes them, or those of ``ur-cartesian export``.
+    Titles are names of RTDE with the index of the element, such as ``target_q_0`` (the
+    manufacturer's recorder), or those of ``ur-cartesian export``.
 
     :raises ValueError: what is wrong with the file, in a sentence.
     :raises OSError: the file does not exist, or cannot be read.
@@ -66,9 +66,9 @@ def read_samples(path: Path) -> ArmSamples:
         return _checked(_from_recording(path), path)
     try:
         with (
-            gzip.open(path, 'rt', encoding='utf-8')
+            gzip.open(path, 'rt', encoding='utf-8-sig')
             if path.suffix == '.gz'
-            else path.open(encoding='utf-8') as file
+            else path.open(encoding='utf-8-sig') as file
         ):
             return _checked(_from_text(file, path), path)
     except (gzip.BadGzipFile, EOFError, zlib.error):
@@ -101,7 +101,8 @@ def _from_text(file: IO[str], path: Path) -> ArmSamples:
     groups = _wanted_columns(places, path)
     wanted = [name for group in groups.values() for name in group]
     try:
-        with warnings.catch_warnings(action='ignore', category=UserWarning):  # about no rows
+        # numpy warns if there are no rows; _checked refuses them.
+        with warnings.catch_warnings(action='ignore', category=UserWarning):
             rows = np.loadtxt(
                 file, delimiter=delimiter, usecols=[places[name] for name in wanted], ndmin=2
             )
@@ -127,7 +128,7 @@ def _from_text(file: IO[str], path: Path) -> ArmSamples:
 
 
 _SINGLE = ('runtime_state', 'safety_mode', 'slider')
-#: Columns of a group, in the first form that a file has.
+#: Titles of the columns of each field, the preferred ones first; a file has all of one form.
 _FORMS: dict[str, tuple[tuple[str, ...], ...]] = {
     'time': (('timestamp',), ('time',)),
     'target_q': (tuple(f'target_q_{i}' for i in range(6)),),
@@ -166,13 +167,13 @@ def _wanted_columns(places: dict[str, int], path: Path) -> dict[str, tuple[str, 
 
 
 def _checked(samples: ArmSamples, path: Path) -> ArmSamples:
-    """Refuse what no robot sends; leave out packets that were written twice."""
+    """Refuse damaged recordings; leave out packets that were written twice."""
     time = samples.time
     if len(time) < MIN_ROWS:
-        raise ValueError(f'{path} is too short: it has {len(time)} packets, not {MIN_ROWS}')
+        raise ValueError(f'{path} is too short: it has {len(time)} packets, {MIN_ROWS} are needed')
     columns: dict[str, Floats | None] = {name: getattr(samples, name) for name in _FORMS}
     for name, values in columns.items():
-        columns[name] = _numbers(name, values, path)
+        columns[name] = _checked_column(name, values, path)
     back = np.flatnonzero(np.diff(time) < 0.0)
     if len(back):
         row = int(back[0])
@@ -187,7 +188,7 @@ def _checked(samples: ArmSamples, path: Path) -> ArmSamples:
     return ArmSamples(name=samples.name, **kept)
 
 
-def _numbers(name: str, values: Floats | None, path: Path) -> Floats | None:
+def _checked_column(name: str, values: Floats | None, path: Path) -> Floats | None:
     """Return a column; None if the robot did not report it. A column with holes is damaged."""
     if values is None or np.isfinite(values).all():
         return values

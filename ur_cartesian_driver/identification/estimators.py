@@ -282,8 +282,8 @@ def stop_ramp(moves: Sequence[FoundMove], ending: Ending) -> Result:
 def arm_figures(recordings: Sequence[ArmSamples]) -> dict[str, Result]:
     """Find lag, friction, static error, ringing and noise of the measured joints."""
     every = [errors for samples in recordings if (errors := find_arm_errors(samples)) is not None]
-    found = [errors for errors in every if errors.is_known_law]
-    reason = _why_no_errors(recordings, found, [each for each in every if not each.is_known_law])
+    found = [errors for errors in every if errors.fits_model]
+    reason = _why_no_errors(recordings, found, [each for each in every if not each.fits_model])
     noises = [noise for samples in recordings if (noise := find_noise(samples)) is not None]
     experiment = (
         'record actual_q beside target_q while single joints turn fast and slowly, with a second '
