@@ -138,8 +138,8 @@ def _rest_doubt(grid: _Grid, resolution: float, noise: float) -> float:
     """
     Return the uncertainty of the static error that is due to the encoders' resolution [rad].
 
-    A joint that moves passes all steps r of its encoder. One that rests keeps one quantization error
-    throughout; uniform noise of the width w dithers it down to a root mean square of
+    A joint that moves passes all steps r of its encoder. One that rests keeps one quantization
+    error throughout; uniform noise of the width w dithers it down to a root mean square of
     r^2/(sqrt(180) w) at most (the Fourier series, each term at its largest).
 
     :param noise: standard deviation of measured positions, with the resolution [rad].
@@ -238,7 +238,7 @@ def _end_speeds(step: Floats) -> Floats:
     left = 1.5 * padded[:, 2 : 2 + count] - 0.5 * padded[:, 1 : 1 + count]
     right = 1.5 * padded[:, 3 : 3 + count] - 0.5 * padded[:, 4 : 4 + count]
     is_left = bend[:, :count] < bend[:, 3 : 3 + count]
-    # Where a motion begins or ends, the line overshoots: keep between 0 and twice the means beside.
+    # Where a motion begins or ends, the line overshoots: keep it from 0 to twice the means beside.
     beside = 2.0 * np.stack([step[:, :-1], step[:, 1:], np.zeros_like(left)])
     speeds: Floats = np.clip(
         np.where(is_left, left, right), beside.min(axis=0), beside.max(axis=0)
