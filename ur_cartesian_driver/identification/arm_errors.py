@@ -356,7 +356,7 @@ class _Model:
         return drag
 
     def _bend(self, parameters: Floats) -> Spectrum:
-        # The delay of the acceleration is an unknown fraction of a cycle: a mixture of none and one.
+        # The delay of the acceleration is an unknown part of a cycle: a mixture of none and one.
         now, later = parameters[_ACCELERATION], parameters[_ACCELERATION_LATER]
         bend: Spectrum = self._acceleration * (now + later * self._later)
         return bend
