@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterable, Iterator
-from pathlib import Path as FilePath
 import sys
 import threading
 
@@ -31,11 +30,9 @@ def teach_path(arguments: argparse.Namespace) -> int:
     """
     Connect, let a person guide the arm, and write the taken points, even after Ctrl-C.
 
-    :raises OSError: the file cannot be written. This is found out before the robot is connected;
-        if it happens afterwards, the goal is printed instead.
+    :raises OSError: the file cannot be written any more; the goal is printed instead.
     """
     lesson = Lesson(Path().at(speed=arguments.speed, blend=arguments.blend))
-    _check_writable(FilePath(arguments.output))
     try:
         with ready_driver(arguments, allow_freedrive=True) as driver:
             guide(driver, lesson, _keys(), _say)
@@ -46,19 +43,6 @@ def teach_path(arguments: argparse.Namespace) -> int:
         else:
             _say('no point was taken, so nothing is written')
     return 0
-
-
-def _check_writable(file: FilePath) -> None:
-    """Open a file for writing, and leave it as it is."""
-    existed = file.exists()
-    try:
-        file.open('a').close()
-    except OSError as error:
-        raise OSError(
-            f'{file} cannot be written: {error.strerror}; choose another file by -o'
-        ) from None
-    if not existed:
-        file.unlink()
 
 
 def save(path: Path, file: str) -> None:
