@@ -78,7 +78,11 @@ class PrimaryProbe:
         )
         await self._wait(lambda: bool(self.configuration or self._failure), CONFIGURATION_TIMEOUT)
         if self.configuration is None:
-            raise OSError(self._failure or 'primary interface: no configuration is reported')
+            raise OSError(
+                self._failure
+                or f'primary interface: {address.host} port {address.primary_port}: no '
+                'configuration is reported (the usual port is 30001)'
+            )
 
     async def close(self) -> None:
         """Disconnect."""
