@@ -203,8 +203,8 @@ setup(
     extras_require=EXTRAS,
     entry_points={
         'console_scripts': [
-            f'ur-cartesian-driver = {NAME}.ros.node:main',
-            f'ur-cartesian = {NAME}.cli:main',
+            f'ur-cartesian-driver = {NAME}.entry_points:driver',
+            f'ur-cartesian = {NAME}.entry_points:command_line',
         ],
         'pytest11': [f'ur_cartesian = {NAME}.pytest_plugin'],
     },

@@ -5,6 +5,7 @@
 import ast
 import importlib
 from importlib import metadata, resources
+import inspect
 import itertools
 from pathlib import Path
 import re
@@ -139,13 +140,15 @@ def test_console_scripts_and_executables_call_the_same_functions():
     if not scripts:
         pytest.skip('console scripts come with pip; this is an installation by colcon')
     assert scripts == {
-        'ur-cartesian-driver': f'{NAME}.ros.node:main',
-        'ur-cartesian': f'{NAME}.cli:main',
+        'ur-cartesian-driver': f'{NAME}.entry_points:driver',
+        'ur-cartesian': f'{NAME}.entry_points:command_line',
     }
-    for name, command in (('driver', 'ur-cartesian-driver'), ('sim', 'ur-cartesian')):
-        module, function = scripts[command].split(':')
-        source = (prefix_with_executables() / name).read_text()
-        assert f'from {module} import {function}' in source
+    entry_points = importlib.import_module(f'{NAME}.entry_points')
+    for name, function in (('driver', entry_points.driver), ('sim', entry_points.command_line)):
+        executable = (prefix_with_executables() / name).read_text()
+        for source in (executable, inspect.getsource(function)):
+            (module,) = re.findall(r'from (\S+) import main\b', source)
+            assert module == f'{NAME}.{"ros.node" if name == "driver" else "cli"}'
 
 
 def test_pytest_finds_the_fixtures_for_users():

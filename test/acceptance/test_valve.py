@@ -174,6 +174,17 @@ def test_the_beads_are_laid_if_the_person_agrees(driver, small):
 
 @pytest.mark.ur_sim(frequency=125.0)
 def test_beads_at_another_speed_than_asked_tell_nothing(driver, small, ur_sim):
-    ur_sim.call(lambda controller: controller.set_slider(0.5))
+    def agrees(question):
+        ur_sim.call(lambda controller: controller.set_slider(0.5))
+        return True
+
     with pytest.raises(RobotNotReady, match='The arm moved at 50 % of its speed: set the slider'):
-        lay_beads(driver, small, digital(PIN), lambda _: True)
+        lay_beads(driver, small, digital(PIN), agrees)
+
+
+@pytest.mark.ur_sim(frequency=125.0)
+def test_a_low_slider_is_refused_before_the_question(driver, small, ur_sim):
+    ur_sim.call(lambda controller: controller.set_slider(0.5))
+    wait_for(lambda: driver.state.target_speed_fraction == 0.5)
+    with pytest.raises(RobotNotReady, match=r'^The speed slider is at 50%: set it to 100 %'):
+        lay_beads(driver, small, digital(PIN), lambda _: pytest.fail('nothing may be asked'))

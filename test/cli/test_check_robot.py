@@ -92,6 +92,27 @@ def test_the_report_does_not_say_who_or_where_the_robot_is(check, tmp_path):
     assert json.loads(text)['driver']
 
 
+def test_the_report_of_a_robot_that_does_not_answer_says_no_address(check, closed_port, tmp_path):
+    check(rtde=closed_port, primary=closed_port)
+    text = (tmp_path / 'report.json').read_text()
+    assert '127.0.0.1' not in text
+    assert f'ROBOT port {closed_port}' in text
+
+
+@pytest.mark.parametrize('host', ['localhost', '127.0.0.1', 'ur10e'])
+def test_no_address_is_in_the_texts_of_a_report(host):
+    text = f'{host}: refused; {host} port 1 of 5.21.0.0, beside {host}-2.'
+    findings = [Finding(check='rtde', verdict=Verdict.PROBLEM, text=text)]
+    (found,) = check_robot.report(findings, {}, host)['findings']
+    assert found['text'] == f'ROBOT: refused; ROBOT port 1 of 5.21.0.0, beside {host}-2.'
+
+
+def test_a_resolved_address_is_in_no_report():
+    findings = [Finding(check='rtde', verdict=Verdict.PROBLEM, text='127.0.0.1 port 1: lost.')]
+    (found,) = check_robot.report(findings, {}, 'localhost')['findings']
+    assert found['text'] == 'ROBOT port 1: lost.'
+
+
 @pytest.mark.ur_sim(remote_control=False)
 def test_local_control_is_noted(check):
     status, _, findings = check()
@@ -221,6 +242,11 @@ def address(ur_sim):
     )
 
 
+class Terminal(StringIO):
+    def isatty(self):
+        return True
+
+
 def run_experiments(ur_sim, agrees):
     recordings = {}
     findings = check_robot.experiment_findings(address(ur_sim), [], agrees, recordings)
@@ -270,10 +296,9 @@ def test_what_the_software_is_not_known_to_have_is_not_tried(version, asked, mon
     tried = []
     monkeypatch.setattr(check_robot, '_experiment', experiment)
     observed = [Finding(check='software', verdict=Verdict.OK, text='', data={'version': version})]
-    findings = check_robot.experiment_findings(
-        RobotAddress(host='127.0.0.1'), observed, lambda _: True, {}
-    )
-    assert len(findings) == 10
+    address = RobotAddress(host='127.0.0.1')
+    findings = check_robot.experiment_findings(address, observed, lambda _: True, {})
+    assert len(list(findings)) == 10
     assert len(tried) == asked
     assert ('path_offset' in tried) == (asked == 10)
 
@@ -294,6 +319,32 @@ def test_nothing_moves_without_a_yes(ur_sim):
 def test_only_yes_is_yes(monkeypatch, answer, agrees):
     monkeypatch.setattr(sys, 'stdin', StringIO(answer + '\n'))
     assert check_robot.ask('The arm moves.') is agrees
+
+
+def test_the_end_of_the_input_is_no(monkeypatch):
+    monkeypatch.setattr(sys, 'stdin', StringIO(''))
+    assert check_robot.ask('The arm moves.') is False
+
+
+@pytest.mark.ur_sim(rate=4.0, frequency=125.0)
+def test_who_ends_the_questions_keeps_what_was_found(ur_sim, tmp_path, monkeypatch):
+    answers = iter(['y'])
+
+    def answer(question):
+        for each in answers:
+            return each
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys, 'stdin', Terminal())
+    monkeypatch.setattr('builtins.input', answer)
+    path, where = tmp_path / 'report.json', address(ur_sim)
+    options = ['--robot-ip', where.host, '--seconds', '0.3', '--report', str(path)]
+    for name in ('rtde', 'primary', 'dashboard', 'robot_api'):
+        options += [f'--{name.replace("_", "-")}-port', str(getattr(where, f'{name}_port'))]
+    assert main(['check-robot', '--with-motion', *options]) == 130
+    found = json.loads(path.read_text())
+    assert {'software', 'joint_move'} <= {finding['check'] for finding in found['findings']}
+    assert list(found['recordings']) == ['joint_move']
 
 
 def test_without_a_terminal_no_motion_is_asked_for(capsys):
@@ -364,6 +415,23 @@ def test_who_interrupts_an_experiment_stops_the_arm_and_gets_the_slider_back(ur_
     asyncio.run(asyncio.wait_for(interrupted(), 10.0))
     wait_for(lambda: ur_sim.state().runtime_state is RuntimeState.STOPPED)
     wait_for(lambda: max(map(abs, ur_sim.state().qd)) == 0.0)
+    assert ur_sim.state().speed_slider == 1.0
+
+
+@pytest.mark.ur_sim(frequency=125.0)
+def test_who_interrupts_before_the_slider_is_confirmed_gets_it_back(ur_sim):
+    slider = next(experiment for experiment in EXPERIMENTS if experiment.check == 'slider')
+
+    async def interrupted():
+        running = asyncio.create_task(run_experiment(address(ur_sim), slider))
+        ur_sim.inject('delay rtde 0.06 s')
+        await asyncio.to_thread(wait_for, lambda: ur_sim.state().speed_slider == 0.5)
+        running.cancel()
+        ur_sim.clear_faults()
+        with pytest.raises(asyncio.CancelledError):
+            await running
+
+    asyncio.run(asyncio.wait_for(interrupted(), 20.0))
     assert ur_sim.state().speed_slider == 1.0
 
 

@@ -9,9 +9,11 @@ import errno
 from io import StringIO
 import json
 import os
+from pathlib import Path
 import signal
 import subprocess
 import sys
+from typing import Any
 from unittest.mock import Mock
 
 import pytest
@@ -24,6 +26,7 @@ from ur_cartesian_driver.cli.plots import feedback_plot
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
+from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.sim.command_line.console import run_command
 
@@ -379,3 +382,55 @@ def test_a_signal_ends_a_loop_but_none_of_its_callbacks(own_signals, number):
 def test_a_signal_interrupts_a_command_without_a_loop(own_signals, number):
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
     assert run_command('serve', lambda _: signal.raise_signal(number), Namespace()) == 128 + number
+
+
+def test_no_command_writes_over_the_file_that_it_reads(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    goal, table = tmp_path / 'goal.yaml', tmp_path / 'a.csv'
+    goal.write_text((share_path() / 'config' / 'examples' / 'square.yaml').read_text())
+    table.write_text('x [mm],y [mm],z [mm]\n1,2,3\n4,5,6\n')
+    texts = goal.read_text(), table.read_text()
+    assert main(['send', 'goal.yaml', '--record', str(goal), '--wait', '0']) == 1
+    assert '--record names the goal itself' in capsys.readouterr().err
+    assert main(['import', 'a.csv', '--orientation', 'down', '-o', str(table)]) == 1
+    assert '-o names the file itself' in capsys.readouterr().err
+    assert (goal.read_text(), table.read_text()) == texts
+
+
+def test_the_demo_can_move_no_arm_of_others(monkeypatch):
+    """Its drivers have names that no other driver has, in a domain that nobody has chosen."""
+    monkeypatch.setenv('ROS_DOMAIN_ID', '77')
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
+    environment = demo._environment()
+    assert environment['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
+    assert environment['ROS_DOMAIN_ID'] != '77'
+    fields: dict[str, Any] = {'goal': Path('a'), 'model': 'ur5e', 'drawing': Path('b')}
+    spaces = [demo.DemoArm(name=name, **fields).namespace for name in ('', 'left', 'right')]
+    assert len(set(spaces)) == 3
+    assert all(str(os.getpid()) in space for space in spaces)
+
+
+@pytest.mark.parametrize(
+    ('command', 'module'), [('command_line', 'cli.command_parser'), ('driver', 'ros.node')]
+)
+def test_ctrl_c_is_silent_while_modules_load(command, module):
+    program = f"""
+import os, signal, sys
+from ur_cartesian_driver import entry_points
+
+class Person:
+    def find_spec(self, name, path, target=None):
+        if name == 'ur_cartesian_driver.{module}':
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Person())
+entry_points.{command}()
+"""
+    ended = subprocess.run(
+        [sys.executable, '-c', program, 'where'],
+        capture_output=True,
+        text=True,
+        timeout=60.0,
+        check=False,
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr) == (-signal.SIGINT, '', '')

@@ -78,7 +78,7 @@ def test_our_own_recordings_name_their_arm(laws, tmp_path, capsys):
     assert found.estimates['start_time'].value == pytest.approx(laws.start_time, abs=1e-3)
     capsys.readouterr()
     assert main(['identify', recording, '--model', 'ur10e']) == 1
-    assert 'is of another arm: model ur10e, not ur5e' in capsys.readouterr().err
+    assert 'is of another arm: model ur5e, not ur10e' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

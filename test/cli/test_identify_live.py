@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """``ur-cartesian identify --robot-ip``: from a simulated arm with hidden laws to its twin."""
 
+import asyncio
 from dataclasses import replace
 from io import StringIO
 from random import Random
@@ -17,11 +18,13 @@ from ur_cartesian_driver.identification.law_experiments import (
     LAW_EXPERIMENTS,
     MotionBounds,
 )
+from ur_cartesian_driver.identification.live_run import ready_state, record_experiment
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.motion.twin.twin import ArmIdentity, Estimate, Twin
 from ur_cartesian_driver.motion.twin.twin_file import read_twin
-from ur_cartesian_driver.robot.check.finding import Finding, Verdict
+from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, Verdict
+from ur_cartesian_driver.robot.check.program_run import Surprise
 
 HOME = (0.0, -1.2, 1.4, -1.6, -1.5, 0.2)
 NAMES = [each.name for each in LAW_EXPERIMENTS]
@@ -69,18 +72,18 @@ class Terminal(StringIO):
 def identify(ur_sim, tmp_path, monkeypatch, capsys):
     """Run the command; return its status, its output, and the outcome of each experiment."""
 
-    def run(*words, answer='y', terminal=True, box=BOX, speed='0.3'):
-        answers = (Terminal if terminal else StringIO)(f'{answer}\n' * 20)
-        monkeypatch.setattr(sys, 'stdin', answers)
+    def run(*words, answer='y', answers='', terminal=True, box=BOX, speed='0.3'):
+        typed = (Terminal if terminal else StringIO)(answers or f'{answer}\n' * 20)
+        monkeypatch.setattr(sys, 'stdin', typed)
         ports = ur_sim.ports
         arguments = ['--robot-ip', '127.0.0.1', '--folder', str(tmp_path / 'found')]
         for name in ('rtde', 'primary', 'dashboard', 'robot_api'):
             arguments += [f'--{name.replace("_", "-")}-port', str(getattr(ports, name))]
         arguments += [f'--box={box}', '--max-speed', speed, '-o', str(tmp_path / 'twin.yaml')]
         status = main(['identify', *arguments, *words])
-        printed = capsys.readouterr()
         lines = (tmp_path / 'found' / PROGRESS).read_text().splitlines()
         outcomes = dict(line.split(': ', 1) for line in lines)
+        printed = capsys.readouterr()
         return status, printed.out + printed.err, outcomes
 
     return run
@@ -156,6 +159,19 @@ def test_a_protective_stop_ends_the_experiments_and_stays(identify, ur_sim, name
 
 @pytest.mark.slow
 @hidden_arm
+@pytest.mark.parametrize('fault', ['emergency_stop', 'safeguard_stop'])
+def test_another_safety_stop_is_no_law_of_the_twin(identify, ur_sim, fault, tmp_path):
+    ur_sim.inject(f'{fault} at 0.02 m')
+    status, printed, outcomes = identify('--only', 'line')
+    assert status == 1
+    assert outcomes['line'].startswith('ended: the robot stopped, with safety mode '), printed
+    found = read_twin(tmp_path / 'twin.yaml')
+    for name in ('pause_time', 'stop_time', 'protective_stop_time'):
+        assert name in found.not_identified
+
+
+@pytest.mark.slow
+@hidden_arm
 @pytest.mark.parametrize('name', TRAVELS)
 @pytest.mark.parametrize('cut', [('rtde',), ('rtde', 'primary')], ids=['rtde', 'both'])
 def test_a_cut_connection_leaves_a_resting_arm(identify, ur_sim, name, cut):
@@ -167,6 +183,62 @@ def test_a_cut_connection_leaves_a_resting_arm(identify, ur_sim, name, cut):
     assert 'RTDE' in outcomes[name]
     assert 'start_time' in printed  # the first experiment is evaluated
     rests(ur_sim)
+
+
+@pytest.mark.slow
+@hidden_arm
+def test_a_lost_primary_connection_ends_the_experiments(identify, ur_sim):
+    ur_sim.inject('drop primary at 0.01 m')
+    status, printed, outcomes = identify('--only', 'line,stop')
+    assert status == 1, printed
+    assert outcomes['line'].startswith('ended: primary interface: ')
+    assert 'may move' not in outcomes['line']  # the client connects again, and stops the program
+    assert outcomes['stop'] == 'not begun'
+    rests(ur_sim)
+
+
+@pytest.mark.slow
+@hidden_arm
+def test_an_arm_that_nobody_can_stop_is_said_to_move(identify, ur_sim):
+    ur_sim.inject(*(f'drop {each} at 0.01 m for 1000 s' for each in ('rtde', 'primary')))
+    status, printed, outcomes = identify('--only', 'movel_without_speed')
+    assert status == 1
+    said = '; nobody can stop the program, so the arm may move for up to 10 s more'
+    assert outcomes['movel_without_speed'].endswith(said)
+    assert said in printed
+    rests(ur_sim)
+
+
+@pytest.mark.slow
+@hidden_arm
+def test_the_way_back_of_a_stop_keeps_its_speed(identify, ur_sim):
+    begin = ur_sim.state().T_base_tcp
+    status, printed, outcomes = identify('--only', 'stop', speed='0.041')
+    assert (status, outcomes) == (0, {'stop': 'done'}), printed
+    assert begin.distance_to(ur_sim.state().T_base_tcp) < 1e-4
+
+
+@pytest.mark.slow
+@hidden_arm
+def test_a_recording_that_cannot_be_written_hides_no_surprise(ur_sim, tmp_path):
+    address = RobotAddress(
+        host='127.0.0.1', rtde_port=ur_sim.ports.rtde, primary_port=ur_sim.ports.primary
+    )
+    bounds = MotionBounds(low=(-1.0, -1.0, 0.0), high=(1.0, 1.0, 1.0), max_speed=0.3)
+    line = next(each for each in LAW_EXPERIMENTS if each.name == 'line')
+
+    async def carry_out():
+        state = await ready_state(address, None)
+        with pytest.raises(Surprise) as caught:
+            await record_experiment(address, line, state, bounds, tmp_path / 'gone' / 'line.csv')
+        assert asyncio.all_tasks() == {asyncio.current_task()}  # both connections are closed
+        return caught.value
+
+    ur_sim.inject('slider 0.5 at 0.01 m')
+    surprise = asyncio.run(carry_out())
+    assert str(surprise) == 'the speed slider was moved'
+    (note,) = surprise.__notes__
+    assert note.endswith('line.csv cannot be written: No such file or directory')
 
 
 @pytest.mark.slow
@@ -279,7 +351,45 @@ def test_a_folder_with_recordings_is_not_written_over(monkeypatch, capsys, tmp_p
 def test_a_robot_with_a_problem_is_not_moved():
     problem = Finding(check='rtde', verdict=Verdict.PROBLEM, text='Nothing answers.')
     with pytest.raises(ValueError, match=r'no motion, because of rtde: Nothing answers\.'):
-        arm_of([problem])
+        arm_of([problem], ArmIdentity())
+
+
+def observed(*models):
+    """Return the findings about a robot whose type has some models."""
+    return [
+        Finding(check=check, verdict=Verdict.OK, text='', data=data)
+        for check, data in (
+            ('software', {'version': '5.21.0.0'}),
+            ('model', {'models': list(models)}),
+            ('motion_version', {'motion_version': 1}),
+        )
+    ]
+
+
+@pytest.mark.parametrize(('asked', 'model'), [('', 'ur5e'), ('ur5e', 'ur5e'), ('ur7e', 'ur7e')])
+def test_the_option_chooses_among_models_of_one_type(asked, model):
+    arm = arm_of(observed('ur5e', 'ur7e'), ArmIdentity(model=asked))
+    assert arm == ArmIdentity(model=model, software='5.21.0', motion_version=1)
+
+
+@pytest.mark.slow
+@hidden_arm
+def test_another_arm_than_the_option_names_is_not_moved(identify, ur_sim, tmp_path, capsys):
+    begin = ur_sim.state().q
+    with pytest.raises(FileNotFoundError):  # nothing was begun
+        identify('--model', 'ur10e')
+    said = 'the robot is another arm: model ur5e, not ur10e; correct the options'
+    assert said in capsys.readouterr().err
+    assert ur_sim.state().q == begin
+
+
+@pytest.mark.slow
+@hidden_arm
+def test_the_end_of_the_input_means_no(identify, tmp_path):
+    status, printed, outcomes = identify('--only', 'wrist_slow,turn', answers='y\n')
+    assert status == 0, printed
+    assert outcomes == {'wrist_slow': 'done', 'turn': 'skipped: not wanted'}
+    assert 'start_time' in printed
 
 
 def test_experiments_are_slow_first_and_interrupted_last():

@@ -28,6 +28,14 @@ def test_a_file_that_is_checked_stays_as_it_is(tmp_path, capsys):
     assert not new.exists()
 
 
+def test_the_last_lesson_is_not_replaced_without_being_named(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'path.yaml').write_text('points of yesterday')
+    assert main(['teach', '--wait', '0', '--rtde-port', '1']) == 1
+    assert 'path.yaml exists already; name the file by -o' in capsys.readouterr().err
+    assert (tmp_path / 'path.yaml').read_text() == 'points of yesterday'
+
+
 def test_points_whose_file_cannot_be_written_are_printed(capsys):
     path = Path((-0.5, 0.1, 0.4), DOWN).by(dy=0.1).by(dx=0.1)
     with pytest.raises(OSError, match='/dev/full cannot be written: No space left on device; the'):

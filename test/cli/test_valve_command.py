@@ -2,15 +2,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command ``valve``: dead times by hand calculation, its questions, its file, its refusals."""
 
+from contextlib import nullcontext
+from io import StringIO
 from math import hypot, sqrt
+import shlex
+from typing import cast, TYPE_CHECKING
+from unittest.mock import Mock
 
 import pytest
 
-from ur_cartesian_driver.cli import main
+from ur_cartesian_driver.cli import main, valve_command
 from ur_cartesian_driver.cli.valve_beads import Beads, dead_times
-from ur_cartesian_driver.cli.valve_command import ask_distance
+from ur_cartesian_driver.cli.valve_command import ask_distance, lay_beads
 from ur_cartesian_driver.goal_files.lead_file import read_leads
+from ur_cartesian_driver.motion.errors import RobotNotReady
+from ur_cartesian_driver.motion.events import Progress
+from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import OutputKind
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
+from ur_cartesian_driver.path import digital
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.driver import Driver
 
 SPEEDS = {'slow': 0.02, 'fast': 0.2}
 
@@ -52,7 +65,14 @@ def test_metres_in_place_of_millimetres_are_refused(begins, ends):
 
 @pytest.mark.parametrize(
     ('changes', 'words'),
-    [({'fast': 0.03}, 'at least twice as fast'), ({'length': 0.01}, '--length is 10 mm')],
+    [
+        ({'fast': 0.03}, 'at least twice as fast'),
+        ({'length': 0.01}, '--length is 10 mm'),
+        (
+            {'length': 0.03, 'fast': 1.0},
+            '--length is 30 mm, which --fast passes in 30 ms; lay beads that take 80 ms or more',
+        ),
+    ],
 )
 def test_beads_that_tell_nothing_are_refused(changes, words):
     fields = {'slow': 0.02, 'fast': 0.2, 'length': 0.1, 'beside': 0.01, 'along': 'x'} | changes
@@ -68,10 +88,8 @@ def test_a_distance_is_asked_for_until_it_is_a_number(capsys):
         asked.append(question)
         return next(answers)
 
-    assert ask_distance('begin', read) == 10.8
-    assert asked[0] == (
-        'How far behind the begin of the slow bead is the begin of the fast one [mm]? '
-    )
+    assert ask_distance('start', read) == 10.8
+    assert asked[0] == 'How far behind the start of the slow bead does the fast one start [mm]? '
     assert "'far' is no number; give millimetres, like 10.8" in capsys.readouterr().out
 
 
@@ -113,7 +131,11 @@ def test_a_better_ruler_makes_them_better(valve):
     ('words', 'said'),
     [
         (['--measured', '-10.8', '6.3'], 'the fast bead begins 10.8 mm before the slow one'),
-        (['--measured', '270', '6.3'], "open of 'valve_1' is 1.5 s"),
+        (
+            ['--measured', '270', '6.3'],
+            'the fast bead begins 270 mm behind the slow one, which is a dead time of 1.5 s, '
+            'above 1 s; give --measured in millimetres',
+        ),
         ([], 'valve asks before it moves the arm, so it needs a terminal'),
         (['--fast', '0.03', '--measured', '1', '1'], 'lay one bead at least twice as fast'),
         (['--output', 'tool_digital', '2', '--measured', '1', '1'], 'its pin is 2'),
@@ -133,3 +155,73 @@ def test_a_wrong_file_is_refused_first_and_kept(valve, tmp_path):
     assert status == 1
     assert 'has no leads' in text
     assert file.read_text('utf-8') == 'points: []\n'
+
+
+class TerseDriver:
+    """A driver whose arm is so fast that the speed is reported at the slow bead only."""
+
+    rest_state = RobotState(timestamp=0.0, actual_q=(0.0,) * 6, actual_tcp_pose=Pose())
+
+    def plan(self, _):
+        return Mock(find_slow_stretches=list)
+
+    def start(self, _, watch):
+        for waypoint in (0, 1, 2, 7):
+            watch(
+                Progress(waypoint=waypoint, fraction=0.5, desired_pose=Pose(), actual_pose=Pose())
+            )
+        return Mock()
+
+
+def test_a_bead_whose_speed_was_not_reported_tells_nothing():
+    beads = Beads(slow=0.02, fast=0.2, length=0.1, beside=0.01, along='x')
+    with pytest.raises(RobotNotReady, match='did not report its speed during a bead'):
+        lay_beads(cast('Driver', TerseDriver()), beads, digital(2), lambda _: True)
+
+
+def test_an_empty_name_is_refused_before_beads_are_laid(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(valve_command, 'ready_driver', lambda _: pytest.fail('nothing may move'))
+    monkeypatch.setattr('sys.stdin', Terminal())
+    monkeypatch.chdir(tmp_path)
+    assert main(['valve', '', '--output', 'standard_digital', '2']) == 1
+    assert 'the name is empty; give one' in capsys.readouterr().err
+
+
+class Terminal(StringIO):
+    def isatty(self):
+        return True
+
+
+def test_the_printed_command_finds_the_same_times_later(monkeypatch, capsys, tmp_path):
+    """Beads at other speeds than the default ones, measured at once, and later."""
+    monkeypatch.setattr(valve_command, 'ready_driver', lambda _: nullcontext())
+    monkeypatch.setattr(valve_command, 'lay_beads', lambda *_: True)
+    monkeypatch.chdir(tmp_path)
+    laid = [
+        'valve',
+        'glue 1',
+        '--output',
+        'tool_digital',
+        '1',
+        '--fast',
+        '0.1',
+        '--ruler',
+        '0.1mm',
+    ]
+    laid += ['--lead-file', 'my leads.yaml', '--ur-type', 'ur3']
+    monkeypatch.setattr('sys.stdin', Terminal('4.8\n2.8\n'))
+    assert main(laid) == 0
+    printed = capsys.readouterr().out
+    (at_once,) = read_leads(tmp_path / 'my leads.yaml')
+    assert at_once.open == pytest.approx(0.06)
+    monkeypatch.setattr('sys.stdin', Terminal('4.8'))  # then Ctrl-D
+    assert main(laid) == 1
+    shown = capsys.readouterr()
+    assert 'the input ended before the answer' in shown.err
+    (tmp_path / 'my leads.yaml').unlink()
+    (command,) = [line for line in shown.out.splitlines() if line.startswith('ur-cartesian ')]
+    words = shlex.split(command.replace('BEGINS ENDS', '4.8 2.8'))
+    assert main(words[1:]) == 0
+    assert read_leads(tmp_path / 'my leads.yaml') == (at_once,)
+    report = printed.splitlines()[-2].partition('[mm]? ')[2].rpartition('[mm]? ')[2]
+    assert report in capsys.readouterr().out

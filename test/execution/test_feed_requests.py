@@ -60,6 +60,42 @@ def test_a_signal_that_ends_is_lost_after_its_timeout():
     )
 
 
+def losses(feed, begin, end):
+    """Return the times [s] of the warnings, by asking every 10 ms."""
+    times = [begin + 0.01 * i for i in range(round((end - begin) / 0.01))]
+    return [now for now in times if feed.age(now)]
+
+
+def test_a_signal_that_is_invalid_from_the_beginning_is_said_once():
+    feed = ProgramFeed(BOUNDS, FeedInput(0, 0.004, 0.02))
+    broken = RobotState(timestamp=0.0, actual_q=(0.0,) * 6, standard_analog_input0=0.0)
+    said = 0
+    for i in range(500):
+        feed.observe_feed(broken, 0.01 * i)
+        said += any(isinstance(command, LogWarning) for command in feed.age(0.01 * i))
+    assert said == 1
+    assert not any('was lost' in line for line in feed.report)  # it was never there
+
+
+def test_a_second_loss_is_said_when_a_warning_is_due_again():
+    feed = FeedRequests(BOUNDS)
+    feed.set_feed(0.8, 0.0, 1.0)
+    assert losses(feed, 1.0, 1.5) == [pytest.approx(1.21, abs=0.02)]
+    feed.set_feed(0.8, 0.0, 1.5)
+    assert losses(feed, 1.5, 8.0) == [pytest.approx(3.21, abs=0.02)]
+
+
+def test_a_second_loss_that_is_over_is_not_said():
+    feed = FeedRequests(BOUNDS)
+    feed.set_feed(0.8, 0.0, 1.0)
+    assert len(losses(feed, 1.0, 1.5)) == 1
+    feed.set_feed(0.8, 0.0, 1.5)
+    assert losses(feed, 1.5, 2.0) == []
+    for i in range(200):
+        feed.set_feed(0.8, 0.0, 2.0 + 0.01 * i)
+        assert feed.age(2.0 + 0.01 * i) == []
+
+
 @pytest.mark.parametrize('age', [0.3, nan])
 def test_a_value_that_is_old_or_out_of_order_is_ignored(age):
     feed = FeedRequests(BOUNDS)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ur_cartesian_driver.execution.offsets.offset_requests import OffsetRequests
 from ur_cartesian_driver.execution.servo.offset_setpoints import (
     BoundedOffset,
     OffsetSetpoints,
@@ -20,7 +21,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.goal.goal import StaleOffset
 from ur_cartesian_driver.motion.plan.offset_band import OffsetBand
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
-from ur_cartesian_driver.planning.preflight.offset_bands import fade_time
+from ur_cartesian_driver.planning.preflight.offset_band_check import fade_time
 
 #: How many random streams; 10,000 take two minutes.
 STREAMS = int(os.environ.get('OFFSET_STREAMS', '25'))
@@ -49,6 +50,17 @@ def band(duration, *, limits=LIMITS, speed=SPEED, acceleration=ACCELERATION, **c
         }
         | changes
     )
+
+
+def test_a_second_stale_offset_is_said_when_a_warning_is_due_again():
+    requests = OffsetRequests(band(20.0))
+    warnings = []
+    for i in range(800):
+        now = 0.01 * i
+        if now < 1.0 or 1.5 < now < 1.6:
+            requests.set_offset((0.0, 0.001, 0.0), 0.0, now)
+        warnings += [now] * len(requests.age(now))
+    assert warnings == [pytest.approx(1.3, abs=0.02), pytest.approx(3.3, abs=0.02)]
 
 
 class Still:

@@ -123,7 +123,7 @@ def test_the_calls_of_a_program_are_read():
     ('call', 'found'),
     [
         ('movej([0, 1], 1.4, 1.05)', {'a': 1.4, 'v': 1.05}),
-        ('movej([0, 1], 1.4, 1.05, 0, 0.01)', {'a': 1.4, 'v': 1.05, 'r': 0.01}),
+        ('movej([0, 1], 1.4, 1.05, 0, 0.01)', {'a': 1.4, 'v': 1.05}),
         ('movej(f(2, a=1), 1.4, v=1.05)', {'a': 1.4, 'v': 1.05}),
         ('movej(q=[a, v], t=3)', {'t': 3.0}),
         ('movej(p[0,\n1], # a=9\n a=1)', {'a': 1.0}),
@@ -148,6 +148,11 @@ def test_arguments_are_bound_as_the_controller_does(call, found):
         ('movej(q, 1, 1, 1, 1, 1)', 'line 1: movej has no argument number 6'),
         ('while True:\n  movej(q)\nend', 'line 2: movej stands in a loop, a branch or a function'),
         ('def f():\n def g():\n movel(p)\n end\n g()\n g()\nend', 'line 3: movel stands in a'),
+        (
+            'def move():\n movej(q)\nend\ndef program():\n move()\n move()\nend',
+            'line 2: movej stands in a loop, a branch or a function',
+        ),
+        ('movej(q, r=-1)', 'line 1: r of movej is -1; it must be 0 or more'),
         ('movej(q', 'moves.script, line 1: this is no call of URScript'),
     ],
 )

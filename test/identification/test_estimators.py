@@ -14,6 +14,7 @@ from ur_cartesian_driver.identification.estimators import Unknown
 from ur_cartesian_driver.identification.identify import identify
 from ur_cartesian_driver.identification.profile import find_profile
 from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState, SafetyMode
 
 
 @pytest.fixture
@@ -97,3 +98,62 @@ def test_an_estimate_at_the_bound_of_its_law_keeps_an_interval(laws):
             program.movej([q, 0.0, 0.0, 0.0, 0.0, 0.0], a=3.0, v=1.0)
         low, high = identify([program.record('chain')]).results['idle_between_moves'].interval
         assert low == 0.0 < high
+
+
+def interrupted(laws, ending, **columns):
+    """Return a recording of a joint move that something ends; columns replace its own."""
+    program = Program(laws=laws, random=Random(3))
+    program.movej([1.6, 0.3, 0.2, 0.0, 0.0, 0.0], a=3.0, v=0.5)
+    samples = program.record('move', ending, 1.2)
+    return replace(samples, **{name: make(samples) for name, make in columns.items()})
+
+
+@pytest.mark.parametrize('mode', [SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SAFEGUARD_STOP, 21])
+@pytest.mark.parametrize('ending', ['pause', 'stop', 'protective'])
+def test_another_safety_stop_shows_no_law(laws, mode, ending):
+    """Its ramp is neither that of a pause, nor of a stopped program, nor of a protective stop."""
+
+    def safety(samples):
+        playing = np.isin(samples.runtime_state, (RuntimeState.STOPPED, RuntimeState.PLAYING))
+        stopped = ~playing if ending != 'stop' else samples.runtime_state == RuntimeState.STOPPING
+        return np.where(stopped, float(mode), float(SafetyMode.NORMAL))
+
+    results = identify([interrupted(laws, ending, safety_mode=safety)]).results
+    for name in ('pause_time', 'stop_time', 'protective_stop_time'):
+        assert isinstance(results[name], Unknown), name
+        assert 'in motion' in results[name].reason
+
+
+@pytest.mark.parametrize(
+    ('ending', 'name'),
+    [('pause', 'pause_time'), ('stop', 'stop_time'), ('protective', 'protective_stop_time')],
+)
+def test_a_stop_below_full_speed_is_left_out(laws, ending, name):
+    found = identify([interrupted(laws, ending)]).results[name]
+    assert found.interval[0] <= getattr(laws, name) <= found.interval[1]
+    slowed = interrupted(laws, ending, slider=lambda samples: np.full(len(samples.time), 0.5))
+    found = identify([slowed]).results[name]
+    assert found.reason == '1 stop came while the speed slider was below 100 %'
+
+
+def test_a_program_that_is_paused_between_two_moves_makes_two(laws):
+    """The second one is no rest of the first, which came to its end."""
+    program = Program(laws=laws, random=Random(3))
+    program.movej([0.9, 0.0, 0.0, 0.0, 0.0, 0.0], a=3.0, v=1.0)
+    program.wait(0.5)
+    program.movej([0.1, 0.0, 0.0, 0.0, 0.0, 0.0], a=3.0, v=1.0)
+    samples = program.record('moves')
+    begin = samples.time[0] + 0.401 + 0.5 * laws.start_time
+    (_, end, _), (start, _, _) = program.parts
+    paused = (samples.time > begin + end + 0.1) & (samples.time < begin + start + 0.004)
+    states = np.where(paused, float(RuntimeState.PAUSED), samples.runtime_state)
+    found = identify([replace(samples, runtime_state=states)], program.commands)
+    assert [move.piece.resumed for move in found.moves] == [False, False]
+
+
+@pytest.mark.parametrize(
+    'name', ['servo_gain_factor', 'set_point_deceleration', 'blend_shape', 'speed_noise']
+)
+def test_no_experiment_is_recommended_that_does_not_show_the_law(laws, name):
+    found = identify([interrupted(laws, None)]).results[name]
+    assert found.experiment == 'no experiment shows it yet'

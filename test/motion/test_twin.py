@@ -104,7 +104,7 @@ def test_the_file_has_a_paragraph_for_each_law():
         ('[0.154, 0.162]', '0.1', 'line 11: the interval of start_time must be two numbers'),
         ('  interval: [0.154, 0.162]\n', '', 'line 9: start_time has no interval'),
         ('value: parabola', 'value: circle', 'blend_shape is circle; it must be parabola or'),
-        ('lag:', 'start_time:', 'start_time stands twice'),
+        ('lag:', 'start_time:', 'start_time is given twice'),
         ('\nlag:', '\n? [a]\n: b\nlag:', 'a field of the file has no name'),
         ('  not_identified', '  value: 1\n  not_identified', 'is not identified, so it can'),
     ],

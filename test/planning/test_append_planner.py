@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A goal that is planned part by part becomes the motion that it is when all is known at once."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from math import pi
 
@@ -10,7 +11,12 @@ import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.errors import (
+    GoalRefused,
+    InvalidGoal,
+    NotAvailable,
+    Unreachable,
+)
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import ZERO6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
@@ -26,9 +32,11 @@ from ur_cartesian_driver.motion.goal.leads import Lead
 from ur_cartesian_driver.motion.plan.primitive import SwitchOutput
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.append import append_planner
 from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.planning.options import MAX_POINTS
+from ur_cartesian_driver.planning.spline.spline_planner import plan_spline
 from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 
 ARM = Arm(robot_model('ur5e'))
@@ -211,8 +219,11 @@ def test_a_lead_of_an_appended_command_is_refused_by_its_time_or_its_name():
             r'io_commands\[0\]\.offset is -0\.02, but a goal with keep_open switches outputs at ',
         ),
         ('other', r"io_commands\[0\]\.lead is 'other', but the driver has only valve"),
+        ('no output', r'io_commands\[0\]\.output is 9; allowed are STANDARD_DIGITAL'),
     ):
-        command = replace(outputs((0.0,))[6], lead=name)
+        command = replace(outputs((0.0,))[6], lead=name.removeprefix('no output') or 'valve')
+        if name == 'no output':
+            command = replace(command, output=9)
         points = AppendedPoints(**of(goal, 4, COUNT, io_commands=(command,)), last=True)
         with pytest.raises(InvalidGoal, match=sentence):
             plan_append(part.next_goal, points, ARM, options, from_rest=False)
@@ -318,15 +329,19 @@ def test_points_of_a_refusal_are_numbered_from_the_start_of_the_goal():
 
 
 @pytest.mark.parametrize('from_rest', [False, True])
-def test_a_goal_of_speeds_takes_no_times(from_rest):
+@pytest.mark.parametrize('known', [1, 3])
+def test_a_goal_of_speeds_takes_no_times(known, from_rest):
     goal = moves(1)
     part = plan_first_part(
-        plan(replace(goal, **of(goal, 0, 3), keep_open=True), STATE, ARM, OPTIONS), ARM, OPTIONS
+        plan(replace(goal, **of(goal, 0, known), keep_open=True), STATE, ARM, OPTIONS),
+        ARM,
+        OPTIONS,
     )
-    with pytest.raises(InvalidGoal, match=r'points\[3\].time_from_start is 9 s, .* no times'):
+    text = rf'points\[{known}\].time_from_start is 9 s, .* no times'
+    with pytest.raises(InvalidGoal, match=text):
         plan_append(
             part.next_goal,
-            AppendedPoints(waypoints=(replace(goal.waypoints[3], time=9.0),)),
+            AppendedPoints(waypoints=(replace(goal.waypoints[known], time=9.0),)),
             ARM,
             OPTIONS,
             from_rest=from_rest,
@@ -350,6 +365,42 @@ def test_appended_times_go_on_increasing(times, goal, from_rest):
         plan_append(
             part.next_goal, AppendedPoints(waypoints=waypoints), ARM, OPTIONS, from_rest=from_rest
         )
+
+
+@pytest.mark.parametrize('from_rest', [False, True])
+@pytest.mark.parametrize('goal', [spline(), moves(1, timed=0.6)], ids=['spline', 'lines'])
+def test_an_appended_time_beyond_all_measure_is_refused_as_it_was_given(goal, from_rest):
+    part = plan_first_part(
+        plan(replace(goal, **of(goal, 0, 3), keep_open=True), STATE, ARM, OPTIONS), ARM, OPTIONS
+    )
+    points = AppendedPoints(waypoints=(replace(goal.waypoints[3], time=1e300),))
+    with pytest.raises(InvalidGoal, match=r'points\[3\].* gives the segment 1e\+300 s, more than'):
+        plan_append(part.next_goal, points, ARM, OPTIONS, from_rest=from_rest)
+
+
+def test_only_a_spline_that_is_too_fast_from_rest_is_tried_again_with_more_time(monkeypatch):
+    goal = spline()
+    part = plan_first_part(
+        plan(replace(goal, **of(goal, 0, 3), keep_open=True), STATE, ARM, OPTIONS), ARM, OPTIONS
+    )
+    tried = []
+
+    def counted(*args, **fields):
+        tried.append(args[0].time)
+        return plan_spline(*args, **fields)
+
+    monkeypatch.setattr(append_planner, 'plan_spline', counted)
+    far = replace(goal.waypoints[3], pose=Pose((3.0, 0.0, 0.0), HOME.quaternion))
+    soon = replace(goal.waypoints[3], time=goal.waypoints[2].time + 0.05)
+    for point, again, refusal in (
+        (far, False, pytest.raises(Unreachable)),
+        (soon, True, nullcontext()),
+    ):
+        tried.clear()
+        addition = AppendedPoints(waypoints=(replace(point, twist=ZERO6),), last=True)
+        with refusal:
+            plan_append(part.next_goal, addition, ARM, OPTIONS, from_rest=True)
+        assert (len(tried) > 1) is again
 
 
 @pytest.mark.parametrize('from_rest', [False, True])

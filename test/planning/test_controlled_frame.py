@@ -147,6 +147,14 @@ def test_a_turn_on_the_way_needs_the_tcp_and_is_refused_with_point_and_angle(cel
         plan(goal, cell.state, cell.arm, KEEP)
 
 
+def test_rounded_corners_are_not_advised_to_use_joint_moves(cell):
+    goal = goal_of(
+        moved(nozzle(cell), y=0.05, turn=(0.0, 0.0, 0.1)), corner_deviation=1e-3, segments=()
+    )
+    with pytest.raises(InvalidGoal, match=r'; keep the orientation, or set allow_tcp_change to'):
+        plan(goal, cell.state, cell.arm, KEEP)
+
+
 def test_the_way_to_the_first_point_counts_too(cell):
     goal = goal_of(moved(nozzle(cell), y=0.05, turn=(0.0, 0.0, 0.1)))
     with pytest.raises(InvalidGoal, match=r'points\[0\]'):

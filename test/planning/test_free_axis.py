@@ -128,6 +128,32 @@ def test_a_range_of_no_width_is_the_fixed_planner():
         assert one.joints == pytest.approx(other.joints, abs=1e-8)
 
 
+@pytest.mark.parametrize('beside', [-0.004, 0.004])
+def test_an_arm_just_beside_the_range_of_its_first_rotation_is_within_the_start_tolerance(beside):
+    """At time 0 the arm is at the point, turned by the bound of the range and a little farther."""
+    start, bound = STATE.actual_tcp_pose, 0.5
+    goal = Goal(
+        waypoints=tuple(
+            Waypoint(
+                pose=turned(Pose((x, y + dy, z), start.quaternion), FreeAxis.Z, -bound - beside),
+                time=time,
+            )
+            for (x, y, z), dy, time in ((start.position, 0.0, 0.0), (start.position, 0.05, 2.0))
+        ),
+        segments=(
+            Segment(
+                free_axis=FreeAxis.Z,
+                free_min=-1.0 if beside > 0.0 else bound,
+                free_max=bound if beside > 0.0 else 1.0,
+            ),
+        )
+        * 2,
+    )
+    made = plan(goal, STATE, ARM, OPTIONS)
+    assert 'as given' not in free_remark(made)
+    assert rotations(goal, made)[0] == pytest.approx(bound)
+
+
 def test_a_chosen_goal_is_planned_again_to_the_same():
     path = free_path(2)
     made = plan(path.goal, path.state, path.arm, OPTIONS)

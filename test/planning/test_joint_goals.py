@@ -3,6 +3,7 @@
 """Joint goals: refusals and their reasons, the velocities that the driver chooses, and limits."""
 
 from dataclasses import replace
+import itertools
 from math import inf, nan, pi
 from typing import Any
 
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 import pytest
+from random_cases import cases, random_of
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import (
@@ -25,6 +27,7 @@ from ur_cartesian_driver.motion.goal.joint_goal import JointGoal, JointPoint, Jo
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.primitive import BeginPress, EndPress, PressLaw, Spline
 from ur_cartesian_driver.planning import plan_joint_goal, PlanningOptions
+from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 
 OPTIONS = PlanningOptions(max_tool_speed=0.0, max_approach_distance=0.0, self_collision='off')
@@ -163,6 +166,141 @@ def test_a_trajectory_that_is_too_fast_is_slowed_as_a_whole(cell):
         planned(cell, goal, max_tool_speed=0.2, on_too_fast='slow', max_segment_time=0.6)
 
 
+def test_the_acceleration_where_a_cubic_begins_counts(cell):
+    """The joint starts off from a point with 3 d / T^2, and arrives at the next one with 0."""
+    d, T = 0.2, 0.2
+    rows = [np.zeros(6), *(np.array([0.0, 0.0, 0.0, 0.0, 0.0, by]) for by in (d, d + 0.75))]
+    speeds = (0.0, 1.5 * d / T, 0.0)
+    points = tuple(
+        JointPoint(
+            time=time, positions=np.add(cell.state.actual_q, row), velocities=(*ZERO[:5], speed)
+        )
+        for time, row, speed in zip((1.0, 1.0 + T, 2.0 + T), rows, speeds, strict=True)
+    )
+    goal, most = JointGoal(joint_names=JOINT_NAMES, points=points), 3.0 * d / T**2
+    text = (
+        r'points\[1\]\.time_from_start gives too little time: at 0 % of it wrist_3_joint needs '
+        rf'{most:.3f} rad/s\^2, more than max_joint_acceleration = {0.99 * most:.3f}'
+    )
+    planned(cell, goal, max_joint_acceleration=1.01 * most)
+    with pytest.raises(TooFast, match=text):
+        planned(cell, goal, max_joint_acceleration=0.99 * most)
+    slow = planned(cell, goal, max_joint_acceleration=0.5 * most, on_too_fast='slow')
+    q, dt = spline_of(slow).rows(np.linspace(0.0, slow.duration, 20_001))[0], slow.duration / 20e3
+    assert np.abs(np.diff(q, 2, axis=0) / dt**2).max() == pytest.approx(0.5 * most, rel=1e-3)
+
+
+def turned(cell, by, time, *, rates=ZERO):
+    """Return a point with wrist 3 turned from home [rad], and rates."""
+    positions = np.add(cell.state.actual_q, (*ZERO[:5], by))
+    return JointPoint(time=time, positions=positions, velocities=rates, accelerations=ZERO)
+
+
+@pytest.mark.parametrize('T', [0.004, 0.02, 0.1])
+def test_accelerations_between_samples_count(cell, T):
+    """From rest to rest, a quintic needs 10 / sqrt(3) of d / T^2, at 21 % and 79 % of its time."""
+    most = 40.0
+    d = most * T**2 * 3.0**0.5 / 10.0
+    points = (turned(cell, 0.0, 1.0), turned(cell, d, 1.0 + T))
+    goal = JointGoal(joint_names=JOINT_NAMES, points=points)
+    options = {'max_angular_acceleration': 1000.0}
+    planned(cell, goal, **options, max_joint_acceleration=1.003 * most)
+    with pytest.raises(TooFast, match=r'at (2[012]|7[89]|80) % of it wrist_3_joint needs \d+'):
+        planned(cell, goal, **options, max_joint_acceleration=0.997 * most)
+
+
+@pytest.mark.random
+def test_no_limit_is_exceeded_between_samples(cell):
+    """Judged by differences of joints and places, at 2,000 steps of each piece."""
+    random, judged = random_of('joint limits'), 0
+    for _ in range(cases(30)):
+        rng = np.random.default_rng(random.randrange(2**32))
+        goal = random_goal(cell, rng)
+        options = {
+            'max_tool_speed': float(rng.choice([0.0, 0.25])),
+            'max_joint_acceleration': float(rng.choice([5.0, 40.0])),
+            'max_linear_acceleration': float(rng.choice([2.0, 10.0])),
+            'on_too_fast': 'slow',
+        }
+        try:
+            made = planned(cell, goal, **options)
+        except (InvalidGoal, JointLimitExceeded):
+            continue
+        judged += 1
+        for key, used in used_parts_of_limits(cell, made, options).items():
+            assert used < 1.003, key
+    assert judged > cases(30) / 3
+
+
+def random_goal(cell, rng):
+    """Return a goal with pieces of any duration, short ones included, and any rates."""
+    time, points, quintic = 0.5, [], rng.random() < 0.5
+    moved, scale = rng.random(6) < rng.choice([0.2, 0.5, 1.0]), 10.0 ** rng.uniform(-5.0, -1.0)
+    count = rng.integers(1, 6)
+    for i in range(count):
+        time += 10.0 ** rng.uniform(-2.7, -0.5)
+        rates = rng.normal(0.0, 1.0, (2, 6)) * 10.0 ** rng.uniform(-3.0, 0.0) * (i + 1 < count)
+        points.append(
+            JointPoint(
+                time=time,
+                positions=np.add(cell.state.actual_q, rng.normal(0.0, scale, 6) * moved),
+                velocities=rates[0],
+                accelerations=5.0 * rates[1] if quintic else (),
+            )
+        )
+    return JointGoal(joint_names=JOINT_NAMES, points=tuple(points))
+
+
+def used_parts_of_limits(cell, made, options):
+    """Return the greatest parts of the limits that a plan uses inside of its pieces."""
+    spline, used = spline_of(made), dict.fromkeys(('qd', 'qdd', 'v', 'a'), 0.0)
+    for begin, end in itertools.pairwise(spline.times):
+        times = np.linspace(begin, end, 2001)[1:-1]
+        h, q = times[1] - times[0], spline.rows(times)[0]
+        x = tcp_rows(cell.arm, cell.T_flange_tcp, q)[:, :3]
+        v, a = (np.linalg.norm(np.diff(x, n, axis=0), axis=1).max() / h**n for n in (1, 2))
+        qd, qdd = (np.abs(np.diff(q, n, axis=0)).max(axis=0) / h**n for n in (1, 2))
+        for key, part in (
+            ('qd', (qd / cell.arm.model.max_joint_speed).max()),
+            ('qdd', qdd.max() / options['max_joint_acceleration']),
+            ('v', v / (options['max_tool_speed'] or np.inf)),
+            ('a', a / options['max_linear_acceleration']),
+        ):
+            used[key] = max(used[key], part)
+    return used
+
+
+@pytest.mark.parametrize('beyond', [1e-5, 1e-4])
+def test_a_joint_that_turns_back_between_samples_keeps_its_range(cell, beyond):
+    """A cubic that leaves with v and comes back with -v after T gets v T / 4 far."""
+    T, v = 0.05, 0.5
+    bound = 2.0 * pi - cell.state.actual_q[5]
+    begin = bound + beyond - v * T / 4.0
+    points = tuple(
+        JointPoint(
+            time=time,
+            positions=np.add(cell.state.actual_q, (*ZERO[:5], by)),
+            velocities=(*ZERO[:5], speed),
+        )
+        for time, by, speed in (
+            (9.0, begin, v),
+            (9.0 + T, begin, -v),
+            (19.0, bound - 1.0, 0.0),
+        )
+    )
+    goal = JointGoal(joint_names=JOINT_NAMES, points=points)
+    text = (
+        r'points\[1\]\.positions, at 4\d\.\d % of its segment: wrist_3_joint turns to 6\.283\d+ '
+    )
+    with pytest.raises(JointLimitExceeded, match=text):
+        planned(cell, goal, max_joint_acceleration=100.0)
+    nearer = tuple(
+        replace(each, positions=(*each.positions[:5], each.positions[5] - 1.01 * beyond))
+        for each in points
+    )
+    planned(cell, replace(goal, points=nearer), max_joint_acceleration=100.0)
+
+
 def test_points_may_be_a_millisecond_apart(cell):
     times = [0.5 + 0.001 * k for k in range(200)]  # as sums of decimals are
     points = tuple(JointPoint(positions=cell.state.actual_q, time=time) for time in times)
@@ -192,6 +330,17 @@ def test_accelerations_of_some_points_are_ignored_and_the_report_says_so(cell):
     assert all(piece.accelerations == SIX for piece in full.rows.primitives)
     assert all(piece.accelerations is None for piece in partly.rows.primitives)
     assert any('accelerations are ignored' in line for line in partly.remarks)
+
+
+def test_accelerations_of_a_point_where_the_arm_rests_are_ignored_and_the_report_says_so(cell):
+    rates = {'velocities': ZERO, 'accelerations': SIX}
+    home = JointPoint(positions=cell.state.actual_q, time=0.0, **rates)
+    (point,) = goal_through(cell, SIX).points
+    goal = JointGoal(joint_names=JOINT_NAMES, points=(home, replace(point, **rates)))
+    text = 'point 0: accelerations are ignored, because the arm rests there'
+    assert text in planned(cell, goal).remarks
+    still = replace(goal, points=(replace(home, accelerations=ZERO), *goal.points[1:]))
+    assert text not in planned(cell, still).remarks
 
 
 @given(

@@ -144,6 +144,12 @@ def test_a_joint_out_of_its_range_is_not_turned_back(cell):
     assert 'wrist_3_joint at 7.0000 rad' in str(error)
 
 
+def test_a_joint_just_out_of_its_range_is_told_with_digits_that_show_it(cell):
+    q = (*cell.state.actual_q[:5], 2.0 * pi + 1e-6)
+    text = 'wrist_3_joint at 6.283186 rad, outside its range of -6.2832 to 6.2832 rad'
+    assert text in str(refusal(cell, at(q), segments=(JOINT,)))
+
+
 def test_a_wrong_name_is_refused(cell):
     error = refusal(cell, at(UPRIGHT, ('a', *JOINT_NAMES[1:])), segments=(JOINT,))
     assert isinstance(error, InvalidJoints)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 import gc
 from math import degrees, hypot, pi
@@ -50,6 +51,7 @@ from ur_cartesian_driver.motion.plan.primitive import (
 )
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.moves import joint_path_planner
 from ur_cartesian_driver.preview import table
 from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 
@@ -254,6 +256,31 @@ def test_a_partial_posture_flips_the_elbow_to_the_solution_nearest_in_it(cell):
     assert cell.tool(segment.joints).distance_to(goal.waypoints[0].pose) < 1e-9
     every = solutions(cell.arm, goal.waypoints[0].pose @ cell.T_flange_tcp.inverse())
     assert abs(segment.joints[2] + 1.2) <= min(abs(q[2] + 1.2) for q in every) + 0.01
+
+
+def test_a_path_that_needs_too_many_samples_is_refused_before_it_is_sampled(cell):
+    back, forth = cell.point(), cell.point(0.2)  # a hundred steps of 2 mm apart
+    goal = Goal(waypoints=(forth, back) * 20_100)
+    text = (
+        r'trajectory\.points describe a path whose check needs 4\.02e\+06 samples, more than '
+        r'4,000,000, most of all on the way to points\[\d+\]; check the positions, or split'
+    )
+    with pytest.raises(InvalidGoal, match=text):
+        plan(goal, cell.state, cell.arm, OPTIONS)
+
+
+def test_samples_of_joint_moves_and_lines_count_together(cell, monkeypatch):
+    goal = Goal(
+        waypoints=tuple(cell.point(0.1 * (k % 2 == 0)) for k in range(12)),
+        segments=(Segment(), Segment(type=TYPE.JOINT)) * 6,
+    )
+    for bound, refusal in (
+        (700, nullcontext()),
+        (500, pytest.raises(InvalidGoal, match='samples, more than 500, most of all on the way')),
+    ):
+        monkeypatch.setattr(joint_path_planner, '_MAX_SAMPLES', bound)
+        with refusal:
+            plan(goal, cell.state, cell.arm, OPTIONS)
 
 
 @pytest.mark.parametrize('kind', [TYPE.LINEAR, TYPE.CIRCULAR, TYPE.PROCESS])

@@ -117,7 +117,11 @@ def test_records_go_on_behind_those_that_stay():
         ({'replace_from_point': -1}, InvalidGoal, 'replace_from_point is -1, but'),
         ({'replace_from_time': nan}, InvalidGoal, 'replace_from_time contains nan'),
         ({'replace_from_point': 2, 'replace_from_time': 0.5}, InvalidGoal, 'and replace_from_ti'),
-        ({'replace_from_time': -0.5}, AlreadySent, 'replace from point 1 on, from 0.000 s on'),
+        (
+            {'replace_from_time': -0.5},
+            AlreadySent,
+            'replace from point 1 or from 0.000 s on, or later',
+        ),
         ({'replace_from_time': 1.1}, InvalidGoal, r'is 1 s, not later than the 1.1 s where the'),
     ],
 )

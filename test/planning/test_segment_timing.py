@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import pi
+from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -156,6 +157,20 @@ def test_speeds_are_slowed_to_the_largest_tool_speed_and_it_is_said(cell, kind):
     assert free[0].primitive.velocity == 0.6
 
 
+@pytest.mark.parametrize(
+    ('x', 'turn', 'twist', 'ignored'),
+    [
+        (0.1, 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.3), True),
+        (0.1, 0.0, (0.1, 0.0, 0.0, 0.0, 0.0, 0.3), False),
+        (0.0, 0.5, (0.1, 0.0, 0.0, 0.0, 0.0, 0.0), True),
+        (0.0, 0.5, (0.0, 0.0, 0.0, 0.0, 0.0, 0.3), False),
+    ],
+)
+def test_a_twist_without_the_part_that_sets_the_speed_is_told(cell, x, turn, twist, ignored):
+    _, remarks = one(cell, x=x, turn=(0.0, 0.0, turn), twist=twist)
+    assert any('point 0: twist is ignored' in line for line in remarks) is ignored
+
+
 def test_joint_moves_keep_to_the_speed_of_the_joints(cell):
     options = PlanningOptions(max_tool_speed=0.0)
     segment, remarks = one(cell, options, x=0.1, segment=Segment(type=TYPE.JOINT, velocity=9.0))
@@ -275,6 +290,42 @@ def test_the_shortest_time_keeps_the_tool_speed(cell, kind, max_tool_speed, too_
     rows = drive(made, cell)
     assert rows[:, 4].max() <= max_tool_speed * (1.0 + 1e-4)
     assert rows[-1, 0] == pytest.approx(shortest, abs=2 * CYCLE)
+
+
+@pytest.mark.parametrize('radius', [0.002, 0.02])
+@pytest.mark.parametrize('timed', [False, True])
+def test_an_arc_keeps_the_acceleration_of_the_tool(cell, radius, timed):
+    """
+    On half a circle, at the speed at which v^2 / r is the limit.
+
+    Judged by second differences of the driven places. While the tool speeds up or brakes, the
+    acceleration along the arc comes on top, at a right angle.
+    """
+    options = PlanningOptions(max_linear_acceleration=1.0, max_tool_speed=1.0)
+    segment = Segment(
+        type=TYPE.CIRCULAR,
+        via=cell.pose(radius, radius),
+        velocity=0.0 if timed else 0.9,
+        acceleration=0.5,
+    )
+    text = f'max_linear_acceleration = 1 m/s^2 (on an arc with a radius of {1e3 * radius:g} mm)'
+    point: dict[str, Any] = {'x': 2.0 * radius, 'segment': segment}
+    if timed:
+        with pytest.raises(TooFast) as caught:
+            one(cell, options, time=0.1, **point)
+        assert text in str(caught.value)
+        point['time'] = float(str(caught.value).split('at least ')[1].split(' s')[0])
+    found, remarks = one(cell, options, **point)
+    assert found.primitive.velocity == pytest.approx(radius**0.5, rel=0.01)
+    assert timed or text in remarks[0]
+    goal = Goal(
+        waypoints=(cell.point(2.0 * radius, time=point.get('time', 0.0)),), segments=(segment,)
+    )
+    rows = drive(plan(goal, cell.state, cell.arm, options), cell)
+    needed = np.linalg.norm(np.diff(rows[:, 1:4], 2, axis=0), axis=1) / CYCLE**2
+    cruises = np.abs(np.diff(rows[1:, 4])) < 1e-6
+    assert needed[cruises].max() == pytest.approx(1.0, rel=0.02)
+    assert needed.max() <= np.hypot(1.0, 0.5) * 1.01
 
 
 CORNERS = ((0.1, 0.0), (0.1, 0.2), (-0.1, 0.2), (-0.1, 0.0), (0.1, 0.0))

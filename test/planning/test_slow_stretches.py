@@ -109,6 +109,18 @@ def test_the_acceleration_on_the_arc_of_a_blend_is_no_joint_limit():
     assert SlowCause.ACCELERATION_LIMIT.value in str(refusal.value)
 
 
+def test_the_acceleration_on_an_arc_is_no_joint_limit():
+    segment = Segment(type=SegmentType.CIRCULAR, via=at(y=0.01, x=0.01), velocity=0.24)
+    of = goal(at(y=0.02), segment=segment, min_speed_fraction=0.9)
+    with pytest.raises(
+        InvalidGoal,
+        match=r'max_linear_acceleration = 1 m/s\^2 \(on an arc with a '
+        r'radius of 10 mm\)',
+    ) as refusal:
+        planned(of, max_linear_acceleration=1.0)
+    assert SlowCause.ACCELERATION_LIMIT.value in str(refusal.value)
+
+
 def test_a_spline_slowed_by_the_acceleration_of_the_tool_is_not_advised_to_raise_its_speed():
     places = (0.02, 0.3), (0.04, 0.6), (0.07, 1.0), (0.09, 1.3), (0.11, 1.7)
     points = tuple(

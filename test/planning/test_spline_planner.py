@@ -28,6 +28,7 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector, rotate
 from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows
+from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal, Posture, Segment, Waypoint
 from ur_cartesian_driver.motion.goal.goal_columns import goal_table
@@ -544,6 +545,57 @@ def test_accelerations_are_slowed_to_their_limit_and_no_further(cell, linear):
     assert most == pytest.approx(limit, rel=0.05)
 
 
+@pytest.mark.parametrize('linear', [True, False], ids=['tool', 'joints'])
+def test_the_acceleration_where_a_cubic_begins_is_slowed_to_its_limit(cell, linear):
+    """
+    The tool starts off from point 0 with 3 d / T^2, and arrives at point 1 with 0.
+
+    Judged by second differences of places and joints, a millisecond apart.
+    """
+    d, T = 0.02, 0.2
+    goal = Goal(
+        waypoints=(
+            cell.point(0.0, 0.01, time=1.0),
+            cell.point(0.0, 0.01 + d, time=1.0 + T, twist=(0.0, 1.5 * d / T, 0, 0, 0, 0)),
+            cell.point(0.0, 0.01 + 3.0 * d, time=2.0 + T),
+        ),
+        execution=SPLINE,
+    )
+    bounds: dict[str, Any] = {}
+    for factor in (1.0, 0.25):
+        options = replace(OPTIONS, on_too_fast='slow', **bounds)
+        made = plan(goal, cell.state, cell.arm, options)
+        q = joints_of(made).rows(np.arange(0.0, made.duration, 1e-3))[0]
+        x = tcp_rows(cell.arm, cell.T_flange_tcp, q)[:, :3] if linear else q
+        needed = np.diff(x, 2, axis=0) / 1e-3**2
+        most = np.linalg.norm(needed, axis=1).max() if linear else np.abs(needed).max()
+        if not bounds:
+            assert most == pytest.approx(3.0 * d / T**2, rel=0.02) or not linear
+            bounds = {f'max_{"linear" if linear else "joint"}_acceleration': 0.25 * most}
+            needed_before = most
+        # The joint pieces have a little more or less than the spline of the tool.
+        assert most == pytest.approx(factor * needed_before, rel=0.02)
+
+
+@pytest.mark.parametrize('T', [0.004, 0.02])
+def test_the_acceleration_within_a_short_piece_is_found(cell, T):
+    """From rest to rest, a quintic needs 10 / sqrt(3) of the turn / T^2."""
+    most, options = 35.0, replace(OPTIONS, max_joint_acceleration=1000.0)
+    turn = most * T**2 * 3.0**0.5 / 10.0
+    goal = Goal(
+        waypoints=(
+            cell.point(0.001, time=1.0, acceleration=(1e-9, 0, 0, 0, 0, 0)),
+            cell.point(0.001, time=1.0 + T, turn=(0.0, 0.0, turn)),
+        ),
+        execution=SPLINE,
+    )
+    plan(goal, cell.state, cell.arm, replace(options, max_angular_acceleration=1.003 * most))
+    low = replace(options, max_angular_acceleration=0.997 * most)
+    text = refused(TooFast, cell, goal, low)
+    found = float(text.split('the tool needs ')[1].split(' rad/s^2')[0])
+    assert found == pytest.approx(most, rel=0.002)
+
+
 def test_a_workspace_plane_is_kept_between_the_points_too(cell):
     low = cell.home.position[2] - 0.03
     plane = replace(OPTIONS, workspace_planes=(f'table 0 0 {low} 0 0 1',))
@@ -660,7 +712,7 @@ def test_what_is_planned_in_parts_is_not_slowed(cell):
 def test_a_closing_piece_brakes_smoothly_and_no_harder_than_told(cell, qdd):
     qd = (0.5, -0.8, 0.3, 0.2, -0.1, 1.0)
     state = SplineState(time=3.0, q=cell.state.actual_q, qd=qd, qdd=qdd)
-    piece = plan_stop(state, cell.arm, 2.0)
+    piece = plan_stop(state, cell.arm, replace(OPTIONS, keep_open_deceleration=2.0), 0)
     assert piece.velocities == piece.accelerations == (0.0,) * 6
     spline = JointSpline.of(state.q, [piece], velocities=qd, accelerations=qdd)
     _, speeds, accelerations = spline.rows(np.linspace(0.0, piece.duration, 100))
@@ -671,16 +723,31 @@ def test_a_closing_piece_brakes_smoothly_and_no_harder_than_told(cell, qdd):
         assert (np.diff(np.abs(speeds), axis=0) <= 1e-12).all()
 
 
-def test_a_closing_piece_keeps_to_the_range_of_a_joint_or_is_refused(cell):
-    q = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 2.0 * pi - 0.05)
+@pytest.mark.parametrize('left', [0.05, 0.02, 0.0188])
+def test_a_closing_piece_keeps_to_the_range_of_a_joint_as_hard_as_it_may(cell, left):
+    """From 1 rad/s, a cubic needs 1.5 / 2 of v^2 / a to rest: 18.75 mrad with 40 rad/s^2."""
+    q = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 2.0 * pi - left)
     state = SplineState(q=q, qd=(0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
-    piece = plan_stop(state, cell.arm, 4.0)
+    piece = plan_stop(state, cell.arm, OPTIONS, 0)
     assert piece.target[5] <= 2.0 * pi
     assert piece.duration < 1.5 / 4.0
+    dense = JointSpline.of(q, [piece], velocities=state.qd).rows(
+        np.linspace(0.0, piece.duration, 500)
+    )[0]
+    braked = np.diff(dense, 2, axis=0) / (piece.duration / 499.0) ** 2
+    assert np.abs(braked).max() <= OPTIONS.max_joint_acceleration * (1.0 + 1e-6)
+
+
+def test_a_closing_piece_that_would_brake_too_hard_is_refused_with_place_value_and_bound(cell):
+    q = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 2.0 * pi - 0.018)
+    state = SplineState(q=q, qd=(0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
     with pytest.raises(
-        JointLimitExceeded, match='wrist_3_joint is too fast to stop before the end of its range'
+        JointLimitExceeded,
+        match=r'^trajectory\.points\[7\]: wrist_3_joint is too fast there to stop before the end '
+        r'of its range, -6\.2832 to 6\.2832 rad: with max_joint_acceleration = 40 rad/s\^2 it '
+        r'stops at 6\.2839 rad; end',
     ):
-        plan_stop(replace(state, q=(*q[:5], 2.0 * pi - 1e-4)), cell.arm, 4.0)
+        plan_stop(state, cell.arm, OPTIONS, 7)
 
 
 def test_a_closing_piece_keeps_to_the_speed_of_a_joint_that_gets_faster_still(cell):
@@ -688,12 +755,44 @@ def test_a_closing_piece_keeps_to_the_speed_of_a_joint_that_gets_faster_still(ce
     state = SplineState(
         q=cell.state.actual_q, qd=(0.0,) * 5 + (0.98 * fastest,), qdd=(0.0,) * 5 + (8.0,)
     )
-    piece = plan_stop(state, cell.arm, 1.0)
+    piece = plan_stop(state, cell.arm, replace(OPTIONS, keep_open_deceleration=1.0), 0)
     _, speeds, _ = JointSpline.of(
         state.q, [piece], velocities=state.qd, accelerations=state.qdd
     ).rows(np.linspace(0.0, piece.duration))
     assert speeds[1, 5] > speeds[0, 5]
     assert speeds.max() < 1.02 * fastest
+
+
+def test_a_joint_that_gets_too_fast_while_it_stops_is_named_with_its_reason(cell):
+    fastest = cell.arm.model.max_joint_speed[4]
+    state = SplineState(
+        q=cell.state.actual_q, qd=(*(0.0,) * 4, 0.999 * fastest, 0.0), qdd=(*(0.0,) * 4, 39.0, 0)
+    )
+    with pytest.raises(
+        TooFast,
+        match=r'^trajectory\.points\[3\]\.acceleration still speeds up wrist_2_joint, which '
+        r'reaches 3\.\d+ rad/s while it stops .* more than the joint speed limit = 3\.142 rad/s; '
+        r'reduce',
+    ):
+        plan_stop(state, cell.arm, OPTIONS, 3)
+
+
+@pytest.mark.parametrize('seed', range(40))
+def test_a_closing_piece_needs_no_more_than_the_greatest_acceleration(cell, seed):
+    """Judged by differences of the joints, for any speeds and accelerations at the last point."""
+    random = np.random.default_rng(seed)
+    qd, qdd = random.uniform(-3.0, 3.0, 6), random.uniform(-40.0, 40.0, 6)
+    q = np.array(cell.state.actual_q) + random.uniform(-4.0, 4.0, 6)
+    state = SplineState(q=vector6(q.tolist()), qd=vector6(qd.tolist()), qdd=vector6(qdd.tolist()))
+    try:
+        piece = plan_stop(state, cell.arm, OPTIONS, 0)
+    except (JointLimitExceeded, TooFast):
+        return
+    dense = JointSpline.of(state.q, [piece], velocities=state.qd, accelerations=state.qdd).rows(
+        np.linspace(0.0, piece.duration, 500)
+    )[0]
+    braked = np.diff(dense, 2, axis=0) / (piece.duration / 499.0) ** 2
+    assert np.abs(braked).max() <= OPTIONS.max_joint_acceleration * (1.0 + 1e-6)
 
 
 def test_the_way_to_rest_behind_an_open_end_is_checked_too(cell):

@@ -22,12 +22,14 @@ from twin_errors import (
     warm_robot,
 )
 
-from ur_cartesian_driver.motion.errors import GoalRefused, TooFast
+from ur_cartesian_driver.motion.errors import CollisionPredicted, GoalRefused, TooFast
 from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType
 from ur_cartesian_driver.motion.twin.laws import LAWS, MotionLaws
 from ur_cartesian_driver.motion.twin.twin import ArmIdentity, Estimate, Twin
 from ur_cartesian_driver.motion.twin.twin_file import twin_text
-from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning import plan, planner, PlanningOptions
+from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
+from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
 
 
 @pytest.mark.slow
@@ -118,6 +120,28 @@ def test_a_blend_of_unknown_shape_is_planned_as_assumed(cell):
     assert options.laws == replace(MotionLaws(), turn_ratio=3.0, blend_shape='unknown')
     assert made.duration == assumed.duration
     assert made.report == assumed.report
+
+
+def test_the_path_of_the_assumed_blends_is_checked_too_and_only_one_path_is_timed(
+    cell, monkeypatch
+):
+    options, timed = PlanningOptions(twin=twin_of(**BLENDS)), []
+
+    def timings(geometries, used, *others):
+        timed.append(used.twin)
+        return SegmentTimings(geometries, used, *others)
+
+    def lines(arm, tips, used, *others):
+        if used.twin is None:
+            raise CollisionPredicted('The assumed blend is too close.')
+        return clearance_lines(arm, tips, used, *others)
+
+    monkeypatch.setattr(planner, 'SegmentTimings', timings)
+    plan(two_lines(cell), cell.state, cell.arm, options)
+    assert timed == [options.twin]
+    monkeypatch.setattr(planner, 'clearance_lines', lines)
+    with pytest.raises(CollisionPredicted, match='assumed'):
+        plan(two_lines(cell), cell.state, cell.arm, options)
 
 
 def test_the_arcs_of_process_follow_no_measured_law(cell):

@@ -42,9 +42,10 @@ from ur_cartesian_driver.motion.goal.goal import (
     Waypoint,
 )
 from ur_cartesian_driver.motion.goal.goal_columns import goal_table
+from ur_cartesian_driver.motion.goal.leads import Lead
 from ur_cartesian_driver.planning import check, PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
-from ur_cartesian_driver.planning.request.validate import RULES
+from ur_cartesian_driver.planning.request.validate import FIELD_RULES, RULES
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude, PreludeFunction
 from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 
@@ -126,6 +127,21 @@ REFUSALS = [
         ),
         InvalidGoal,
         'segments[1].blend_radius is 0.01 m, but corner_deviation rounds the corners of this goal',
+    ),
+    (
+        with_segment(PLAIN, 1, corner_angle=0.1),
+        InvalidGoal,
+        'segments[1].corner_angle is 0.1 rad, but without corner_deviation the arm rounds no',
+    ),
+    (
+        replace(PLAIN, corner_angle=0.2),
+        InvalidGoal,
+        'corner_angle is 0.2 rad, but without corner_deviation the arm rounds no corner there',
+    ),
+    (
+        replace(TIMED, stall_timeout=3.0),
+        InvalidGoal,
+        'stall_timeout is 3 s, but on_path_tolerance is ABORT, which waits for no arm; set on',
     ),
     # number of things
     (Goal(waypoints=()), InvalidGoal, 'trajectory.points is empty'),
@@ -740,7 +756,7 @@ REFUSALS = [
             presses=(GRIND,),
         ),
         InvalidGoal,
-        'segments[2].type is CIRCULAR, but it begins where presses[0] has brought the tool',
+        'segments[2].type is CIRCULAR, but presses[0] may have displaced the tool at its start',
     ),
     (
         with_fields(PLAIN, presses=(GRIND,), keep_open=True),
@@ -953,6 +969,10 @@ ACCEPTED = {
     'blends that touch': replace(
         PLAIN, segments=(Segment(blend_radius=0.05), Segment(blend_radius=0.05), Segment())
     ),
+    'blend at a first point where the arm is': replace(
+        with_point(TIMED, 0, time=0.0),
+        segments=(Segment(blend_radius=0.15), Segment(blend_radius=0.09), Segment()),
+    ),
     'blend on the last point is dropped': with_segment(PLAIN, 2, blend_radius=5.0),
     'tolerances': replace(
         PLAIN,
@@ -967,6 +987,39 @@ ACCEPTED = {
         with_point(PLAIN, 1, pose=Pose((0.1, 0.0, 0.0))), 1, type=TYPE.JOINT
     ),
 }
+
+
+def test_a_dwell_is_no_part_of_the_time_of_the_segment_after_it():
+    goal = Goal(
+        waypoints=(at(0.1, time=1.0), at(0.2, time=5.0)),
+        segments=(Segment(dwell=3.0), Segment()),
+    )
+    check(goal, replace(OPTIONS, max_segment_time=1.2))
+    with pytest.raises(InvalidGoal, match=r'gives the segment 1\.5 s, more than max_segment_time'):
+        check(with_point(goal, 1, time=5.5), replace(OPTIONS, max_segment_time=1.2))
+
+
+@pytest.mark.parametrize(
+    ('fields', 'text'),
+    [
+        ({'offset': -1.5}, r'io_commands\[0\]\.offset is -1\.5 s, outside -1 to'),
+        ({'offset': nan}, r'io_commands\[0\]\.offset contains nan|offset is nan'),
+        ({'output': 9}, r'io_commands\[0\]\.output is 9; allowed are STANDARD_DIGITAL'),
+        (
+            {'offset': -0.9},
+            r"io_commands\[0\]\.lead is 'valve', whose dead time of 0\.3 s and the offset of "
+            r'-0\.9 s are together more than 1 s; set the offset to 0',
+        ),
+    ],
+)
+def test_a_command_with_a_lead_is_refused_by_what_the_user_wrote(fields, text):
+    valve = Lead(name='valve', output=OutputKind.STANDARD_DIGITAL, pin=3, open=0.3, close=0.0)
+    options = replace(OPTIONS, leads=(valve,))
+    command = replace(VALVE, lead='valve')
+    checked = check(replace(PLAIN, io_commands=(replace(command, offset=-0.5),)), options)
+    assert checked.io_commands[0].offset == pytest.approx(-0.8)
+    with pytest.raises(InvalidGoal, match=text):
+        check(replace(PLAIN, io_commands=(replace(command, **fields),)), options)
 
 
 @pytest.mark.parametrize('goal', ACCEPTED.values(), ids=ACCEPTED)
@@ -1052,8 +1105,10 @@ def test_joint_names_carry_the_prefix():
 
 
 def test_every_rule_refuses_some_goal_of_the_table():
+    all_rules = (*FIELD_RULES, *RULES)
+
     def refusing(goal, options=OPTIONS):
-        for rule in RULES:
+        for rule in all_rules:
             try:
                 rule(goal_table(goal), options)
             except Exception:
@@ -1065,7 +1120,7 @@ def test_every_rule_refuses_some_goal_of_the_table():
         PlanningOptions(acceleration_known=False),
     )
     older = refusing(replace(PLAIN, keep_open=True), PlanningOptions(dialect=DIALECTS['2.12']))
-    assert {refusing(goal) for goal, _, _ in REFUSALS} | {without, older} == set(RULES)
+    assert {refusing(goal) for goal, _, _ in REFUSALS} | {without, older} == set(all_rules)
 
 
 numbers = st.floats(allow_nan=True, allow_infinity=True, width=64)

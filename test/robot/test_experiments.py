@@ -3,6 +3,8 @@
 """The experiments tell the laws apart by which a controller may move."""
 
 from dataclasses import replace
+from pathlib import Path
+import re
 
 import numpy as np
 import pytest
@@ -30,6 +32,10 @@ from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 CYCLE = 0.002
 ANALYSES = {experiment.check: experiment.analyses[0] for experiment in EXPERIMENTS}
 ANALYSES['steps_100'] = next(e for e in EXPERIMENTS if e.check == 'corner_100').analyses[1]
+
+
+#: Columns that few analyses read.
+UNUSED = ('target_distance', 'actual_distance', 'spline_time', 'pieces_begun', 'runtime_state')
 
 
 def trapezoid(distance, speed, acceleration, stretched=1.0):
@@ -67,6 +73,7 @@ def samples(path, scaling=1.0, fraction=1.0, speed=None, stop_sent=float('nan'))
         scaling=np.full(len(path), scaling),
         fraction=np.full(len(path), fraction),
         stop_sent=stop_sent,
+        **dict.fromkeys(UNUSED, np.full(len(path), np.nan)),
     )
 
 
@@ -168,6 +175,15 @@ def test_programs_are_indented_and_move_slowly():
         assert all(line.startswith('  ') for line in body)
     assert experiments.JOINT_SPEED <= 0.2
     assert experiments.TOOL_SPEED <= 0.05
+
+
+def test_programs_use_no_name_of_a_function_for_a_variable():
+    page = Path(__file__).parents[2] / 'doc' / 'script_functions.md'
+    functions = set(re.findall(r'^\| `(\w+)\(', page.read_text('utf-8'), re.MULTILINE))
+    assert {'size', 'norm', 'movej'} <= functions
+    for experiment in EXPERIMENTS:
+        assigned = set(re.findall(r'^\s*(\w+) = ', experiment.script, re.MULTILINE))
+        assert not assigned & functions, experiment.check
 
 
 def rests(*heights, off=0.0):

@@ -15,7 +15,7 @@ from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.msg import DriverStatus
 from ur_cartesian_driver.ros.client import GoalClient
 from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer
-from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS
+from ur_cartesian_driver.ros.node_endpoints import feedback_publishers, LATCHED_QOS
 from ur_cartesian_driver.srv import Recover
 
 
@@ -88,6 +88,16 @@ def test_a_driver_that_was_stopped_is_not_ready(make_driver, client, state):
         waiting = pool.submit(client.wait_ready, 30.0)
         driver.report(DriverStatus.EXECUTING)
         waiting.result()
+
+
+def test_of_two_drivers_of_one_name_none_is_chosen(make_driver, client):
+    drivers = make_driver(), make_driver()
+    for driver in drivers:
+        driver.serve_goals()
+    wait_for(lambda: len(feedback_publishers(client._node, client.action)) == 2, 10.0)
+    with pytest.raises(ConnectionError, match=r'^2 drivers serve .*, and any of them could move'):
+        client.send(FollowCartesianTrajectory.Goal(), timeout=1.0)
+    assert not any(driver.accepted.is_set() for driver in drivers)
 
 
 def test_a_driver_that_is_started_again_does_not_know_the_goal(make_driver, client):

@@ -340,6 +340,9 @@ def run_when_ready(client, goal, on_feedback):
         ),
         (['-p', 'ur_type'], "failed to initialize rcl: Couldn't parse parameter override rule"),
         (['--params-file', '/nowhere'], "failed to initialize rcl: Couldn't parse params file"),
+        (['robot_ip:=10.0.0.5'], "'robot_ip:=10.0.0.5' is not understood. Usage: "),
+        (['--', '-p', 'robot_ip:=10.0.0.5'], '-p robot_ip:=10.0.0.5 is not understood. Usage: '),
+        (['--', '--ur-driver-name'], '--ur-driver-name is not understood. Usage: '),
     ],
 )
 def test_the_command_ends_with_a_sentence_for_bad_arguments(arguments, sentence):
@@ -349,6 +352,13 @@ def test_the_command_ends_with_a_sentence_for_bad_arguments(arguments, sentence)
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1].startswith(f'ur_cartesian_driver: {sentence}')
     assert 'Traceback' not in done.stderr
+
+
+def test_help_starts_no_driver():
+    done = subprocess.run(
+        command('--', '--help'), capture_output=True, text=True, timeout=30.0, check=True
+    )
+    assert done.stdout.startswith('Usage: ur-cartesian-driver ')
 
 
 def test_an_empty_list_in_a_file_is_explained(no_thread_left, tmp_path):

@@ -20,7 +20,7 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.ros.message_fields import pose_from_message
 from ur_cartesian_driver.ros.messages import marker_messages
-from ur_cartesian_driver.ros.messages.marker_messages import COLOURS, plan_markers
+from ur_cartesian_driver.ros.messages.marker_messages import plan_markers
 from ur_cartesian_driver.ros.messages.state_messages import link_transforms
 from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS
 
@@ -64,10 +64,18 @@ def test_path_points_and_ends_are_those_of_the_plan(made):
         np.testing.assert_allclose(pose.row(), made.reference.poses[row])
 
 
-def test_colours_are_those_of_the_page():
-    assert {
-        name: tuple(round(255 * v) for v in (c.r, c.g, c.b)) for name, c in COLOURS.items()
-    } == {name: colour for name, (_, colour) in PAGE.MOTIONS.items()}
+def test_each_part_of_the_path_has_the_colour_of_its_motion(made):
+    """Lines at the begin, the blend beside its point, the joint motion at the end."""
+    path = markers(made)['path', 0]
+    places = array(path.points)
+    corner, end_of_lines = (point.pose.position for point in made.goal.waypoints[:2])
+    near = [int(np.argmin(np.linalg.norm(places - one, axis=1))) for one in (corner, end_of_lines)]
+    colours = [(c.r, c.g, c.b) for c in path.colors]
+    line, blend, joint = colours[0], colours[near[0]], colours[-1]
+    assert len({line, blend, joint}) == 3
+    between = np.linalg.norm(places[: near[1]] - corner, axis=1) > 0.011
+    assert {colours[k] for k in np.flatnonzero(between)} == {line}
+    assert set(colours[near[1] + 1 :]) == {joint}
 
 
 def test_long_paths_are_thinned_out_and_keep_their_ends(made, monkeypatch):

@@ -465,6 +465,9 @@ def shortest_times(refused: Refused, i: int, piece: Piece) -> tuple[float, float
         way = np.linalg.norm(np.diff(places, axis=0)[keep], axis=1) / step[keep]
         if curve.length > 1e-6:
             slowest = max(slowest, float(way.max()) / options.max_tool_speed)
+    if kind == SegmentType.CIRCULAR and isinstance(curve, Arc):
+        fastest = sqrt(options.max_linear_acceleration * curve.radius)
+        slowest = max(slowest, curve.length / fastest)
     if kind in _JOINT:
         bound = options.max_joint_acceleration / max(
             float(np.abs(piece.q[-1] - piece.q[0]).max()), 1e-9

@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
 import os
+from os.path import samefile
 from pathlib import Path
 import re
 from typing import TYPE_CHECKING
@@ -63,22 +65,30 @@ def code_output(text: str) -> tuple[str, CodeOutput]:
 
 def output_file(text: str) -> str:
     """Return the name of a file; refuse one that cannot be written before the work begins."""
-    file = Path(text)
     try:
-        if file.is_dir():
-            raise argparse.ArgumentTypeError(f'{text!r} is a folder; name a file')
-        if not file.parent.is_dir():
-            raise argparse.ArgumentTypeError(
-                f'{text} cannot be written: there is no folder {file.parent}'
-            )
+        check_writable(text)
+    except OSError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return text
+
+
+def check_writable(name: str) -> None:
+    """
+    Refuse the name of a file that cannot be written, and change nothing on the disk.
+
+    :raises OSError: it is a folder, its folder does not exist, or the permission is missing.
+    """
+    file = Path(name)
+    try:
         written = file if file.exists() else file.parent
     except OSError as error:  # such as a name that is too long
-        raise argparse.ArgumentTypeError(f'{text} cannot be written: {error.strerror}') from None
+        raise OSError(f'{name} cannot be written: {error.strerror}') from None
+    if file.is_dir():
+        raise OSError(f'{name!r} is a folder; name a file')
+    if not file.parent.is_dir():
+        raise OSError(f'{name} cannot be written: there is no folder {file.parent}')
     if not os.access(written, os.W_OK):
-        raise argparse.ArgumentTypeError(
-            f'{text} cannot be written: no permission to write {written}'
-        )
-    return text
+        raise OSError(f'{name} cannot be written: no permission to write {written}')
 
 
 def picture_file(text: str) -> str:
@@ -205,3 +215,10 @@ def seconds(text: str) -> float:
     if not 0.0 <= number <= MAX_SECONDS:  # or NaN
         raise argparse.ArgumentTypeError(f'{number:g} s is not within 0 and {MAX_SECONDS:g} s')
     return number
+
+
+def is_same_file(one: str | None, other: str | None) -> bool:
+    """Return whether two options name one file that exists."""
+    with suppress(OSError):
+        return bool(one and other) and samefile(str(one), str(other))
+    return False

@@ -6,10 +6,13 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping, Sequence
+import contextlib
 from datetime import date
 import json
 from pathlib import Path
+import re
+import socket
 import sys
 from typing import Any
 from xml.etree import ElementTree
@@ -18,7 +21,7 @@ from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.program.render import has_feature
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.resources import share_path
-from ur_cartesian_driver.robot.check.experiment_runner import motion_refusal, run_experiment
+from ur_cartesian_driver.robot.check.experiment_runner import run_experiment
 from ur_cartesian_driver.robot.check.experiments import Experiment, EXPERIMENTS
 from ur_cartesian_driver.robot.check.finding import (
     Finding,
@@ -29,6 +32,7 @@ from ur_cartesian_driver.robot.check.finding import (
 )
 from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 from ur_cartesian_driver.robot.check.observations import observe
+from ur_cartesian_driver.robot.check.program_run import motion_refusal, Surprise
 from ur_cartesian_driver.sim.command_line.simulator_options import fields_from
 
 #: Exit status: nothing answers at the address; something keeps the driver from working.
@@ -46,11 +50,15 @@ def check_robot(arguments: argparse.Namespace) -> int:
     address = address_of(arguments)
     findings = asyncio.run(observe_and_show(address, arguments.seconds))
     recordings: dict[str, MotionSamples] = {}
-    if arguments.with_motion:
-        findings += experiment_findings(address, findings, ask, recordings)
-    path = Path(arguments.report)
-    path.write_text(json.dumps(_without_nan(report(findings, recordings))), encoding='utf-8')
-    print(f'\nreport: {path}')
+    try:
+        if arguments.with_motion:
+            observed = tuple(findings)
+            for finding in experiment_findings(address, observed, ask, recordings):
+                findings.append(finding)
+    finally:  # Ctrl-C keeps what was found until then
+        path, found = Path(arguments.report), report(findings, recordings, address.host)
+        path.write_text(json.dumps(_without_nan(found)), encoding='utf-8')
+        print(f'\nreport: {path}')
     return exit_status(findings)
 
 
@@ -69,34 +77,32 @@ async def observe_and_show(address: RobotAddress, seconds: float) -> list[Findin
 
 def experiment_findings(
     address: RobotAddress,
-    observed: list[Finding],
+    observed: Sequence[Finding],
     agrees: Callable[[str], bool],
     recordings: dict[str, MotionSamples],
-) -> list[Finding]:
+) -> Iterator[Finding]:
     """
-    Carry out the experiments that a person allows.
+    Carry out the experiments that a person allows; yield the findings of each.
 
     :param agrees: asks the person about a motion, and returns whether the person agrees.
     :param recordings: receives the samples of each experiment.
     """
     if problems := [f.check for f in observed if f.verdict is Verdict.PROBLEM]:
         reason = f'No motion, because of {", ".join(problems)}'
-        findings = [skipped(experiment.check, reason) for experiment in EXPERIMENTS]
-    else:
-        print(f'\n{WARNING}')
-        findings = []
-        for experiment in EXPERIMENTS:
-            if _is_known_by(experiment, observed):
-                found = _experiment(address, experiment, agrees, recordings)
-            else:
-                found = [skipped(experiment.check, 'The software is not known to have it')]
-            for finding in found:
-                show(finding)
-            findings += found
-    return findings
+        yield from (skipped(experiment.check, reason) for experiment in EXPERIMENTS)
+        return
+    print(f'\n{WARNING}')
+    for experiment in EXPERIMENTS:
+        if _is_known_by(experiment, observed):
+            found = _experiment(address, experiment, agrees, recordings)
+        else:
+            found = [skipped(experiment.check, 'The software is not known to have it')]
+        for finding in found:
+            show(finding)
+        yield from found
 
 
-def _is_known_by(experiment: Experiment, observed: list[Finding]) -> bool:
+def _is_known_by(experiment: Experiment, observed: Sequence[Finding]) -> bool:
     """Return whether the robot's software supports an experiment, or its version is unknown."""
     if not experiment.feature:
         return True
@@ -120,7 +126,7 @@ def _experiment(
         if refusal := asyncio.run(motion_refusal(address)):  # again, after the person's answer
             return [skipped(experiment.check, f'No motion: {refusal}')]
         samples = asyncio.run(run_experiment(address, experiment))
-    except (OSError, DriverError) as error:
+    except (OSError, DriverError, Surprise) as error:
         return [problem(experiment.check, f'Not finished: {error}')]
     recordings[experiment.check] = samples
     return [analyse(samples) for analyse in experiment.analyses]
@@ -132,8 +138,12 @@ def address_of(arguments: argparse.Namespace) -> RobotAddress:
 
 
 def ask(motion: str) -> bool:
-    """Ask on the terminal; any answer other than yes means no."""
-    return input(f'\n{motion} Move? [y/N] ').strip().lower() in ('y', 'yes')
+    """Ask on the terminal; any answer other than yes means no, as does the end of the input."""
+    try:
+        return input(f'\n{motion} Move? [y/N] ').strip().lower() in ('y', 'yes')
+    except EOFError:
+        print()
+        return False
 
 
 def show(finding: Finding) -> None:
@@ -149,8 +159,15 @@ def exit_status(findings: list[Finding]) -> int:
     return HAS_PROBLEMS if problems else 0
 
 
-def report(findings: list[Finding], recordings: dict[str, MotionSamples]) -> dict[str, Any]:
-    """Return the report for the maintainers, without address, serial number and program names."""
+def report(
+    findings: Sequence[Finding], recordings: Mapping[str, MotionSamples], host: str
+) -> dict[str, Any]:
+    """
+    Return the report for the maintainers, without addresses, serial number and program names.
+
+    :param host: name or address of the robot.
+    """
+    names = _names_of_addresses(host)
     return {
         'format': 1,
         'driver': ElementTree.parse(share_path() / 'package.xml').findtext('version'),
@@ -159,13 +176,29 @@ def report(findings: list[Finding], recordings: dict[str, MotionSamples]) -> dic
             {
                 'check': finding.check,
                 'verdict': finding.verdict.value,
-                'text': finding.text,
+                'text': _renamed(finding.text, names),
                 'data': dict(finding.data),
             }
             for finding in findings
         ],
         'recordings': {check: samples.as_lists() for check, samples in recordings.items()},
     }
+
+
+def _names_of_addresses(host: str) -> dict[str, str]:
+    """Return what the report says in place of the addresses of the robot and of this computer."""
+    names = {}
+    with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.connect((host, 9))  # finds the way to the robot, and sends nothing
+        names[probe.getsockname()[0]] = 'COMPUTER'
+        names[probe.getpeername()[0]] = 'ROBOT'
+    return names | {host: 'ROBOT'}
+
+
+def _renamed(text: str, names: Mapping[str, str]) -> str:
+    for old, new in names.items():
+        text = re.sub(rf'(?<![\w.-]){re.escape(old)}(?![\w-])', new, text)
+    return text
 
 
 def _without_nan(value: Any) -> Any:

@@ -505,7 +505,10 @@ def _add_teach(command: CommandParser) -> None:
 
     command.set_defaults(run=teach_command.teach_path)
     command.add_argument(
-        '-o', '--output', type=argument_types.output_file, default='path.yaml', help='goal file'
+        '-o',
+        '--output',
+        type=argument_types.output_file,
+        help='goal file; path.yaml by default, which must not exist yet',
     )
     _add_own_driver(command)
     command.add_argument(
@@ -538,7 +541,8 @@ def _add_valve(command: CommandParser) -> None:
         type=float,
         nargs=2,
         metavar=('BEGINS', 'ENDS'),
-        help='how far behind the slow bead the fast one begins and ends [mm]: lay no beads',
+        help='how far behind the slow bead the fast one begins and ends [mm]: lay no beads; '
+        '--slow and --fast are those of the beads',
     )
     _add_length(command, 'ruler', '0.5mm', 'uncertainty of one reading')
     for name, speed in (('slow', 0.02), ('fast', 0.2)):

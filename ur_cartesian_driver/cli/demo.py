@@ -3,8 +3,9 @@
 """
 ``ur-cartesian demo``: simulated controller, driver node and client, each in its own process.
 
-The processes are the commands that a user would start by hand, but on free ports, so that the demo
-disturbs no other program. With two arms, each driver has a namespace and a ``tf_prefix``.
+The processes are the commands that a user would start by hand, but on free ports, in a ROS domain
+and a namespace of their own, so that the demo moves no other arm. With two arms, each driver also
+has a ``tf_prefix``.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ class DemoArm:
     """
     One arm of the demo.
 
-    :param name: the namespace of the arm's driver; empty for a single arm.
+    :param name: the name of the arm; empty for a single arm.
     """
 
     name: str = ''
@@ -42,9 +43,9 @@ class DemoArm:
     drawing: Path
 
     @property
-    def driver(self) -> str:
-        """The name of the arm's driver node."""
-        return f'{self.name}/ur_cartesian_driver'.lstrip('/')
+    def namespace(self) -> str:
+        """The namespace of the arm's driver, which no other driver has."""
+        return f'/demo_{os.getpid()}/{self.name}'.rstrip('/')
 
     @property
     def tf_prefix(self) -> str:
@@ -120,7 +121,6 @@ def _start(arm: DemoArm, environment: dict[str, str], stack: ExitStack) -> None:
     }
     if arm.name:  # ROS cannot tell the type of an empty value
         parameters['tf_prefix'] = arm.tf_prefix
-    names = ['-r', f'__ns:=/{arm.name}'] if arm.name else []
     settings = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
     # The client prints what happens; the driver adds warnings only.
     stack.enter_context(
@@ -128,7 +128,8 @@ def _start(arm: DemoArm, environment: dict[str, str], stack: ExitStack) -> None:
             '--ros-args',
             '--log-level',
             'warn',
-            *names,
+            '-r',
+            f'__ns:={arm.namespace}',
             *settings,
             module='ur_cartesian_driver.ros.node',
             environment=environment,
@@ -146,7 +147,7 @@ def _clients(options: Mapping[DemoArm, Sequence[str]], environment: dict[str, st
                     'send',
                     str(arm.goal),
                     '--driver',
-                    arm.driver,
+                    f'{arm.namespace}/ur_cartesian_driver',
                     '--tf-prefix',
                     arm.tf_prefix,
                     *extra_options,
@@ -238,10 +239,10 @@ def _free_port_options(*names: str) -> Sequence[str]:
 
 
 def _environment() -> dict[str, str]:
-    """Return an environment in which processes find only each other; existing values stay."""
+    """Return an environment in which processes find only each other."""
     return {
-        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-        'ROS_DOMAIN_ID': str(1 + os.getpid() % 100),
         **os.environ,
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+        'ROS_DOMAIN_ID': str(1 + os.getpid() % 59),  # test runs use those from 60 on
         'PYTHONUNBUFFERED': '1',
     }

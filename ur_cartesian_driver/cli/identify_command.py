@@ -44,9 +44,10 @@ def _identify_live(arguments: argparse.Namespace) -> int:
     """Let the robot move, and identify what it showed; 1 if a surprise ended that."""
     from ur_cartesian_driver.cli.identify_live import CALLS, record
 
-    live = record(arguments)
+    asked = _asked(arguments)
+    live = record(arguments, asked)
     if live.samples:
-        arm = _merged(_asked(arguments), live.arm, arguments.robot_ip)
+        arm = _merged(asked, live.arm, arguments.robot_ip)
         names = [Path(samples.name) for samples in live.samples]
         _show_and_write(identify_laws(live.samples, live.commands, CALLS), arm, names, arguments)
     if live.surprise:
@@ -115,7 +116,7 @@ def _merged(arm: ArmIdentity, own: ArmIdentity, source: str) -> ArmIdentity:
 
     :raises ValueError: the source names another arm.
     """
-    if differences := arm.differences(own):
+    if differences := own.differences(arm):
         raise ValueError(f'{source} is of another arm: {differences}; identify one arm at a time')
     names = [each.name for each in fields(ArmIdentity)]
     return ArmIdentity(**{name: getattr(arm, name) or getattr(own, name) for name in names})

@@ -19,17 +19,14 @@ from ur_cartesian_driver.identification.law_experiments import (
     LawExperiment,
     MotionBounds,
 )
-from ur_cartesian_driver.identification.live_run import (
-    ready_state,
-    record_experiment,
-    Surprise,
-)
+from ur_cartesian_driver.identification.live_run import ready_state, record_experiment
 from ur_cartesian_driver.identification.moves import find_moves, join_commands
 from ur_cartesian_driver.identification.recorded_calls import MotionCommand, read_commands
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.twin.twin import ArmIdentity
 from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, Verdict
+from ur_cartesian_driver.robot.check.program_run import Surprise
 
 #: The file that says how far the experiments came, and the one with the calls behind the moves.
 PROGRESS, CALLS = 'experiments.txt', 'calls.script'
@@ -55,11 +52,12 @@ class LiveRecordings:
     surprise: str
 
 
-def record(arguments: argparse.Namespace) -> LiveRecordings:
+def record(arguments: argparse.Namespace, asked: ArmIdentity) -> LiveRecordings:
     """
     Run the experiments that are wanted, and return their recordings.
 
-    :raises ValueError: an option is missing, or the robot cannot be used.
+    :param asked: the arm that the options name.
+    :raises ValueError: an option is missing, or the robot cannot be used or is another arm.
     """
     if arguments.box is None or arguments.max_speed is None:
         raise ValueError('the arm moves: add --box and --max-speed, within which it has to stay')
@@ -75,7 +73,7 @@ def record(arguments: argparse.Namespace) -> LiveRecordings:
     if (folder / PROGRESS).exists():
         raise ValueError(f'{folder} has the recordings of another run; name another --folder')
     address = address_of(arguments)
-    arm = arm_of(asyncio.run(observe_and_show(address, _OBSERVED)))
+    arm = arm_of(asyncio.run(observe_and_show(address, _OBSERVED)), asked)
     print(f'\n{WARNING}')
     wanted = [
         each for each in LAW_EXPERIMENTS if not arguments.only or each.name in arguments.only
@@ -86,24 +84,29 @@ def record(arguments: argparse.Namespace) -> LiveRecordings:
     return LiveRecordings(arm=arm, samples=samples, commands=commands, surprise=series.surprise)
 
 
-def arm_of(findings: list[Finding]) -> ArmIdentity:
+def arm_of(findings: list[Finding], asked: ArmIdentity) -> ArmIdentity:
     """
     Return the arm that was observed.
 
-    :raises ValueError: the robot cannot be used.
+    :param asked: the arm that the options name; it chooses among models that report one type.
+    :raises ValueError: the robot cannot be used, or is another arm.
     """
     if problems := [each for each in findings if each.verdict is Verdict.PROBLEM]:
         raise ValueError(f'no motion, because of {problems[0].check}: {problems[0].text}')
     data = {each.check: each.data for each in findings}
-    return ArmIdentity(
-        model=data['model']['models'][0],
+    models = data['model']['models']
+    arm = ArmIdentity(
+        model=asked.model if asked.model in models else models[0],
         software='.'.join(str(data['software']['version']).split('.')[:3]),
         motion_version=data.get('motion_version', {}).get('motion_version', 0),
     )
+    if differences := arm.differences(asked):
+        raise ValueError(f'the robot is another arm: {differences}; correct the options')
+    return arm
 
 
 def _answers(yes: bool) -> Callable[[LawExperiment], bool]:
-    """Return who answers: --yes only for moves that nothing stops or pauses."""
+    """Return the function that answers; --yes covers only uninterrupted moves."""
 
     def agrees(experiment: LawExperiment) -> bool:
         if yes and experiment.interruption is Interruption.NONE:
@@ -134,7 +137,8 @@ class _Series:
             try:
                 outcome, start = self._one(experiment, start)
             except (OSError, DriverError, Surprise) as error:
-                self.surprise = str(error).rstrip('.')
+                clauses = [str(error).rstrip('.'), *getattr(error, '__notes__', ())]
+                self.surprise = '; '.join(clauses)
             except KeyboardInterrupt:
                 self.surprise = 'interrupted from the keyboard'
             if self.surprise:

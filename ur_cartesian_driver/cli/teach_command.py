@@ -6,9 +6,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path as FilePath
 import sys
 import threading
 
+from ur_cartesian_driver.cli.argument_types import check_writable
 from ur_cartesian_driver.cli.own_driver import ready_driver
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
@@ -21,6 +23,8 @@ HELP = (
     'Enter takes a point like the one before; l: a line to it, j: a joint motion, p: a line of a '
     'process, a: here is the middle of an arc, and the next Enter its end; u: undo, q: write, end'
 )
+#: The file of a lesson for which none is named; it is not replaced.
+DEFAULT_OUTPUT = 'path.yaml'
 #: Longest time until the arm can be guided, and until the robot holds it again [s].
 FREEDRIVE_TIME = 10.0
 _KINDS = {'l': 'line', 'j': 'joint', 'p': 'process'}
@@ -33,13 +37,18 @@ def teach_path(arguments: argparse.Namespace) -> int:
     :raises OSError: the file cannot be written any more; the goal is printed instead.
     """
     lesson = Lesson(Path().at(speed=arguments.speed, blend=arguments.blend))
+    output = arguments.output or DEFAULT_OUTPUT
+    if not arguments.output:
+        if FilePath(output).exists():
+            raise OSError(f'{output} exists already; name the file by -o')
+        check_writable(output)
     try:
         with ready_driver(arguments, allow_freedrive=True) as driver:
             guide(driver, lesson, _keys(), _say)
     finally:
         if lesson.path.poses:
-            save(lesson.path, arguments.output)
-            _say(f'{_points(len(lesson.path))} in {arguments.output}')
+            save(lesson.path, output)
+            _say(f'{_points(len(lesson.path))} in {output}')
         else:
             _say('no point was taken, so nothing is written')
     return 0

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from math import hypot, isfinite, sqrt
 
 from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.goal import MAX_OUTPUT_LEAD
 from ur_cartesian_driver.path import mm, Output, Path
 
 #: Acceleration of the beads, and speed between them [m/s^2], [m/s].
@@ -35,6 +36,8 @@ DIRECTIONS = {
 }
 #: The points of the path to which the beads lead.
 BEAD_POINTS = (1, 8)
+#: Shortest time of a bead in which the speed of the arm is reported, once in 40 ms [s].
+SHORTEST = 0.08
 #: A dead time that is negative by more standard uncertainties is a mistake of the measurement.
 _MAX_NEGATIVE = 3.0
 #: A ruler shows no smaller part of its uncertainty: a distance below it has another unit.
@@ -46,7 +49,8 @@ class Beads:
     """
     The two beads.
 
-    :raises ValueError: the speeds are too close to each other, or a bead is too short.
+    :raises ValueError: the speeds are too close to each other, or a bead is too short, in its
+        length or its time.
     """
 
     #: Speeds [m/s].
@@ -67,6 +71,12 @@ class Beads:
             )
         if self.length < 2.0 * RUN:
             raise ValueError(f'--length is {1e3 * self.length:g} mm; lay beads of 20 mm or more')
+        if self.length < SHORTEST * self.fast:
+            raise ValueError(
+                f'--length is {1e3 * self.length:g} mm, which --fast passes in '
+                f'{1e3 * self.length / self.fast:.0f} ms; lay beads that take '
+                f'{1e3 * SHORTEST:g} ms or more'
+            )
 
     @property
     def run(self) -> float:
@@ -129,8 +139,8 @@ def dead_times(
     :param slow: speed of the slow bead [m/s]; ``fast``: of the fast one.
     :param reading: standard uncertainty of one reading of the ruler [m].
     :param cycle: the cycle time of the controller [s].
-    :raises ValueError: the fast bead begins or ends before the slow one, or a distance is not
-        finite, or smaller than the ruler shows.
+    :raises ValueError: the fast bead begins or ends before the slow one, or too far behind it, or
+        a distance is not finite, or smaller than the ruler shows.
     """
     difference = fast - slow
     switching = cycle / sqrt(12.0) * hypot(slow, fast)
@@ -151,6 +161,12 @@ def dead_times(
                 f'the fast bead {verb} {1e3 * abs(shift):.3g} mm before the slow one, although a '
                 'valve can only be late; measure from the slow bead to the fast one, positive in '
                 'the direction of the motion'
+            )
+        if time > MAX_OUTPUT_LEAD:
+            raise ValueError(
+                f'the fast bead {verb} {1e3 * shift:.3g} mm behind the slow one, which is a dead '
+                f'time of {time:.3g} s, above {MAX_OUTPUT_LEAD:g} s; give --measured in '
+                'millimetres, and --slow and --fast as the beads had them'
             )
         times.append(max(time, 0.0))
     return DeadTimes(open=times[0], close=times[1], uncertainty=uncertainty)

@@ -5,10 +5,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from datetime import date
 from math import isfinite
 from pathlib import Path
+import shlex
 import sys
 
 from ur_cartesian_driver.cli.check_robot import ask
@@ -25,7 +27,7 @@ from ur_cartesian_driver.motion.goal.output_names import output_name, parse_outp
 from ur_cartesian_driver.path import Output
 from ur_cartesian_driver.sim.command_line.simulator_options import fields_from
 
-QUESTIONS = ('begin', 'end')
+QUESTIONS = ('start', 'end')
 WARNING = (
     'The arm will move, and the valve will open. Keep a hand on the emergency stop and everybody '
     'out of reach. The nozzle has to be as high above a test piece as it will be above the work.'
@@ -34,6 +36,7 @@ HOW_TO_READ = (
     'Read where the beads have their full width: the slow one is thicker, and its round ends '
     'reach farther.'
 )
+LATER = 'To measure later, press Ctrl-C now, and then run:'
 #: Below this part of its speed the arm was slowed down by the slider.
 _FULL_SPEED = 0.99
 
@@ -43,6 +46,8 @@ def measure_valve(arguments: argparse.Namespace) -> int:
     kind, pin = parse_output(' '.join(arguments.output))
     if kind is OutputKind.STANDARD_ANALOG:
         raise ValueError('output is analog, but valve switches the output; name a digital one.')
+    # Name and output are refused before beads are laid; the times follow from the beads.
+    lead = Lead(name=arguments.name, output=kind, pin=pin, open=0.0, close=0.0)
     file = Path(arguments.lead_file)
     if file.exists():
         read_leads(file)  # so that a wrong file is refused before beads are laid
@@ -54,7 +59,7 @@ def measure_valve(arguments: argparse.Namespace) -> int:
             if not lay_beads(driver, beads, Output(kind, pin), ask):
                 print('No bead was laid.')
                 return 1
-        print(HOW_TO_READ)
+        print(f'{HOW_TO_READ}\n{LATER}\n{later_command(arguments)}')
         shifts = [ask_distance(question, input) for question in QUESTIONS]
     else:
         raise ValueError(
@@ -68,14 +73,8 @@ def measure_valve(arguments: argparse.Namespace) -> int:
         reading=arguments.ruler,
         cycle=robot_model(arguments.ur_type).control_cycle,
     )
-    lead = Lead(
-        name=arguments.name,
-        output=kind,
-        pin=pin,
-        open=times.open,
-        close=times.close,
-        date=date.today().isoformat(),
-    )
+    today = date.today().isoformat()
+    lead = replace(lead, open=times.open, close=times.close, date=today)
     # Before the file, which may be one that cannot be written.
     print(report(arguments.name, times, beads.fast))
     write_lead(file, lead)
@@ -91,11 +90,16 @@ def lay_beads(driver: Driver, beads: Beads, valve: Output, agrees: Callable[[str
     Lay the beads from where the tool is, if the person agrees; return whether they were laid.
 
     :raises DriverError: the path was refused or not completed, or a bead cannot have its speed.
-    :raises RobotNotReady: the robot reports no state, or did not move at full speed.
+    :raises RobotNotReady: the robot reports no state, or its slider is below 100 % before or
+        while the beads are laid.
     """
     state = driver.rest_state
     if state is None:
         raise RobotNotReady('The robot does not report its state.')
+    if state.target_speed_fraction < _FULL_SPEED:
+        raise RobotNotReady(
+            f'The speed slider is at {state.target_speed_fraction:.0%}: set it to 100 %.'
+        )
     plan = driver.plan(beads.path(state.actual_tcp_pose, valve))
     for stretch in plan.find_slow_stretches():
         if any(stretch.first <= point <= stretch.last for point in BEAD_POINTS):
@@ -113,26 +117,45 @@ def lay_beads(driver: Driver, beads: Beads, valve: Output, agrees: Callable[[str
     )
     if not agrees(question):
         return False
-    speeds: list[float] = []
+    speeds: dict[int, list[float]] = {point: [] for point in BEAD_POINTS}
 
     def watch(progress: Progress) -> None:
-        if progress.waypoint in BEAD_POINTS:
-            speeds.append(progress.speed_scaling)
+        if progress.waypoint in speeds:
+            speeds[progress.waypoint].append(progress.speed_scaling)
 
     driver.start(plan, watch).result().raise_for_error()
-    if min(speeds, default=0.0) < _FULL_SPEED:
-        raise RobotNotReady(
-            f'The arm moved at {100.0 * min(speeds, default=0.0):.0f} % of its speed: set the '
-            'slider to 100 %, and lay the beads again.'
-        )
+    _check_speeds(speeds.values())
     return True
 
 
+def _check_speeds(beads: Iterable[Sequence[float]]) -> None:
+    """Refuse beads of which one was laid below full speed, or without a report of the speed."""
+    for speeds in beads:
+        if not speeds:
+            raise RobotNotReady(
+                'The robot did not report its speed during a bead: lay longer beads (--length).'
+            )
+        if min(speeds) < _FULL_SPEED:
+            raise RobotNotReady(
+                f'The arm moved at {100.0 * min(speeds):.0f} % of its speed: set the slider to '
+                '100 %, and lay the beads again.'
+            )
+
+
+def later_command(arguments: argparse.Namespace) -> str:
+    """Return the command that takes the distances of the beads that these arguments laid."""
+    speeds = [f'--slow={arguments.slow:g}', f'--fast={arguments.fast:g}']
+    options = [f'--ruler={1e3 * arguments.ruler:g}mm', f'--ur-type={arguments.ur_type}']
+    words = [arguments.name, '--output', *arguments.output, *speeds, *options]
+    command = shlex.join([*words, f'--lead-file={arguments.lead_file}'])
+    return f'ur-cartesian valve {command} --measured BEGINS ENDS'
+
+
 def ask_distance(which: str, read: Callable[[str], str]) -> float:
-    """Return how far behind the slow bead the fast one begins, or ends, as a person says [mm]."""
+    """Return how far behind the slow bead the fast one starts, or ends, as a person says [mm]."""
     while True:
         answer = read(
-            f'How far behind the {which} of the slow bead is the {which} of the fast one [mm]? '
+            f'How far behind the {which} of the slow bead does the fast one {which} [mm]? '
         )
         try:
             distance = float(answer.replace(',', '.').removesuffix('mm'))

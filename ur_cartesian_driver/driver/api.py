@@ -429,8 +429,8 @@ class Driver(RobotServices, InteractiveMotions):
     def _options_for(self, state: RobotState) -> PlanningOptions:
         """Return the planning options, with the features of the connected robot."""
         status = self.status
-        return replace(
-            self.options.for_program(self.config),
+        return self.options.for_program(
+            self.config,
             calibration_known=status.calibration_known,
             optimove_known=has_feature('optimove', status.software()),
             path_offset_known=has_feature('path_offset', status.software()),

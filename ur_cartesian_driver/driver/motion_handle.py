@@ -31,13 +31,13 @@ from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 OnProgress = Callable[[Progress], None]
 
 
-#: Why a client cannot slow a motion: its goal has no bounds for a signal; or an input of the robot
-#: gives the signal.
+#: Why clients cannot slow a motion: its goal has no bounds for a signal.
 NO_FEED_OVERRIDE = (
     'feed_override',
     'is not set in the running goal',
     'set its minimum in the goal',
 )
+#: The same: an input of the robot gives the signal.
 HAS_FEED_INPUT = (
     'feed_override_input',
     'names an input of the robot, whose signal slows all goals',

@@ -16,7 +16,11 @@ from math import sqrt
 
 import numpy as np
 
-from ur_cartesian_driver.identification.arm_errors import find_arm_errors, find_noise
+from ur_cartesian_driver.identification.arm_errors import (
+    ArmErrors,
+    find_arm_errors,
+    find_noise,
+)
 from ur_cartesian_driver.identification.arm_samples import ArmSamples
 from ur_cartesian_driver.identification.geometry import Kind
 from ur_cartesian_driver.identification.least_squares import (
@@ -32,7 +36,7 @@ from ur_cartesian_driver.identification.stop_ramp import find_ramp
 from ur_cartesian_driver.motion.twin.laws import LAWS
 from ur_cartesian_driver.motion.twin.twin import Estimate
 
-#: How far a profile may be from the one that was asked for, so that its axis leads.
+#: Relative tolerance within which a profile matches its call, so that its axis leads.
 _LEADS = 1e-3
 
 
@@ -81,18 +85,21 @@ def turn_ratio(moves: Sequence[FoundMove]) -> Result:
     profiles, odd = [], 0
     for move in moves:
         command = move.command
-        if move.kind is not Kind.LINE or command is None or None in (command.a, command.v):
+        if move.kind is not Kind.LINE or command is None:
             continue
-        if command.t is not None or move.travel.turn is None or _translation_leads(move):
+        a, v = command.a, command.v
+        if a is None or v is None or command.t is not None:
+            continue
+        if move.travel.turn is None or _translation_leads(move, a):
             continue
         time, rows = move.rows
         turn = find_profile(time, move.travel.turn, rows, may_start=not move.piece.chained)
         if not isinstance(turn, Profile):
             odd += isinstance(turn, Misfit)
             continue
-        ratios = [_times(turn.acceleration, 1.0 / (command.a or 1.0))]
+        ratios = [_times(turn.acceleration, 1.0 / a)]
         if turn.speed is not None:
-            ratios.append(_times(turn.speed, 1.0 / (command.v or 1.0)))
+            ratios.append(_times(turn.speed, 1.0 / v))
             if abs(ratios[0].value / ratios[1].value - 1.0) > 0.01:
                 odd += 1
                 continue
@@ -110,12 +117,11 @@ def turn_ratio(moves: Sequence[FoundMove]) -> Result:
     )
 
 
-def _translation_leads(move: FoundMove) -> bool:
-    """Return whether the travel of the tool has the acceleration of its call."""
-    profile, command = move.profile, move.command
-    if move.travel.line is None or not isinstance(profile, Profile) or command is None:
+def _translation_leads(move: FoundMove, asked: float) -> bool:
+    """Return whether the travel of the tool has the acceleration of its call [m/s^2]."""
+    profile = move.profile
+    if move.travel.line is None or not isinstance(profile, Profile):
         return False
-    asked = command.a or 1.0
     tolerance = _LEADS + 3.0 * profile.acceleration.error / asked
     return abs(profile.acceleration.value / asked - 1.0) < tolerance
 
@@ -141,21 +147,21 @@ def left_out(moves: Sequence[FoundMove], kind: Kind) -> tuple[Result, Result]:
         elif kind is Kind.LINE and _turn_may_lead(move):
             turning += 1
         elif command.t is not None:
-            quotients += [move.profile.speed_squared_by_acceleration]
+            quotient = move.profile.speed_squared_by_acceleration
+            quotients += [] if quotient is None else [quotient]
         else:
             accelerations.append(move.profile.acceleration)
             speeds += [move.profile.speed] if move.profile.speed else []
             profiles.append(move.profile)
     reason = f'no {call} without a, v and t among the calls'
-    known = [quotient for quotient in quotients if quotient is not None]
     if odd:
         reason = f'{_plural(odd, call)} without a and v followed no law that is known'
     elif turning:
         reason = f'{_plural(turning, call)} turned the tool so far that the turn may lead'
-    elif known:
-        whole = combined(known)
+    elif quotients:
+        whole = combined(quotients)
         reason = (
-            f'{_plural(len(known), call)} with t show only v^2/a, {whole.value:.5g} +- '
+            f'{_plural(len(quotients), call)} with t show only v^2/a, {whole.value:.5g} +- '
             f'{whole.half_width:.1g} {"rad" if kind is Kind.JOINT else "m"}'
         )
     experiment = f'record a {call} without a, v and t that cruises, and name the call'
@@ -228,7 +234,8 @@ def _gap(before: Profile, after: Profile) -> Measured:
     )
 
 
-_STOPS = {
+#: The endings whose ramps have a law -> the event, and the experiment that shows it.
+STOPS = {
     Ending.PROGRAM_STOP: (
         'program was stopped',
         'stop a program while a long move cruises, and record runtime_state',
@@ -246,9 +253,12 @@ _STOPS = {
 
 def stop_ramp(moves: Sequence[FoundMove], ending: Ending) -> Result:
     """Find the time from full speed to rest of one kind of stop."""
-    ramps, odd, unsteady = [], 0, 0
+    ramps, odd, unsteady, slowed = [], 0, 0, 0
     for move in moves:
         if move.piece.ending is not ending or move.leading is None:
+            continue
+        if move.piece.slowed:
+            slowed += 1
             continue
         time, rows = move.rows
         ramp = find_ramp(time, move.leading, rows)
@@ -256,12 +266,14 @@ def stop_ramp(moves: Sequence[FoundMove], ending: Ending) -> Result:
         unsteady += ramp is None
         if isinstance(ramp, Measured):
             ramps.append(ramp)
-    event, experiment = _STOPS[ending]
+    event, experiment = STOPS[ending]
     reason = f'no {event} in motion'
     if odd:
         reason = f'{_plural(odd, "stop")} followed no even ramp'
     elif unsteady:
         reason = f'{_plural(unsteady, "stop")} came while the arm did not move at constant speed'
+    elif slowed:
+        reason = f'{_plural(slowed, "stop")} came while the speed slider was below 100 %'
     return _result(
         ending.value, ramps, _plural(len(ramps), 'stop') + ' at constant speed', reason, experiment
     )
@@ -269,31 +281,21 @@ def stop_ramp(moves: Sequence[FoundMove], ending: Ending) -> Result:
 
 def arm_figures(recordings: Sequence[ArmSamples]) -> dict[str, Result]:
     """Find lag, friction, static error, ringing and noise of the measured joints."""
-    found = [errors for samples in recordings if (errors := find_arm_errors(samples)) is not None]
+    every = [errors for samples in recordings if (errors := find_arm_errors(samples)) is not None]
+    found = [errors for errors in every if errors.is_known_law]
+    reason = _why_no_errors(recordings, found, [each for each in every if not each.is_known_law])
     noises = [noise for samples in recordings if (noise := find_noise(samples)) is not None]
     experiment = (
         'record actual_q beside target_q while single joints turn fast and slowly, with a second '
         'of rest after each'
     )
-    reason = 'no recording with measured joints that move and rest again'
-    odd = [errors for errors in found if not errors.is_known_law]
-    found = [errors for errors in found if errors.is_known_law]
-    if odd:
-        worst = max(odd, key=lambda errors: errors.rms)
-        reason = (
-            f'the joints follow their targets by another law in {_plural(len(odd), "recording")}: '
-            f'{1e6 * worst.rms:.3g} urad are left, of which {1e6 * worst.noise:.3g} are noise'
-        )
-    if not any(samples.actual_q is not None for samples in recordings):
-        reason = 'no recording has actual_q'
     results: dict[str, Result] = {}
     for name, most in _MAX_WIDTH.items():
         used = [errors for errors in found if name not in _RINGING or errors.cycle < MAX_CYCLE]
         parts: list[Measured] = [getattr(errors, name) for errors in used]
         evidence = _plural(sum(errors.joints for errors in used), 'moving joint')
         left = f'{1e6 * max((errors.rms for errors in used), default=0.0):.3g} urad rms'
-        seldom = f'packets every {1e3 * found[0].cycle:.3g} ms are too rare' if found else ''
-        result = _result(name, parts, evidence, seldom or reason, experiment, left_over=left)
+        result = _result(name, parts, evidence, reason, experiment, left_over=left)
         if parts and isinstance(result, Estimate):
             whole = combined(parts)
             if whole.half_width > most(whole.value):
@@ -311,6 +313,27 @@ def arm_figures(recordings: Sequence[ArmSamples]) -> dict[str, Result]:
         experiment,
     )
     return results
+
+
+def _why_no_errors(
+    recordings: Sequence[ArmSamples], found: Sequence[ArmErrors], odd: Sequence[ArmErrors]
+) -> str:
+    """
+    Return why recordings do not show a figure of the arm.
+
+    :param found: the errors of joints that follow the known law; ``odd``: those of others.
+    """
+    if found:  # the figure needs packets closer to each other
+        return f'packets every {1e3 * found[0].cycle:.3g} ms are too rare'
+    if all(samples.actual_q is None for samples in recordings):
+        return 'no recording has actual_q'
+    if not odd:
+        return 'no recording with measured joints that move and rest again'
+    worst = max(odd, key=lambda errors: errors.rms)
+    return (
+        f'the joints follow their targets by another law in {_plural(len(odd), "recording")}: '
+        f'{1e6 * worst.rms:.3g} urad are left, of which {1e6 * worst.noise:.3g} are noise'
+    )
 
 
 #: Packets that are further apart [s] do not show when the acceleration changes, nor how the arm

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The laws of the arm that made recordings, each with an interval or the reason why not."""
+"""Identify the laws of an arm from recordings: each with an interval, or the reason why not."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from ur_cartesian_driver.identification.geometry import Kind
 from ur_cartesian_driver.identification.moves import find_moves, FoundMove, join_commands
 from ur_cartesian_driver.identification.profile import Misfit
 from ur_cartesian_driver.identification.recorded_calls import MotionCommand
-from ur_cartesian_driver.identification.segmentation import Ending
 from ur_cartesian_driver.motion.twin.laws import LAWS
 
 #: Laws that no recording identifies so far.
@@ -28,7 +27,7 @@ _LATER = {
     'blend_speed_ratio': 'blends are not evaluated',
     'speed_noise': 'measured speeds are not evaluated',
 }
-_CHECK_ROBOT = 'check-robot --with-motion shows how far this arm follows what is assumed'
+_NO_EXPERIMENT = 'no experiment shows it yet'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,8 +55,8 @@ class Identification:
             if isinstance(move.profile, Misfit):
                 text += (
                     f'\nThe move at {move.samples.time[move.piece.moving[0]]:.2f} s of '
-                    f'{move.samples.name} is no trapezoid: {1e6 * move.profile.rms:.3g} um or '
-                    'urad are left.'
+                    f'{move.samples.name} fits no trapezoid: residual '
+                    f'{1e6 * move.profile.rms:.3g} um or urad rms.'
                 )
         return text
 
@@ -80,7 +79,7 @@ def identify(
     joint, linear = (estimators.left_out(moves, kind) for kind in (Kind.JOINT, Kind.LINE))
     found: dict[str, Result] = {
         'start_time': estimators.start_time(moves),
-        **{ending.value: estimators.stop_ramp(moves, ending) for ending in Ending},
+        **{ending.value: estimators.stop_ramp(moves, ending) for ending in estimators.STOPS},
         'turn_ratio': estimators.turn_ratio(moves),
         'timed_joint_acceleration': joint[0],
         'timed_joint_speed': joint[1],
@@ -91,5 +90,5 @@ def identify(
         **estimators.packet_gaps(recordings),
     }
     for name, reason in _LATER.items():
-        found[name] = Unknown(reason=reason, experiment=_CHECK_ROBOT)
+        found[name] = Unknown(reason=reason, experiment=_NO_EXPERIMENT)
     return Identification(moves=moves, results={name: found[name] for name in LAWS})

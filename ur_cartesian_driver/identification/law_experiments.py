@@ -22,7 +22,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector3
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.twin.laws import ASSUMED_LAWS
 
-#: The tool may leave the box, and exceed the speed, by as much: rounding of the robot [m, m/s].
+#: Tolerance of box and speed, for the robot's rounding [m, m/s].
 _OVER = 1e-3
 #: Places on the path that are compared with the box.
 _PLACES = 25

@@ -19,8 +19,7 @@ import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 
-#: A target on the wire is taken to scatter at least as much [rad or m]: a fifth of the least that
-#: is left of recorded moves.
+#: Assumed noise floor of recorded targets [rad or m]: a fifth of the smallest residual seen.
 TARGET_FLOOR = 1e-8
 #: What a model returns for parameters that it cannot have; finite, so that it can be filtered.
 NOWHERE = 1e6

@@ -10,7 +10,8 @@ connections are cut. A protective stop is never unlocked.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+import contextlib
 from math import dist
 from pathlib import Path
 from typing import Any
@@ -22,16 +23,22 @@ from ur_cartesian_driver.identification.law_experiments import (
     LawExperiment,
     MotionBounds,
 )
-from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     encode_command,
     PrimaryCommand,
 )
-from ur_cartesian_driver.robot.check.experiment_runner import motion_refusal
 from ur_cartesian_driver.robot.check.experiments import program, return_program
 from ur_cartesian_driver.robot.check.finding import RobotAddress
-from ur_cartesian_driver.robot.check.primary_observations import LOCAL_CONTROL, PrimaryProbe
-from ur_cartesian_driver.robot.check.rtde_recorder import RtdeRecorder
+from ur_cartesian_driver.robot.check.program_run import (
+    END_TIMEOUT,
+    motion_refusal,
+    ProgramRun,
+    REST_TIMEOUT,
+    SAFE,
+    START_TIMEOUT,
+    Surprise,
+)
 from ur_cartesian_driver.robot.rtde.probe import read_state
 
 RECORDED = (
@@ -40,20 +47,14 @@ RECORDED = (
 )  # fmt: skip
 #: Outputs that files contain, in the order of their columns.
 _IN_FILE = tuple(name for name in RECORDED if name != 'target_TCP_speed')
-#: Longest times until the arm moves, until the program has done the next thing, and until the arm
-#: rests after a stop [s].
-START_TIMEOUT, END_TIMEOUT, REST_TIMEOUT = 3.0, 30.0, 3.0
+#: Time after which a program has ended by itself [s].
+LONGEST_PROGRAM = 10.0
 #: Time recorded at rest before and after the motion, and how long a program is paused [s].
 BEFORE, AFTER, PAUSED = 0.4, 1.0, 0.6
 #: So many packets without motion are rest.
 MIN_REST = 20
 #: The tool is where it should be within this distance [m].
 NEAR = 1e-3
-_SAFE = (SafetyMode.NORMAL, SafetyMode.REDUCED)
-
-
-class Surprise(Exception):
-    """Something happened that nobody asked for; the text is a clause."""
 
 
 async def ready_state(address: RobotAddress, start: RobotState | None) -> RobotState:
@@ -97,8 +98,15 @@ async def record_experiment(
     try:
         await run.open()
         await run.carry_out()
-    finally:
+    except BaseException as error:
+        try:
+            run.write(path)
+        except OSError as unwritten:  # must not hide what happened to the robot
+            error.add_note(f'{path} cannot be written: {unwritten.strerror or unwritten}')
+        raise
+    else:
         run.write(path)
+    finally:
         await run.close()
 
 
@@ -112,133 +120,74 @@ class _Run:
         state: RobotState,
         bounds: MotionBounds,
     ) -> None:
-        self._address, self._experiment = address, experiment
-        self._state, self._bounds = state, bounds
-        self._recorder = RtdeRecorder(RECORDED, address.host, address.rtde_port)
-        self._probe = PrimaryProbe()
-        #: Whether a pause was sent, and the number of rows that belong to the experiment, and of
-        #: those that were looked at.
-        self._pauses, self._rows, self._seen = False, 0, 0
+        self._experiment, self._state, self._bounds = experiment, state, bounds
+        self._run = ProgramRun(address, RECORDED, self._surprise)
+        self._recorder = self._run.recorder
+        #: Whether a pause was sent.
+        self._pauses = False
+        #: Number of rows that belong to the experiment.
+        self._rows = 0
 
     async def open(self) -> None:
-        await self._recorder.open()
-        await self._probe.open(self._address)
-        await self._until(lambda row: True, START_TIMEOUT, 'the robot streams nothing')
+        await self._run.open()
 
     async def close(self) -> None:
-        self._recorder.close()
-        await self._probe.close()
+        await self._run.close()
 
     async def carry_out(self) -> None:
         """Run the program, with its interruption; leave the arm at rest where it began."""
-        recorder, experiment = self._recorder, self._experiment
-        begin = recorder.newest
+        experiment, begin = self._experiment, self._recorder.newest
         await self._rest(BEFORE)
         try:
-            await self._start(program(f'identify_{experiment.name}', self._script))
+            script = experiment.script(self._state)
+            await self._run.start(program(f'identify_{experiment.name}', script))
             if experiment.interruption is not Interruption.NONE:
                 await self._interrupt()
-            await self._ended()
+            await self._run.ended()
             await self._rest(AFTER)
-        except BaseException:
-            await self._stop()
+            self._rows = len(self._recorder.rows)
+            if experiment.interruption is Interruption.STOP:
+                await self._run.play(return_program(begin['target_TCP_pose'], experiment.back))
+        except BaseException as error:
+            if not await self._stop():
+                error.add_note(
+                    'nobody can stop the program, so the arm may move for up to '
+                    f'{LONGEST_PROGRAM:g} s more'
+                )
             raise
-        finally:
-            self._rows = len(recorder.rows)
-        if experiment.interruption is Interruption.STOP:
-            try:
-                await self._start(return_program(begin['target_TCP_pose']))
-                await self._ended()
-            except BaseException:
-                await self._stop()
-                raise
         self._check_end(begin)
-
-    @property
-    def _script(self) -> str:
-        return self._experiment.script(self._state)
 
     async def _interrupt(self) -> None:
         """Stop the program on its way, or pause and resume it."""
-        due = self._recorder.newest['timestamp'] + self._experiment.after
-        await self._until(
-            lambda row: row['timestamp'] >= due, END_TIMEOUT, 'the time stands still'
-        )
+        await self._rest(self._experiment.after)
         if self._experiment.interruption is Interruption.STOP:
-            self._send(encode_command(PrimaryCommand.STOP_PROGRAM))
+            self._run.send(encode_command(PrimaryCommand.STOP_PROGRAM))
             return
         self._pauses = True
-        self._send(encode_command(PrimaryCommand.PAUSE_PROGRAM))
-        await self._until(
+        self._run.send(encode_command(PrimaryCommand.PAUSE_PROGRAM))
+        await self._run.until(
             lambda row: row['runtime_state'] == RuntimeState.PAUSED,
             START_TIMEOUT,
             'the program does not pause',
         )
         await self._rest(PAUSED)
-        self._send(encode_command(PrimaryCommand.RESUME_PROGRAM))
-        await self._until(
+        self._run.send(encode_command(PrimaryCommand.RESUME_PROGRAM))
+        await self._run.until(
             lambda row: row['runtime_state'] == RuntimeState.PLAYING,
             START_TIMEOUT,
             'the program does not resume',
         )
         self._pauses = False
 
-    async def _start(self, script: bytes) -> None:
-        """Send a program and wait until the arm moves."""
-        begin = self._recorder.newest['target_q']
-        self._send(script)
-        await self._until(
-            lambda row: row['target_q'] != begin or self._refused,
-            START_TIMEOUT,
-            'the arm does not move',
-        )
-        if self._refused:
-            raise Surprise('the robot takes no programs: it is in local control')
-
-    @property
-    def _refused(self) -> bool:
-        return any(LOCAL_CONTROL in line for line in self._probe.lines)
-
-    async def _ended(self) -> None:
-        await self._until(
-            lambda row: row['runtime_state'] == RuntimeState.STOPPED,
-            END_TIMEOUT,
-            'the program does not end',
-        )
-
     async def _rest(self, time: float) -> None:
+        """Wait for a time by the controller's clock [s]."""
         due = self._recorder.newest['timestamp'] + time
-        await self._until(
+        await self._run.until(
             lambda row: row['timestamp'] >= due, END_TIMEOUT, 'the time stands still'
         )
 
-    async def _until(
-        self, is_reached: Callable[[Mapping[str, Any]], bool], time: float, otherwise: str
-    ) -> None:
-        """
-        Wait for a row, and look at each one for surprises.
-
-        :raises Surprise: there was one, or the row did not come in time.
-        """
-        surprise, recorder = '', self._recorder
-
-        def check(row: Mapping[str, Any]) -> bool:
-            nonlocal surprise
-            for values in recorder.rows[self._seen :]:
-                surprise = surprise or self._surprise(
-                    dict(zip(recorder.names, values, strict=True))
-                )
-            self._seen = len(recorder.rows)
-            return bool(surprise) or is_reached(row)
-
-        reached = await recorder.wait_for(check, time)
-        if surprise or not reached:
-            raise Surprise(surprise or f'{otherwise} within {time:g} s')
-
     def _surprise(self, row: Mapping[str, Any]) -> str:
         """Return what nobody asked for, as a clause; '' = nothing."""
-        if row['safety_mode'] not in _SAFE:
-            return f'the robot stopped, with safety mode {SafetyMode(row["safety_mode"]).name}'
         paused = row['runtime_state'] in (RuntimeState.PAUSING, RuntimeState.PAUSED)
         if paused and not self._pauses:
             return 'the program was paused'
@@ -267,31 +216,34 @@ class _Run:
         if missing > 5.0 * NEAR:
             raise Surprise('the program ended before the arm was there and back')
 
-    def _send(self, request: bytes) -> None:
-        if not self._probe.send(request):
-            raise Surprise('the primary interface was lost')
-
-    async def _stop(self) -> None:
-        """Stop the program, and wait until the arm rests, as far as the connections allow it."""
+    async def _stop(self) -> bool:
+        """Stop the program; return whether the arm rests, as far as the connections tell."""
         row = self._recorder.newest
-        if row and row['safety_mode'] not in _SAFE:
-            await self._until_rest()  # its ramp belongs to the recording
-        self._probe.send(encode_command(PrimaryCommand.STOP_PROGRAM))
-        await self._until_rest()
+        if row and row['safety_mode'] not in SAFE:
+            with contextlib.suppress(OSError):
+                await self._rests()  # its ramp belongs to the recording
+        was_sent = await self._run.stop()
+        try:
+            return await self._rests()
+        except OSError:
+            if was_sent:
+                await asyncio.sleep(REST_TIMEOUT)  # without RTDE, wait as long as a stop may take
+            return was_sent
 
-    async def _until_rest(self) -> None:
-        """Wait until the target stands still; as long as may be necessary if nothing tells."""
-        recorder, last = self._recorder, MIN_REST
+    async def _rests(self) -> bool:
+        """
+        Wait until the target stands still; return whether it does within :data:`REST_TIMEOUT`.
+
+        :raises OSError: RTDE is lost.
+        """
+        recorder = self._recorder
         place = recorder.names.index('target_q') if recorder.names else 0
 
-        def rests(row: Mapping[str, Any]) -> bool:
-            rows = recorder.rows[-last:]
-            return len(rows) == last and all(each[place] == row['target_q'] for each in rows)
+        def still(row: Mapping[str, Any]) -> bool:
+            rows = recorder.rows[-MIN_REST:]
+            return len(rows) == MIN_REST and all(each[place] == row['target_q'] for each in rows)
 
-        try:
-            await recorder.wait_for(rests, REST_TIMEOUT)
-        except OSError:
-            await asyncio.sleep(REST_TIMEOUT)
+        return await recorder.wait_for(still, REST_TIMEOUT)
 
     def write(self, path: Path) -> None:
         """Write the rows of the experiment."""

@@ -26,15 +26,15 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 MISFIT = 2e-6
 #: Residuals that are as many times larger than the noise show another law, too, above MISFIT.
 _ROUGH = 3.0
-#: A start within less than this is none [s].
+#: Shorter start ramps count as none [s].
 SHORTEST_START = 0.01
 #: Starts from which the fit begins [s].
 _STARTS = (0.06, 0.15, 0.35)
 #: Twice the logarithm of a likelihood ratio from which one of two laws is ruled out.
 _CLEAR = 10.0
-#: From this share of the speed that it could reach on its travel, a move is taken not to cruise.
+#: From this share of its triangular peak speed on, a move counts as a triangle.
 _TRIANGLE = 0.98
-#: Logarithm of speeds and accelerations that no move has.
+#: Bound on the logarithms of speed and acceleration.
 _NO_BOUND = 20.0
 _OFFSET, _LENGTH, _ONSET, _ACCELERATION, _SPEED = range(5)
 
@@ -67,7 +67,7 @@ class Profile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misfit:
-    """A move whose profile is none of those that are known; rms of what is left [rad or m]."""
+    """A move that no known profile fits; rms of its residuals [rad or m]."""
 
     rms: float
 

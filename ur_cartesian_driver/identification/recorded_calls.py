@@ -19,13 +19,16 @@ _BRANCHES = (tree.IfStatement, tree.SwitchStatement, tree.WhileStatement, tree.F
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionCommand:
-    """A call of ``movej`` or ``movel``; what was left out is None [m or rad, s]."""
+    """
+    A call of ``movej`` or ``movel``; what was left out is None [m or rad, s].
+
+    Its blend radius is checked, but not kept: blended moves are no trapezoids.
+    """
 
     name: str
     a: float | None = None
     v: float | None = None
     t: float | None = None
-    r: float | None = None
 
 
 def read_commands(text: str, name: str) -> list[MotionCommand]:
@@ -50,12 +53,10 @@ def read_commands(text: str, name: str) -> list[MotionCommand]:
 
 
 def _calls(body: tree.StatementBlock, name: str) -> Iterator[tree.CallExpression]:
-    """Yield the calls in the statements of a text; a program in it is a function definition."""
-    for statement in body:
-        if isinstance(statement, tree.FunctionDefinition):
-            yield from _calls_once(statement.body, name)
-        else:
-            yield from _calls_once((statement,), name)
+    """Yield the calls of a text; a function that is all of the text is the program."""
+    if len(body) == 1 and isinstance(body[0], tree.FunctionDefinition):
+        body = body[0].body
+    yield from _calls_once(body, name)
 
 
 def _calls_once(body: tree.StatementBlock, name: str) -> Iterator[tree.CallExpression]:
@@ -100,7 +101,7 @@ def _command(call: tree.CallExpression, name: str) -> MotionCommand:
                 f'{name}, line {call.line}: {key} of {call.function} is {value:g}; it must be '
                 f'{least}'
             )
-        if value:
+        if value and key != 'r':
             found[key] = value
     return MotionCommand(name=call.function, **found)
 

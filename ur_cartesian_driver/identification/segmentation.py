@@ -9,7 +9,7 @@ changes in one cycle, and rises again; a blend stays faster.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import pairwise
 
@@ -31,11 +31,19 @@ _FEWEST_ROWS = 12
 
 
 class Ending(Enum):
-    """The event that ended a piece before its target."""
+    """The event that ended a piece before its target; the value is the law of its ramp."""
 
     PROGRAM_STOP = 'stop_time'
     PAUSE = 'pause_time'
     PROTECTIVE_STOP = 'protective_stop_time'
+    #: Emergency and safeguard stops, violations, faults: no law describes their ramps.
+    OTHER_SAFETY_STOP = ''
+
+
+#: Safety modes in which programs may move the arm.
+_MOVING_MODES = (SafetyMode.NORMAL, SafetyMode.REDUCED)
+#: Endings after which the rest of the move may follow.
+_RESUMABLE = (Ending.PAUSE, Ending.PROTECTIVE_STOP, Ending.OTHER_SAFETY_STOP)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +71,7 @@ class Piece:
     slowed: bool
 
     def directly_follows(self, before: Piece) -> bool:
-        """Return whether no other piece lies between this one and one in a chain before it."""
+        """Return whether this piece comes right after ``before`` in one chain."""
         return self.chained and self.number == before.number + 1
 
 
@@ -84,7 +92,9 @@ def pieces(samples: ArmSamples) -> list[Piece]:
         if end - begin < _FEWEST_ROWS or _has_long_gap(samples.time[begin : end + 1]):
             continue
         cut = place > 0, place + 1 < count
-        found.append(_piece(samples, k, (begin, end), (before, after), cut))
+        piece = _piece(samples, k, (begin, end), (before, after), cut)
+        is_rest = k > 0 and _ending(samples, *cuts[k - 1][:2]) in _RESUMABLE
+        found.append(replace(piece, resumed=is_rest and _is_resuming(samples, begin)))
     return found
 
 
@@ -147,7 +157,7 @@ def _piece(
     cut: tuple[bool, bool],
 ) -> Piece:
     """
-    Make a piece of the steps that move.
+    Make a piece of the steps that move, as if it were no rest of another.
 
     :param moving: row at which it begins to move, and the row at which it has ended.
     :param beside: row at which the piece before has ended, and at which the next one begins.
@@ -168,12 +178,13 @@ def _piece(
         number=number,
         chained=bool(pause < CHAIN_TIME),
         ending=ending,
-        resumed=_is_resumed(samples, begin),
+        resumed=False,
         slowed=slider is not None and bool((slider[begin:end] < 0.999).any()),
     )
 
 
-def _is_resumed(samples: ArmSamples, begin: int) -> bool:
+def _is_resuming(samples: ArmSamples, begin: int) -> bool:
+    """Return whether a paused program goes on where a piece begins."""
     states = samples.runtime_state
     if states is None:
         return False
@@ -185,8 +196,12 @@ def _ending(samples: ArmSamples, begin: int, end: int) -> Ending | None:
     """Return the event during a motion, other than in its last cycles."""
     inside = slice(begin + 1, max(end - 2, begin + 1))
     safety, states = samples.safety_mode, samples.runtime_state
-    if safety is not None and (safety[inside] == SafetyMode.PROTECTIVE_STOP).any():
-        return Ending.PROTECTIVE_STOP
+    if safety is not None:
+        stops = safety[inside][~np.isin(safety[inside], _MOVING_MODES)]
+        if (stops != SafetyMode.PROTECTIVE_STOP).any():
+            return Ending.OTHER_SAFETY_STOP
+        if len(stops):
+            return Ending.PROTECTIVE_STOP
     if states is None:
         return None
     if np.isin(states[inside], (RuntimeState.PAUSING, RuntimeState.PAUSED)).any():

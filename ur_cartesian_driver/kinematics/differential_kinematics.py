@@ -124,6 +124,7 @@ def _bias_acceleration(at: _Jacobians, qd: Floats) -> Floats:
 
 def _cross(a: Floats, b: Floats) -> Floats:
     """Return cross products (3, n); numpy.cross takes twenty times as long for small n."""
-    return np.stack(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    )
+    cross = np.empty(b.shape)
+    cross[0], cross[1] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2]
+    cross[2] = a[0] * b[1] - a[1] * b[0]
+    return cross

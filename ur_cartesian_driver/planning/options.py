@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Any, Literal, Protocol
 
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes
@@ -217,8 +217,8 @@ class PlanningOptions:
     #: Time after the last live target at which the session ends [s].
     live_target_timeout: Annotated[float, Range(0.1, 3600.0)] = 2.0
 
-    #: Largest acceleration of the tool that the times of a goal, or the arcs in which PROCESS
-    #: rounds its corners, may need [m/s^2].
+    #: Largest acceleration of the tool that the times of a goal, or the speed on its arcs, may
+    #: need [m/s^2]: CIRCULAR ones, and those in which PROCESS rounds corners.
     max_linear_acceleration: Annotated[float, Range(0.1, 100.0)] = 10.0
     #: Largest angular acceleration of the tool that the times of a goal may need [rad/s^2].
     max_angular_acceleration: Annotated[float, Range(0.1, 1000.0)] = 40.0
@@ -232,6 +232,7 @@ class PlanningOptions:
     #: pieces on the wire.
     spline_tolerance: Annotated[float, Range(1e-6, 0.01)] = 0.00005
     #: Deceleration of the fastest joint when a goal with keep_open runs out of points [rad/s^2].
+    #: Near the end of a range, the arm brakes with up to max_joint_acceleration.
     keep_open_deceleration: Annotated[float, Range(0.1, 100.0)] = 4.0
     #: Longest duration of one segment [s]; the default is the largest that the robot accepts.
     max_segment_time: Annotated[float, Range(0.1, NEWEST_DIALECT.max_duration)] = (
@@ -287,10 +288,11 @@ class PlanningOptions:
         """
         return with_lead_times(commands, self.leads, self.lead_file)
 
-    def for_program(self, settings: ProgramTraits) -> PlanningOptions:
-        """Return the options for the robot program of a driver."""
+    def for_program(self, settings: ProgramTraits, **detected: Any) -> PlanningOptions:
+        """Return the options for the robot program of a driver, with other fields replaced too."""
         return replace(
             self,
+            **detected,
             dialect=settings.dialect,
             prelude=settings.prelude,
             # An older program may ignore the command that sets the TCP; the wrong TCP would move.

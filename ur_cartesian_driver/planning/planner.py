@@ -16,7 +16,6 @@ reference path and report. The first stage that finds a fault in the goal raises
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from math import inf
@@ -25,7 +24,7 @@ from typing import TypeAlias
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.errors import GoalRefused, NearSingularity, TooFast
+from ur_cartesian_driver.motion.errors import GoalRefused, NearSingularity
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.pose_rows import transform_rows
@@ -58,7 +57,7 @@ from ur_cartesian_driver.planning.moves.slow_moves import slow_move_stretches, u
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
-from ur_cartesian_driver.planning.preflight.offset_bands import (
+from ur_cartesian_driver.planning.preflight.offset_band_check import (
     dense_path,
     FILTER_SETTLING,
     offset_band,
@@ -132,22 +131,6 @@ def plan(
     if options.twin is not None and not options.robot.model:
         options = replace(options, robot=replace(options.robot, model=arm.model.name))
     table = check_for_arm(goal, state.T_flange_tcp, arm, options)
-    if options.laws.blend_begin < 1.0 and table.segments.blend_radii.any():
-        # A measured law must not let a goal pass that was refused: the path of the assumed blends
-        # has to be possible, too. How long it takes does not matter.
-        with suppress(TooFast):
-            _plan(table, state, arm, replace(options, twin=None, twin_file=''), running)
-    return _plan(table, state, arm, options, running)
-
-
-def _plan(
-    table: GoalTable,
-    state: RobotState,
-    arm: Arm,
-    options: PlanningOptions,
-    running: PlannedSegment | None,
-) -> Plan:
-    """Return the plan of a goal that :func:`check_for_arm` has passed."""
     if table.segments.free_axes.any():
         return _plan_free(table, state, arm, options)
     return _plan_fixed(table, state, arm, options, running)
@@ -202,16 +185,14 @@ def _plan_free(table: GoalTable, state: RobotState, arm: Arm, options: PlanningO
 def plan_moves(planner: GoalPlanner) -> Plan:
     """Return the plan of a goal whose points are connected by motion commands of the robot."""
     goal, state, arm, options = planner.goal, planner.state, planner.arm, planner.options
-    paths = JointPathPlanner(
-        goal,
-        planner.targets,
-        planner.kinematics,
-        options,
-        planner.remarks,
-        planner.reasons,
+    first = planner.first_target()
+    if options.laws.blend_begin < 1.0 and goal.segments.blend_radii.any():
+        # A measured law must not let a goal pass that was refused: the path of the assumed blends
+        # has to be possible, too. How long it takes does not matter.
+        _checked_path(planner, first, replace(options, twin=None, twin_file=''), [], {})
+    paths, geometries, lines = _checked_path(
+        planner, first, options, planner.remarks, planner.reasons
     )
-    geometries = paths.geometries(planner.first_target(), state.actual_tcp_pose, state.actual_q)
-    lines = clearance_lines(arm, planner.tool_tips, options, paths.samples, state.actual_q)
     timings = SegmentTimings(
         geometries,
         options,
@@ -228,8 +209,9 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     find_slow_stretches = cache(
         partial(slow_move_stretches, geometries, timings, motion, slower_by(goal))
     )
+    limits = timings.requests.limits
     remarks = [
-        *ignored_remarks(goal),
+        *ignored_remarks(goal, translates=None if planner.timed else limits.translates),
         *motion_version_remarks(options),
         *(remark for _, remark in sorted(timings.requests.remarks.items())),
         *twin_remarks(options, timings),
@@ -241,6 +223,23 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     if goal.min_speed_fraction:
         remarks += unknown_speed_remark(goal, *unknown_speeds(geometries))
     return planner.plan(goal, segments, motion, remarks, find_slow_stretches)
+
+
+def _checked_path(
+    planner: GoalPlanner,
+    first: int,
+    options: PlanningOptions,
+    remarks: list[str],
+    reasons: dict[int, list[str]],
+) -> tuple[JointPathPlanner, SegmentGeometries, list[str]]:
+    """Return the joint path of a goal from a point on, without speeds, and its clearance lines."""
+    state = planner.state
+    paths = JointPathPlanner(
+        planner.goal, planner.targets, planner.kinematics, options, remarks, reasons
+    )
+    geometries = paths.geometries(first, state.actual_tcp_pose, state.actual_q)
+    lines = clearance_lines(planner.arm, planner.tool_tips, options, paths.samples, state.actual_q)
+    return paths, geometries, lines
 
 
 def _planned_rows(

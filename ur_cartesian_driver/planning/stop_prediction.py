@@ -47,7 +47,7 @@ def at_set_point(state: RobotState, arm: Arm) -> RobotState:
     ``MAX_STATIC_ERROR`` is returned unchanged: friction cannot be the cause.
     """
     q = state.target_q
-    if max(map(abs, subtract6(q, state.actual_q))) > MAX_STATIC_ERROR:
+    if q == state.actual_q or max(map(abs, subtract6(q, state.actual_q))) > MAX_STATIC_ERROR:
         return state
     return replace(state, actual_q=q, actual_tcp_pose=_tcp_at(state, arm, q))
 

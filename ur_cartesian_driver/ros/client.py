@@ -441,14 +441,25 @@ class GoalClient:
         """
         Wait for the driver, and return what tells it from one that is started later.
 
+        One that was killed is seen for some seconds beside its successor.
+
         :raises TimeoutError: no driver answers.
+        :raises ConnectionError: several drivers serve the action, and any of them could move.
         """
+        deadline = monotonic() + timeout
         if not self._client.wait_for_server(timeout_sec=timeout):
             raise TimeoutError(
                 f'No driver serves {self.action} (searched for {timeout:g} s): '
                 f'{self._how_to_find()}'
             )
-        return feedback_publishers(self._node, self.action)
+        while len(found := feedback_publishers(self._node, self.action)) > 1:
+            if monotonic() > deadline:
+                raise ConnectionError(
+                    f'{len(found)} drivers serve {self.action}, and any of them could move its '
+                    'arm; end the others, or give each a namespace (-r __ns:=/left) and name it'
+                )
+            self._spin_or_wait()
+        return found
 
     def _find_service(self, kind: Any, name: str, timeout: float) -> Any:
         """

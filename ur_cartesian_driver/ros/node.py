@@ -22,6 +22,7 @@ from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
 
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.driver.callbacks import LOG
@@ -57,6 +58,10 @@ SHUTDOWN_TIMEOUT = 5.0
 LARGE_ARRAY = 2**20
 #: The option of :func:`main` that starts the node with the UR driver's names.
 UR_DRIVER_NAMES = '--ur-driver-names'
+_USAGE = (
+    f'Usage: ur-cartesian-driver [{UR_DRIVER_NAMES}] [--ros-args [-p NAME:=VALUE] '
+    '[--params-file FILE] [-r __ns:=/NAMESPACE]]; doc/parameters.md has the parameters.'
+)
 #: Parameters of mallopt, from malloc.h.
 _M_MMAP_THRESHOLD, _M_ARENA_MAX = -3, -8
 
@@ -231,18 +236,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
     result; a second signal ends this wait. With ``--ur-driver-names`` another process serves the
     names of the UR ROS 2 driver.
     """
-    _share_freed_memory()
     given = list(sys.argv if arguments is None else arguments)
     own_arguments = [argument for argument in given if argument != UR_DRIVER_NAMES]
+    _share_freed_memory()
     # rclpy's own handlers would shut ROS down at once, and no goal could end with a result.
     try:
         rclpy.init(
             args=own_arguments,
             signal_handler_options=SignalHandlerOptions.NO,
         )
+        _check_arguments(remove_ros_args(own_arguments)[1:])
     except RuntimeError as error:
-        # rcl appends the source line to its sentence.
-        sys.exit(f'ur_cartesian_driver: {re.split(r", at /", str(error))[0]}')
+        # rcl appends the source line to its sentence; of unknown arguments it has just the list.
+        reason = re.split(r', at /', str(error))[0]
+        if reason.startswith('['):
+            reason = f'{reason[1:-1]} is not understood. {_USAGE}'
+        sys.exit(f'ur_cartesian_driver: {reason}')
     signals = _SignalCounter()
     try:
         node = CartesianDriverNode()
@@ -268,6 +277,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if names is not None:
             names.close()
         rclpy.shutdown()
+
+
+def _check_arguments(arguments: Sequence[str]) -> None:
+    """Exit if there are arguments that ROS does not take: without them, another arm may move."""
+    if arguments:
+        rclpy.shutdown()
+    if {'-h', '--help'} & set(arguments):
+        sys.stdout.write(f'{_USAGE}\n')
+        sys.exit(0)
+    if arguments:
+        sys.exit(f'ur_cartesian_driver: {" ".join(arguments)} is not understood. {_USAGE}')
 
 
 def _end_goals(

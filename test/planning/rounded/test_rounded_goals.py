@@ -246,6 +246,16 @@ def test_arcs_that_turn_with_their_tangent_and_turns_on_the_spot_are_led_through
     assert end.angle_to(goal.waypoints[-1].pose) < 1e-5
 
 
+def test_an_acceleration_at_a_point_is_told_to_be_ignored_with_the_reason(cell):
+    goal = square(cell, corner_deviation=1e-3)
+    first = replace(goal.waypoints[0], acceleration=(0.1, 0, 0, 0, 0, 0))
+    found = plan(
+        replace(goal, waypoints=(first, *goal.waypoints[1:])), cell.state, cell.arm, OPTIONS
+    )
+    text = 'point 0: acceleration is ignored: corners are rounded with those of the segments'
+    assert text in found.report
+
+
 def test_the_slowest_limit_is_demanded_away(cell):
     goal = square(cell, corner_deviation=5e-5, min_speed_fraction=0.9)
     with pytest.raises(InvalidGoal, match=r'min_speed_fraction is 0\.9, but at .*corner near'):

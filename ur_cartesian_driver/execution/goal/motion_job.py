@@ -321,16 +321,15 @@ def _press_windows(plan: Plan) -> Iterator[PressWindow]:
 
 def _feed_override(wanted: FeedOverride) -> FeedOverride | None:
     """Return the bounds of a feed override with the defaults filled in; None = no override."""
+    if not wanted:
+        return None
     rate, timeout = DEFAULT_FEED_MOTION
-    return (
-        wanted
-        and replace(
-            wanted,
-            maximum=wanted.maximum or 1.0,
-            rate=wanted.rate or rate,
-            timeout=wanted.timeout or timeout,
-        )
-    ) or None
+    return replace(
+        wanted,
+        maximum=wanted.maximum or 1.0,
+        rate=wanted.rate or rate,
+        timeout=wanted.timeout or timeout,
+    )
 
 
 def _longest_delay(rows: PlannedRows, row: int) -> float:

@@ -30,6 +30,7 @@ import numpy as np
 from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
 from ur_cartesian_driver.motion.geometry.vectors import norm, scale, Vector3, Vector6, ZERO3
 from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
@@ -125,7 +126,7 @@ class PathTracker:
         self._rows[:, 3:] *= (
             2.0 * METRES_PER_RADIAN * _continuous_signs(path.poses[:, 3:])[:, None]
         )
-        steps = np.linalg.norm(np.diff(self._rows, axis=0), axis=1)
+        steps = length_rows(np.diff(self._rows, axis=0))
         # An ``array`` is searched faster than a numpy array: its items are plain numbers.
         self._arc = array('d', np.concatenate(([0.0], np.cumsum(steps))).tobytes())
         self._time = array('d', path.time.astype(np.float64).tobytes())

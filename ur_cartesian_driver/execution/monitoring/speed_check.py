@@ -16,6 +16,7 @@ from math import hypot
 import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
 from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 
@@ -36,10 +37,10 @@ class SpeedCheck:
     def __init__(self, path: ReferencePath) -> None:
         """Find the largest speeds of the planned path."""
         passed = np.diff(path.time)
-        distances = np.linalg.norm(np.diff(path.poses[:, :3], axis=0), axis=1)
+        distances = length_rows(np.diff(path.poses[:, :3], axis=0))
         # A turn is four times the arcsine of half the chord from a to the nearer of b and -b.
         a, b = path.poses[:-1, 3:], path.poses[1:, 3:]
-        chords = np.minimum(np.linalg.norm(b - a, axis=1), np.linalg.norm(b + a, axis=1))
+        chords = np.minimum(length_rows(b - a), length_rows(b + a))
         turns = 4.0 * np.arcsin(np.minimum(0.5 * chords, 1.0))
         self._limits = tuple(
             PEAK_TO_MEAN * _max_speed(lengths, passed) + min_limit

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from functools import reduce
+
 import numpy as np
 
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
@@ -35,10 +37,13 @@ class Standstill:
 
         :param output_delay: how long after the end of the motion the last output is switched [s].
         """
-        still = (np.abs(np.diff(path.poses, axis=0)) < SAME_POSE).all(axis=1)
-        # A wait may have several rows: consecutive rows at one pose are summed.
-        waits = np.bincount(np.cumsum(~still), weights=np.where(still, np.diff(path.time), 0.0))
-        longest = max(float(waits.max(initial=0.0)), output_delay)
+        still = reduce(np.logical_and, (np.abs(np.diff(path.poses, axis=0)) < SAME_POSE).T)
+        longest = output_delay
+        if still.any():
+            # A wait may have several rows: consecutive rows at one pose are summed.
+            passed = np.where(still, np.diff(path.time), 0.0)
+            waits = np.bincount(np.cumsum(~still), weights=passed)
+            longest = max(float(waits.max()), longest)
         if longest > 0.0:
             self._timeout = max(self._timeout, longest + STANDSTILL_MARGIN)
 

@@ -38,6 +38,8 @@ class FeedRequests(Overridable, Ageing, Reporting):
         self.bounds, self._input = bounds, feed_input
         self._freshness, self._warnings = Freshness(bounds.timeout), RareWarnings()
         self._newest = bounds.minimum
+        #: Whether no value has come yet, which is no loss.
+        self._is_silent = True
         self._is_valid = self._is_loss_unsaid = False
         self._invalid = self._lost = 0
         self._lowest, self._delay = bounds.maximum, 0.0
@@ -49,7 +51,7 @@ class FeedRequests(Overridable, Ageing, Reporting):
             self._lose()
         elif self._freshness.accept(age, now):
             self._newest = min(max(fraction, self.bounds.minimum), self.bounds.maximum)
-            self._is_valid = True
+            self._is_valid, self._is_silent, self._is_loss_unsaid = True, False, False
 
     def read_input(self, packet: RobotState, now: float) -> None:
         """Accept the value of the input, if an input gives the values."""
@@ -62,18 +64,19 @@ class FeedRequests(Overridable, Ageing, Reporting):
             self._lose()
         if not self._is_loss_unsaid:
             return []
-        self._is_loss_unsaid = False
-        return self._warnings.due(
+        warnings = self._warnings.due(
             'the signal of feed_override is invalid or older than '
             f'{self.bounds.timeout:g} s: the motion slows down to {self.bounds.minimum:.0%}',
             now,
         )
+        self._is_loss_unsaid = not warnings
+        return warnings
 
     def _lose(self) -> None:
-        if self._is_valid:
-            self._lost += 1
+        self._lost += self._is_valid
+        if self._is_valid or self._is_silent:
             self._is_loss_unsaid = True
-        self._is_valid = False
+        self._is_valid = self._is_silent = False
 
     @property
     def target(self) -> float:

@@ -40,7 +40,7 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
         self._fades = band.on_stale is StaleOffset.FADE
         self._freshness, self._warnings = Freshness(band.timeout), RareWarnings()
         self._newest: Vector3 = ZERO3
-        self._is_stale = True
+        self._is_stale, self._is_unsaid = True, False
         self._cut = self._stale_count = 0
         self._largest = list(ZERO3)
 
@@ -60,13 +60,17 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
     def age(self, now: float) -> list[GoalCommand]:
         """Check the age of the newest offset; warn, not too often, when it becomes stale."""
         before, self._is_stale = self._is_stale, self._freshness.is_stale(now)
-        if before or not self._is_stale:
+        if self._is_stale and not before:
+            self._stale_count += 1
+            self._is_unsaid = True
+        if not (self._is_stale and self._is_unsaid):
             return []
-        self._stale_count += 1
         follows = 'goes back to its path' if self._fades else 'stays where it was'
-        return self._warnings.due(
+        warnings = self._warnings.due(
             f'the path offset is older than {self._band.timeout:g} s: the tool {follows}', now
         )
+        self._is_unsaid = not warnings
+        return warnings
 
     def target(self, time: float) -> Vector3:
         """Return the offset to which the tool should move, at a time of the motion [s]."""

@@ -21,22 +21,21 @@ def multiply_rows(a: Floats, b: Floats) -> Floats:
     """Return the rotations ``b`` followed by ``a`` (n, 4), not normalised."""
     ax, ay, az, aw = a.T
     bx, by, bz, bw = b.T
-    return np.stack(
-        (
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-            aw * bw - ax * bx - ay * by - az * bz,
-        ),
-        axis=1,
-    )
+    rows = np.empty((len(a) if len(b) == 1 else len(b), 4))  # for few rows np.stack is slow
+    rows[:, 0] = aw * bx + ax * bw + ay * bz - az * by
+    rows[:, 1] = aw * by - ax * bz + ay * bw + az * bx
+    rows[:, 2] = aw * bz + ax * by - ay * bx + az * bw
+    rows[:, 3] = aw * bw - ax * bx - ay * by - az * bz
+    return rows
 
 
 def cross_rows(a: Floats, b: Floats) -> Floats:
     """Return the cross products of vectors (n, 3); for few rows np.cross is many times slower."""
     ax, ay, az = a.T
     bx, by, bz = b.T
-    return np.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), axis=1)
+    rows = np.empty(b.shape)
+    rows[:, 0], rows[:, 1], rows[:, 2] = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    return rows
 
 
 def conjugate_rows(a: Floats) -> Floats:
@@ -105,9 +104,9 @@ def interpolate_rows(a: Floats, b: Floats, fraction: Floats) -> Floats:
     """
     rows: Floats = a + fraction[:, None] * (b - a)
     rows[:, 3:] = a[:, 3:]
-    a, b = (np.broadcast_to(pose[:, 3:], (len(rows), 4)) for pose in (a, b))
-    turns = np.flatnonzero((a != b).any(axis=1))
-    if len(turns):
+    if (a[:, 3:] != b[:, 3:]).any():
+        a, b = (np.broadcast_to(pose[:, 3:], (len(rows), 4)) for pose in (a, b))
+        turns = np.flatnonzero((a != b).any(axis=1))
         rows[turns, 3:] = _turned_rows(a[turns], b[turns], fraction[turns])
     return rows
 

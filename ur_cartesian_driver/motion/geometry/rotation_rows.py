@@ -27,6 +27,8 @@ from ur_cartesian_driver.motion.geometry.pose_rows import cross_rows
 _TERMS = 26
 _B_SERIES = np.array([(-1.0) ** k / factorial(2 * k + 2) for k in range(_TERMS)])
 _C_SERIES = np.array([(-1.0) ** k / factorial(2 * k + 3) for k in range(_TERMS)])
+# The largest |r|^2 for which 1, 2, ... terms are exact.
+_EXACT = np.array([(1e-20 * factorial(2 * k + 2)) ** (1.0 / k) for k in range(1, _TERMS)])
 _MIN_LENGTH = 1e-150
 
 
@@ -75,7 +77,7 @@ def _series(r: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     s = np.einsum('ij,ij->i', r, r)[:, None]
     b, b_s, c, c_s = np.zeros((4, *s.shape))
     # Only as many terms as the largest turn needs.
-    terms = _TERMS if s.max(initial=0.0) > 4.0 else 14
+    terms = min(int(np.searchsorted(_EXACT, s.max(initial=0.0))) + 2, _TERMS)
     for k in range(terms - 1, -1, -1):
         b_s, b = b_s * s + b, b * s + _B_SERIES[k]
         c_s, c = c_s * s + c, c * s + _C_SERIES[k]

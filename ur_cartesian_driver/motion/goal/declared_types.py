@@ -66,8 +66,10 @@ def declare_types(instance: object) -> None:
 
     :raises WrongType: a value cannot be converted.
     """
-    for name, convert in _field_converters(type(instance)):  # type: ignore[arg-type]  # a dataclass
+    for name, convert, default in _field_converters(type(instance)):  # type: ignore[arg-type]  # a dataclass
         value = getattr(instance, name)
+        if value is default:
+            continue
         converted = _convert_part(convert, value, name)
         if converted is not value:
             object.__setattr__(instance, name, converted)
@@ -116,21 +118,21 @@ def declared_hints(kind: type) -> dict[str, Any]:
 
 
 @cache
-def _field_converters(kind: type) -> tuple[tuple[str, Convert], ...]:
+def _field_converters(kind: type) -> tuple[tuple[str, Convert, Any], ...]:
+    """Return the name, the converter and the default of each field."""
     hints = declared_hints(kind)
-    return tuple((field.name, _converter(hints[field.name])) for field in fields(kind))
+    return tuple((each.name, _converter(hints[each.name]), each.default) for each in fields(kind))
 
 
 def _dataclass(kind: type) -> Convert:
     converters = _field_converters(kind)
-    names = [name for name, _ in converters]
-    defaults = [field.default for field in fields(kind)]
+    names = [name for name, _, _ in converters]
 
     def convert(value: Any) -> Any:
         if not isinstance(value, kind):
             raise _wrong(value, kind.__name__)
         changed = {}
-        for (name, convert_field), default in zip(converters, defaults, strict=True):
+        for name, convert_field, default in converters:
             old = getattr(value, name)
             if old is default:  # true for most fields of a point
                 continue

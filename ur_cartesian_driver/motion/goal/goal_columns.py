@@ -49,7 +49,7 @@ _BLOCK = 4096
 
 def rows_where(mask: Flags | np.bool_) -> list[int]:
     """Return the indices of the true rows of a mask (n,), in order."""
-    rows: list[int] = np.flatnonzero(mask).tolist()
+    rows: list[int] = np.nonzero(mask)[0].tolist()
     return rows
 
 
@@ -75,7 +75,8 @@ class Rows(Sequence[T]):
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]  # every kind of rows is a dataclass
 
     def __post_init__(self) -> None:
-        for name, column in self._columns():
+        for name in _names(type(self)):
+            column = getattr(self, name)
             if isinstance(column, np.ndarray) and column.flags.writeable:
                 view = column.view()
                 view.setflags(write=False)
@@ -93,28 +94,22 @@ class Rows(Sequence[T]):
     def take(self: R, rows: slice) -> R:
         """Return the rows of a slice with a step of 1."""
         first, last, _ = rows.indices(len(self))
+        if last - first == len(self):
+            return self
         return replace(
             self,
             **{
                 name: {row - first: column[row] for row in column if first <= row < last}
-                if isinstance(column, Mapping)
+                if not isinstance(column, np.ndarray) and isinstance(column, Mapping)
                 else column[rows]
                 for name, column in self._columns()
             },
         )
 
-    def with_first(self: R, first: R) -> R:
-        """Return the rows with the first one replaced by the only row of ``first``."""
-        columns = zip(first._columns(), self.take(slice(1, len(self)))._columns(), strict=True)
-        return replace(
-            self,
-            **{
-                name: {**a, **{row + 1: value for row, value in b.items()}}
-                if isinstance(a, Mapping)
-                else np.concatenate([a, b])
-                for (name, a), (_, b) in columns
-            },
-        )
+    def __add__(self: R, other: R) -> R:
+        """Return these rows, followed by others of the same kind."""
+        columns = zip(self._columns(), other._columns(), strict=True)
+        return replace(self, **{name: _joined(a, b, len(self)) for (name, a), (_, b) in columns})
 
     @overload
     def __getitem__(self, index: int) -> T: ...
@@ -142,6 +137,13 @@ class Rows(Sequence[T]):
 
     def __hash__(self) -> int:
         return hash((type(self), len(self)))
+
+
+def _joined(a: Any, b: Any, n: int) -> Any:
+    """Return a column of n rows, followed by the same column of other rows."""
+    if isinstance(a, Mapping):
+        return {**a, **{row + n: value for row, value in b.items()}}
+    return np.concatenate([a, b]) if isinstance(a, np.ndarray) else a + b
 
 
 def _are_equal(a: Any, b: Any) -> bool:
@@ -187,19 +189,24 @@ class GoalRows(Rows[T]):
     @classmethod
     def of_columns(cls: type[G], n: int, columns: Mapping[str, Any]) -> G:
         """Return n rows; columns that are None or left out are filled with the default."""
-        whole: dict[str, Any] = {}
-        for each in cls.columns():
-            if each.mask:
-                whole[each.mask] = np.broadcast_to(np.False_, (n,))
-            whole[each.name] = default_column(each.field, n)
-        return cls(**whole | {name: rows for name, rows in columns.items() if rows is not None})
+        given = {name: rows for name, rows in columns.items() if rows is not None}
+        return cls(**{**cls._defaults(n), **given})
+
+    @classmethod
+    @lru_cache(maxsize=16)  # a plan asks for them again and again
+    def _defaults(cls, n: int) -> Mapping[str, Any]:
+        """Return all columns of n rows, filled with the defaults."""
+        masks = {
+            each.mask: np.broadcast_to(np.False_, (n,)) for each in cls.columns() if each.mask
+        }
+        return masks | {each.name: default_column(each.field, n) for each in cls.columns()}
 
     def is_default(self, column: GoalColumn) -> bool:
         """Return whether each row of a column has the field's default (0 if it declares none)."""
         if column.mask:
             return not getattr(self, column.mask).any()
         rows, default = getattr(self, column.name), column.field.default
-        if isinstance(rows, Mapping):
+        if not isinstance(rows, np.ndarray):
             return not rows
         differs = rows != default if column.field.form is Form.PLAIN and default else rows
         return not differs.any()
@@ -322,8 +329,8 @@ def _array(each: GoalField, values: Sequence[Any]) -> Any:
     """Return the column of a field from its values; None if each is the default object itself."""
     if each.form is Form.RECORD:
         return {i: value for i, value in enumerate(values) if value}
-    zero = {Form.RATES: ZERO6, Form.POSE: IDENTITY}.get(each.form)
-    if zero is not None and all(value is zero for value in values):
+    default = IDENTITY if each.form is Form.POSE else each.default
+    if all(value is default for value in values):
         return None
     if each.form is Form.POSE:
         values = [pose.row() for pose in values]

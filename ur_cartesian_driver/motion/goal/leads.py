@@ -56,8 +56,8 @@ def with_lead_times(
     Return output commands without names of leads, each earlier by the dead time of its lead.
 
     :param file: the parameter ``lead_file``, for refusals.
-    :raises InvalidGoal: a name is unknown, its lead belongs to another output, or the command has
-        a time after its place too.
+    :raises InvalidGoal: a name is unknown, its lead belongs to another output, the command has a
+        time after its place too, or all leads together are too long.
     """
     by_name = {lead.name: lead for lead in leads}
     return tuple(
@@ -94,9 +94,17 @@ def _earlier(command: IOCommand, leads: dict[str, Lead], field: str, file: str) 
             'ahead of its place or after it',
             'set the offset to 0, and move the place by a distance',
         )
+    offset = command.offset - lead.dead_time(command.value)
+    if offset < -MAX_OUTPUT_LEAD:
+        raise InvalidGoal(
+            field,
+            f'is {command.lead!r}, whose dead time of {lead.dead_time(command.value):g} s and the '
+            f'offset of {command.offset:g} s are together more than {MAX_OUTPUT_LEAD:g} s',
+            'set the offset to 0',
+        )
     return replace(
         command,
-        offset=command.offset - lead.dead_time(command.value),
+        offset=offset,
         lead='',
         lead_name=lead.name,
     )

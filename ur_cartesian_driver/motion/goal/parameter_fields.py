@@ -90,7 +90,8 @@ def check_parameters(instance: object) -> None:
     declare_types(instance)
     kind: type = type(instance)
     for each in parameter_fields(kind):
-        if problem := each.problem(getattr(instance, each.name)):
+        value = getattr(instance, each.name)
+        if value != each.default and (problem := each.problem(value)):
             raise ValueError(f'{each.name} {problem}.')
 
 

@@ -24,6 +24,7 @@ from ur_cartesian_driver.motion.geometry.polynomials import (
     quintic_rows,
 )
 from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector6, ZERO6
+from ur_cartesian_driver.motion.plan.move_rows import SplineRows
 from ur_cartesian_driver.motion.plan.primitive import Spline
 
 #: Times that differ by less than this [s] are the same; times on the wire are whole microseconds.
@@ -56,21 +57,19 @@ class JointSpline:
         :param accelerations: joint accelerations at the start [rad/s^2]; None = zero.
         :param start_time: when the first piece begins [s].
         """
-        pieces = tuple(pieces)
-        ends = [
-            (start, velocities or ZERO6, accelerations or ZERO6),
-            *((piece.target, piece.velocities, piece.accelerations or ZERO6) for piece in pieces),
-        ]
-        x, v, a = np.array(ends).transpose(1, 0, 2)
-        before, after = (MotionRows(x[k], v[k], a[k]) for k in (slice(None, -1), slice(1, None)))
-        durations = np.array([piece.duration for piece in pieces])
-        is_cubic = np.array([piece.accelerations is None for piece in pieces], dtype=np.bool_)
-        coefficients = np.where(
-            is_cubic[:, None, None],
-            cubic_rows(durations, before, after),
-            quintic_rows(durations, before, after),
+        rows = SplineRows.of(pieces)
+        reached = np.where(rows.quintic[:, None], rows.accelerations, 0.0)
+        after = MotionRows(rows.targets, rows.velocities, reached)
+        first = start, velocities or ZERO6, accelerations or ZERO6
+        before = MotionRows(
+            *(np.concatenate([[a], b])[:-1] for a, b in zip(first, after, strict=True))
         )
-        times = start_time + np.concatenate([[0.0], np.cumsum(durations)])
+        coefficients = np.where(
+            rows.quintic[:, None, None],
+            quintic_rows(rows.durations, before, after),
+            cubic_rows(rows.durations, before, after),
+        )
+        times = start_time + np.concatenate([[0.0], np.cumsum(rows.durations)])
         return cls(times=times, coefficients=coefficients)
 
     @classmethod

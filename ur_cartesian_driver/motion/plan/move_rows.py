@@ -10,7 +10,7 @@ primitives; those in columns are created on access.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int64s
 from ur_cartesian_driver.motion.geometry.pose import pose_from_row
-from ur_cartesian_driver.motion.geometry.vectors import vector6
+from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
 from ur_cartesian_driver.motion.goal.goal import ArcMode
 from ur_cartesian_driver.motion.goal.goal_columns import Rows
 from ur_cartesian_driver.motion.plan.primitive import (
@@ -94,7 +94,7 @@ class MoveRows(Rows[Primitive]):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
-class SplineRows(Rows[Primitive]):
+class SplineRows(Rows[Spline]):
     """Pieces of a joint spline; units as in a :class:`Spline`."""
 
     #: (n, 6) each
@@ -106,10 +106,28 @@ class SplineRows(Rows[Primitive]):
     #: (n,) whether the piece is quintic; if not, its accelerations are not used
     quintic: Flags
 
+    @classmethod
+    def of(cls, pieces: Iterable[Spline]) -> SplineRows:
+        """Return pieces as rows; rows are returned unchanged."""
+        if isinstance(pieces, cls):
+            return pieces
+        every = tuple(pieces)
+        states = [
+            (piece.target, piece.velocities, piece.accelerations or ZERO6) for piece in every
+        ]
+        targets, velocities, accelerations = np.array(states).reshape(-1, 3, 6).swapaxes(0, 1)
+        return cls(
+            targets=targets,
+            velocities=velocities,
+            accelerations=accelerations,
+            durations=np.array([piece.duration for piece in every], dtype=np.float64),
+            quintic=np.array([piece.accelerations is not None for piece in every], dtype=np.bool_),
+        )
+
     def __len__(self) -> int:
         return len(self.durations)
 
-    def __iter__(self) -> Iterator[Primitive]:
+    def __iter__(self) -> Iterator[Spline]:
         for target, velocity, acceleration, duration, quintic in self._numbers(
             'targets', 'velocities', 'accelerations', 'durations', 'quintic'
         ):

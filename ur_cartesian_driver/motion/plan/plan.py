@@ -9,21 +9,22 @@ A plan: primitives, the reference path of the tool, and a report of the planner'
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cache
-from typing import NamedTuple, overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose_rows import keep_hemisphere
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal
-from ur_cartesian_driver.motion.goal.goal_columns import Rows
+from ur_cartesian_driver.motion.goal.goal_columns import Rows, zeros
 from ur_cartesian_driver.motion.goal.joint_goal import JointTolerances
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
-from ur_cartesian_driver.motion.plan.move_rows import classes
+from ur_cartesian_driver.motion.plan.move_rows import classes, SplineRows
 from ur_cartesian_driver.motion.plan.offset_band import OffsetBand
 from ur_cartesian_driver.motion.plan.primitive import (
     Instruction,
@@ -73,6 +74,23 @@ class ReferencePath:
             )
         for array in arrays:
             array.setflags(write=False)
+
+    def since(self, time: float) -> ReferencePath:
+        """Return copies of the rows from a time [s] on, so that the path itself can be freed."""
+        row = max(int(np.searchsorted(self.time, time, side='right')) - 1, 0)
+        return ReferencePath(**{k: column[row:].copy() for k, column in self._columns().items()})
+
+    def __add__(self, other: ReferencePath) -> ReferencePath:
+        """Return this path and one that begins where this one ends."""
+        columns = {
+            name: np.concatenate([column, getattr(other, name)[1:]])
+            for name, column in self._columns().items()
+        }
+        keep_hemisphere(columns['poses'])
+        return ReferencePath(**columns)
+
+    def _columns(self) -> dict[str, Any]:
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
 
 class BlendEntry(NamedTuple):
@@ -141,6 +159,10 @@ class LateLines(Sequence[str]):
         lines = cache(make)
         return cls(range(count), lambda rows: lines()[rows.start : rows.stop])
 
+    def __add__(self, other: Sequence[str]) -> LateLines:
+        """Return these lines, followed by others."""
+        return LateLines.at_once(len(self) + len(other), lambda: [*self, *other])
+
     def __len__(self) -> int:
         """Return the number of lines."""
         return len(self._rows)
@@ -205,6 +227,27 @@ class PlannedRows(Rows[PlannedSegment]):
             outputs={i: segment.outputs for i, segment in enumerate(every) if segment.outputs},
         )
 
+    @classmethod
+    def of_pieces(
+        cls,
+        pieces: SplineRows,
+        waypoints: Int32s,
+        lengths: Floats,
+        angles: Floats,
+        report_lines: Sequence[str],
+    ) -> PlannedRows:
+        """Return pieces of a spline as rows; the parameters are columns."""
+        return cls(
+            waypoints=waypoints,
+            lengths=lengths,
+            angles=angles,
+            durations=pieces.durations,
+            blend_entries=zeros(len(pieces), 5),
+            joints=pieces.targets,
+            primitives=pieces,
+            report_lines=report_lines,
+        )
+
     @property
     def records(self) -> Indices:
         """The number of records of each row on the wire (n,): its primitive and its outputs."""
@@ -225,7 +268,7 @@ class PlannedRows(Rows[PlannedSegment]):
         for waypoint, kind in zip(self.waypoints.tolist(), classes(self.primitives), strict=True):
             if not issubclass(kind, Stop):
                 found |= dict.fromkeys(range(passed, waypoint + 1), kind.__name__)
-                passed = waypoint
+                passed = waypoint + 1
         return found
 
     def __len__(self) -> int:
@@ -337,7 +380,10 @@ class Plan:
     def joint_spline(self) -> JointSpline:
         """The joints over time, rests included, for a plan whose motions are all splines."""
         pieces: list[Spline] = []
-        for primitive in self.rows.primitives:
+        primitives = self.rows.primitives
+        if isinstance(primitives, SplineRows):
+            return JointSpline.of(self.start, primitives)
+        for primitive in primitives:
             if isinstance(primitive, Spline):
                 pieces.append(primitive)
             elif isinstance(primitive, Wait):  # a rest follows a motion

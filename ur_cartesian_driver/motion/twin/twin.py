@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from datetime import date
+from functools import lru_cache
 from math import isfinite
 import re
 from typing import Any
@@ -183,7 +184,13 @@ def laws_of(twin: Twin | None, turn_ratio: float) -> MotionLaws:
 
     :param turn_ratio: the assumed turn ratio.
     """
-    laws = ASSUMED_LAWS if twin is None else twin.laws
-    if twin is not None and 'turn_ratio' in twin.estimates:
-        return laws
-    return replace(laws, turn_ratio=turn_ratio)
+    if twin is None:
+        return _assumed_laws(turn_ratio)
+    return (
+        twin.laws if 'turn_ratio' in twin.estimates else replace(twin.laws, turn_ratio=turn_ratio)
+    )
+
+
+@lru_cache(maxsize=8)  # a plan asks for them again and again
+def _assumed_laws(turn_ratio: float) -> MotionLaws:
+    return replace(ASSUMED_LAWS, turn_ratio=turn_ratio)

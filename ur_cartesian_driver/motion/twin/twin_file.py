@@ -205,7 +205,7 @@ class _Reader:
         found: dict[str, yaml.Node] = {}
         for key, value in self._pairs(node, where):
             if key.value in found:
-                self._refuse(key, f'{key.value} stands twice; remove one of them')
+                self._refuse(key, f'{key.value} is given twice; remove one of them')
             if key.value not in known:
                 near = get_close_matches(key.value, known, n=1)
                 hint = f'{near[0]} is probably meant' if near else f'known are {", ".join(known)}'

@@ -17,21 +17,27 @@ the ending of a spline is a piece that brakes after the last point
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 import re
 
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.errors import GoalRefused
-from ur_cartesian_driver.motion.geometry.pose_rows import keep_hemisphere
-from ur_cartesian_driver.motion.geometry.vectors import Joints
+from ur_cartesian_driver.motion.errors import GoalRefused, TooFast
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Int32s
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import IOCommand, Segment
 from ur_cartesian_driver.motion.goal.goal_columns import goal_table, GoalTable, WaypointRows
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline, SAME_TIME
-from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
-from ur_cartesian_driver.motion.plan.primitive import Spline, SwitchOutput
+from ur_cartesian_driver.motion.plan.move_rows import SplineRows
+from ur_cartesian_driver.motion.plan.plan import (
+    LateLines,
+    Plan,
+    PlannedRows,
+    PlannedSegment,
+    ReferencePath,
+)
+from ur_cartesian_driver.motion.plan.primitive import SwitchOutput
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.append.appendable_goal import (
     AppendableGoal,
@@ -40,13 +46,14 @@ from ur_cartesian_driver.planning.append.appendable_goal import (
     numbered,
     ReplannablePoint,
 )
-from ur_cartesian_driver.planning.append.planned_part import PlannedPart, unreported_segment
+from ur_cartesian_driver.planning.append.planned_part import PlannedPart, unreported_piece
 from ur_cartesian_driver.planning.append.replaced_tail import cut_tail, cut_time, state_at
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.options import MAX_POINTS, PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.planner import plan as plan_goal
 from ur_cartesian_driver.planning.request.controlled_frame import retarget_to_tcp, tool_tips
+from ur_cartesian_driver.planning.request.field_rules import check_record
 from ur_cartesian_driver.planning.request.ignored_fields import ignored_remarks
 from ur_cartesian_driver.planning.request.joint_points import check_for_arm
 from ur_cartesian_driver.planning.spline.spline_planner import (
@@ -130,6 +137,8 @@ def plan_append(
     :param from_rest: whether the ending was sent, so that the arm is or will be at rest.
     :raises GoalRefused: the points are wrong; the text numbers points from the goal's start.
     """
+    for i, command in enumerate(appended.io_commands):
+        check_record(f'io_commands[{i}]', command)
     appended = replace(appended, io_commands=options.lead_times(appended.io_commands))
     before, cut = appendable, None
     appendable = cut_tail(before, cut_time(before, appended), arm)
@@ -137,11 +146,6 @@ def plan_append(
         assert appendable.state is not None
         cut, from_rest = appendable.state.time, False
     check_appended_points(appendable, appended, options)
-    options = replace(
-        options,
-        max_approach_distance=0.0,
-        max_points=min(options.max_points + REPLANNED_POINTS, MAX_POINTS),
-    )
     time, records_before = appendable.time, appendable.committed_records
     if from_rest:
         time, records_before = appendable.rest_time, appendable.records
@@ -159,7 +163,7 @@ def plan_append(
             return planner.append_spline(
                 rest, records_before, time + delay - appendable.last_client_time
             )
-        except GoalRefused as refusal:
+        except TooFast as refusal:  # more time changes nothing about other refusals
             last_refusal = refusal
     raise last_refusal
 
@@ -185,11 +189,8 @@ class _PartPlanner:
     def append_moves(self, records_before: int, start_time: float) -> AppendPlan:
         """Return a part made of robot motions, planned with the last motions before the part."""
         before, appended = self._before, self._appended
-        replannable, q_start, time_before = (
-            before.replannable,
-            before.q_rest,
-            before.last_client_time,
-        )
+        replannable, q_start = before.replannable, before.q_rest
+        time_before = before.last_client_time
         if replannable:
             q_start, time_before = replannable[0].q_before, replannable[0].time_before
         first = before.points - len(replannable)
@@ -205,10 +206,15 @@ class _PartPlanner:
             io_commands=self._pending_commands(first, start_time),
             keep_open=not appended.last,
         )
+        options = replace(
+            self._options,
+            max_approach_distance=0.0,
+            max_points=min(self._options.max_points + REPLANNED_POINTS, MAX_POINTS),
+        )
         # The first replanned motion was sent before: planning starts from the blend after it.
         running = replannable[0].planned if len(replannable) == REPLANNED_POINTS else None
         try:
-            plan = plan_goal(goal, self._at_rest(q_start), self._arm, self._options, running)
+            plan = plan_goal(goal, self._at_rest(q_start), self._arm, options, running)
         except GoalRefused as refusal:
             raise refusal.reworded(_renumber_text(str(refusal), first)) from None
         start_time += _blend_half(plan.segments[0]) - _blend_half(running) if running else 0.0
@@ -229,19 +235,20 @@ class _PartPlanner:
 
     def moves_part(self, plan: Plan, records_before: int, start_time: float) -> AppendPlan:
         """Return a part made of robot motions, the last of which is the ending."""
-        *others, last = plan.segments
-        time = start_time + sum(segment.duration for segment in others)
+        rows = plan.rows
+        *durations, last = rows.durations.tolist()
+        time = start_time + sum(durations)
         replannable = self._replannable(plan)
         timed = any(known.waypoint.time != 0.0 for known in replannable)
         next_goal = replace(
             self._before,
             time=time,
-            rest_time=time + last.duration,
-            q_rest=last.joints,
+            rest_time=time + last,
+            q_rest=vector6(rows.joints[-1].tolist()),
             replannable=replannable,
             outputs=self._commands_of_ending(plan, start_time),
         )
-        return self._part(plan, records_before, start_time, (last,), next_goal, timed=timed)
+        return self._part(plan, records_before, start_time, 1, next_goal, timed=timed)
 
     def _replannable(self, plan: Plan) -> tuple[ReplannablePoint, ...]:
         """Return the last points of the goal, with the state of the arm before each."""
@@ -276,7 +283,8 @@ class _PartPlanner:
         Records that precede the last motion are committed, even if they are due during it. Among
         equal commands, the earlier ones have the earlier records.
         """
-        ends = _end_times(plan.segments, start_time)
+        rows = plan.rows
+        ends = _end_times(rows.waypoints, rows.durations, start_time)
         commands = [
             *(
                 (ends[c.waypoint] + c.offset if c.waypoint in ends else end_time, c)
@@ -326,9 +334,9 @@ class _PartPlanner:
         segments, reference, begin = found.segments, found.reference, start
         if before.replanned is not None:
             pieces, path = before.replanned
-            segments = PlannedRows.of((*pieces, *segments))
+            segments = pieces + segments
             begin = state_at(before, before.time)
-            reference = _join_paths(path, reference)
+            reference = path + reference
         plan = Plan(
             goal=goal,
             segments=segments,
@@ -389,46 +397,46 @@ class _PartPlanner:
             for time, command in due_commands
             if time >= end.time - SAME_TIME and not self._appended.last
         )
-        ending = complete.segments[len(plan.segments) - bool(pending) :]
+        rows, moving = complete.rows, len(plan.segments)
         time, replanned = end.time, None
         if pending:
-            piece = plan.segments[-1]
-            time -= piece.duration
-            replanned = (piece,), _path_from(plan.reference, time)
-        last = complete.segments[-1]
+            piece = rows[moving - 1 : moving]
+            time -= float(piece.durations[0])
+            replanned = piece, plan.reference.since(time + 2.0 * SAME_TIME)
+        assert isinstance(rows.primitives, SplineRows)
         spline = JointSpline.of(
             begin.q,
-            (piece for piece in complete.rows.primitives if isinstance(piece, Spline)),
+            rows.primitives,
             velocities=begin.qd,
             accelerations=begin.qdd,
             start_time=start_time,
         )
-        records = np.cumsum(complete.rows.records)
         part = PlannedPart(
             spline=spline,
-            waypoints=plan.rows.waypoints,
-            records_before=records_before + np.append(0, records)[: len(plan.segments)],
+            waypoints=rows.waypoints[:moving],
+            records_before=records_before + (np.cumsum(rows.records) - rows.records)[:moving],
         )
         next_goal = replace(
             self._before,
             time=time,
-            rest_time=end.time + (last.duration if closing else 0.0),
-            q_rest=last.joints if closing else end.q,
+            rest_time=end.time + (float(rows.durations[-1]) if closing else 0.0),
+            q_rest=vector6(rows.joints[-1].tolist()) if closing else end.q,
             state=end,
             outputs=pending,
             replanned=replanned,
             parts=(*self._before.parts, part),
             commands=(*self._before.commands, *due_commands[len(self._before.outputs) :]),
         )
+        ending = len(rows) - moving + bool(pending)
         appended = self._part(complete, records_before, start_time, ending, next_goal, timed=True)
         return replace(appended, spline=spline)
 
-    def _stop(self, end: SplineState) -> tuple[PlannedSegment, ReferencePath]:
+    def _stop(self, end: SplineState) -> tuple[PlannedRows, ReferencePath]:
         """Return the piece that stops the arm after the last point, and the path of the piece."""
-        piece = plan_stop(end, self._arm, self._options.keep_open_deceleration)
+        piece = plan_stop(end, self._arm, self._options, self._points - 1)
         times = np.linspace(0.0, piece.duration, _STOP_ROWS + 1)
         q, _, _ = rows_along(piece, end, len(times))
-        return unreported_segment(piece, self._points - 1), ReferencePath(
+        return unreported_piece(piece, self._points - 1), ReferencePath(
             poses=tcp_rows(self._arm, self._T_flange_tcp, q),
             time=end.time + times,
             point=np.full(len(times), self._points - 1, dtype=np.int32),
@@ -438,38 +446,35 @@ class _PartPlanner:
     def _place_outputs(
         self,
         plan: Plan,
-        closing: tuple[PlannedSegment, ReferencePath] | None,
+        closing: tuple[PlannedRows, ReferencePath] | None,
         start_time: float,
     ) -> tuple[Plan, list[tuple[float, IOCommand]]]:
         """Return a plan with its stop and outputs, and the commands with their due times [s]."""
-        pieces, reference = plan.segments, plan.reference
-        segments = [replace(segment, outputs=()) for segment in pieces]
+        rows, reference = plan.rows, plan.reference
+        waypoints = rows.waypoints
         if closing is not None:
             stop, path = closing
-            pieces, reference = (*pieces, stop), _join_paths(reference, path)
+            rows, reference = rows + stop, reference + path
             # The stop leads to no point: outputs that are due during it come after the last point.
-            segments.append(replace(stop, waypoint=stop.waypoint + 1))
-        ends = _end_times(segments, start_time)
+            waypoints = np.append(waypoints, stop.waypoints + 1)
+        ends = _end_times(waypoints, rows.durations, start_time)
         due_commands = [
             *self._before.outputs,
             *((ends[c.waypoint] + c.offset, c) for c in self._appended.io_commands),
         ]
         commands = []
         for time, command in due_commands:
-            waypoint = max(command.waypoint, segments[0].waypoint)
+            waypoint = max(command.waypoint, int(waypoints[0]))
             offset = max(0.0, time - ends[waypoint])
             commands.append(replace(command, waypoint=waypoint, offset=offset))
         found = place_outputs(
-            PlannedRows.of(segments),
+            replace(rows, waypoints=waypoints, outputs={}),
             reference,
             {'io_commands': commands},
             start_time=start_time,
         )
-        segments = [
-            replace(segment, waypoint=piece.waypoint, report_line=piece.report_line)
-            for segment, piece in zip(found, pieces, strict=True)
-        ]
-        return replace(plan, segments=tuple(segments), reference=reference), due_commands
+        rows = replace(rows, outputs=found.outputs)
+        return replace(plan, segments=rows, reference=reference), due_commands
 
     # -- both ------------------------------------------------------------------------------------
 
@@ -478,18 +483,23 @@ class _PartPlanner:
         plan: Plan,
         records_before: int,
         start_time: float,
-        ending: Sequence[PlannedSegment],
+        ending: int,
         next_goal: AppendableGoal,
         *,
         timed: bool,
     ) -> AppendPlan:
-        """Return an append plan; ``next_goal`` also gets the counts of points and records."""
-        last, records = self._appended.last, records_before + _record_count(plan.segments)
-        ending_records = _record_count(ending)
+        """
+        Return an append plan; ``next_goal`` also gets the counts of points and records.
+
+        :param ending: the number of motions of the ending.
+        """
+        last, rows = self._appended.last, plan.rows
+        records = records_before + int(rows.records.sum())
+        ending_records = int(rows.records[len(rows) - ending :].sum())
         # After the last motion, the robot program waits until its outputs are switched.
+        outputs = rows.outputs.get(len(rows) - 1, ())
         delay = max(
-            (each.delay for each in plan.segments[-1].outputs if isinstance(each, SwitchOutput)),
-            default=0.0,
+            (each.delay for each in outputs if isinstance(each, SwitchOutput)), default=0.0
         )
         return AppendPlan(
             plan=replace(plan, goal=replace(plan.goal, keep_open=not last)),
@@ -534,19 +544,22 @@ class _PartPlanner:
 
 def _renumber_plan(plan: Plan, first: int, waypoint: int, start_time: float) -> Plan:
     """Return a plan from a waypoint on, renumbered by ``first`` and shifted in time."""
-    left_out = [s for s in plan.segments if s.waypoint + first < waypoint]
-    begin = sum(segment.duration for segment in left_out)
+    left_out = int(np.searchsorted(plan.rows.waypoints, waypoint - first))
+    begin, rows = sum(plan.rows.durations[:left_out].tolist()), plan.rows[left_out:]
     path = plan.reference
     path = replace(path, time=path.time + (start_time - begin), point=path.point + first)
+    lines = rows.report_lines
     return replace(
         plan,
-        segments=tuple(
-            replace(
-                s, waypoint=s.waypoint + first, report_line=_renumber_text(s.report_line, first)
-            )
-            for s in plan.segments[len(left_out) :]
+        segments=replace(
+            rows,
+            waypoints=rows.waypoints + first,
+            report_lines=LateLines.at_once(
+                len(rows), lambda: [_renumber_text(line, first) for line in lines]
+            ),
+            notes={row: _renumber_text(note, first) for row, note in rows.notes.items()},
         ),
-        reference=_path_from(path, start_time, SAME_TIME),
+        reference=path.since(start_time + SAME_TIME),
         find_slow_stretches=tuple,  # the plan's function would name other points
     )
 
@@ -556,33 +569,10 @@ def _renumber_text(text: str, first: int) -> str:
     return _NUMBER.sub(lambda found: f'{found[1]}{int(found[2]) + first}', text)
 
 
-def _path_from(
-    path: ReferencePath, start_time: float, tolerance: float = 2.0 * SAME_TIME
-) -> ReferencePath:
-    """Return copies of a path's rows from a time [s] on, so that the path itself can be freed."""
-    row = max(int(np.searchsorted(path.time, start_time + tolerance, side='right')) - 1, 0)
-    return ReferencePath(
-        **{each.name: getattr(path, each.name)[row:].copy() for each in fields(path)}
-    )
-
-
-def _join_paths(first: ReferencePath, second: ReferencePath) -> ReferencePath:
-    """Return two paths as one; the second begins where the first ends."""
-    columns = {
-        each.name: np.concatenate([getattr(first, each.name), getattr(second, each.name)[1:]])
-        for each in fields(ReferencePath)
-    }
-    keep_hemisphere(columns['poses'])
-    return ReferencePath(**columns)
-
-
-def _end_times(segments: Iterable[PlannedSegment], start_time: float) -> dict[int, float]:
+def _end_times(waypoints: Int32s, durations: Floats, start_time: float) -> dict[int, float]:
     """Return, by waypoint, the time [s] at which the motion to it ends."""
-    ends, now = {}, start_time
-    for segment in segments:
-        now += segment.duration
-        ends[segment.waypoint] = now
-    return ends
+    ends = np.cumsum(np.append(start_time, durations))[1:]
+    return dict(zip(waypoints.tolist(), ends.tolist(), strict=True))
 
 
 def _blend_half(segment: PlannedSegment) -> float:
@@ -592,7 +582,3 @@ def _blend_half(segment: PlannedSegment) -> float:
 
 def _output_key(output: IOCommand | SwitchOutput) -> tuple[object, ...]:
     return output.output, output.pin, output.value, output.domain
-
-
-def _record_count(segments: Sequence[PlannedSegment]) -> int:
-    return sum(1 + len(segment.outputs) for segment in segments)

@@ -21,12 +21,12 @@ from ur_cartesian_driver.motion.goal.goal_columns import (
     SegmentRows,
     WaypointRows,
 )
-from ur_cartesian_driver.motion.plan.plan import PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.plan.plan import PlannedRows, PlannedSegment, ReferencePath
 from ur_cartesian_driver.planning.append.planned_part import PlannedPart
+from ur_cartesian_driver.planning.geometry.curves import SAME_ANGLE, SAME_POSITION
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.field_rules import check_record
 from ur_cartesian_driver.planning.request.free_axis_rules import keep_open_error
-from ur_cartesian_driver.planning.request.goal_fields import point_field
+from ur_cartesian_driver.planning.request.goal_fields import long_segment_error, point_field
 from ur_cartesian_driver.planning.request.point_events.dwells import refuse_dwells_of_open_goals
 from ur_cartesian_driver.planning.request.point_events.registry import check_outputs
 from ur_cartesian_driver.planning.request.validate import check_list_lengths
@@ -116,7 +116,7 @@ class AppendableGoal:
     state: SplineState | None = None
     #: Pieces up to ``state``, with their path, that are sent (again) together with the next part,
     #: because outputs follow these pieces or a new tail begins in the middle of one of them.
-    replanned: tuple[tuple[PlannedSegment, ...], ReferencePath] | None = None
+    replanned: tuple[PlannedRows, ReferencePath] | None = None
     #: Commands that may not have been carried out, each with the motion time when it is due [s].
     outputs: tuple[tuple[float, IOCommand], ...] = ()
     #: The planned parts of a spline that are not passed, in the order of planning; each is valid
@@ -154,7 +154,6 @@ def check_appended_points(
                 f'request are {first} to {first + count - 1}',
                 'name one of these',
             )
-        check_record(f'io_commands[{i}]', command)
     # Only the new commands are checked, so that refusals number them as in this request.
     check_outputs(
         goal_table(
@@ -166,7 +165,7 @@ def check_appended_points(
         ),
         options,
     )
-    _check_times(appendable, appended)
+    _check_times(appendable, appended, options)
 
 
 def numbered(appended: AppendedPoints, first: int) -> tuple[IOCommand, ...]:
@@ -174,20 +173,31 @@ def numbered(appended: AppendedPoints, first: int) -> tuple[IOCommand, ...]:
     return tuple(shifted(command, -first) for command in appended.io_commands)
 
 
-def _check_times(appendable: AppendableGoal, appended: AppendedPoints) -> None:
-    """Refuse points that are not later than those before them, in client time."""
+def _check_times(
+    appendable: AppendableGoal, appended: AppendedPoints, options: PlanningOptions
+) -> None:
+    """Refuse points that are not later than those before them, or much later, in client time."""
     is_tail = appended.replace_from_time is not None
     times, first = WaypointRows.of(appended.waypoints).times, appendable.points
     if appendable.last_client_time == 0.0 and not times.any():
         return
-    if appendable.last_client_time == 0.0 and first > 1:
+    # The time 0 of a single point can also mean that the arm was there at the start.
+    moved = any(
+        known.planned.length > SAME_POSITION or known.planned.angle > SAME_ANGLE
+        for known in appendable.replannable
+        if known.planned is not None
+    )
+    if appendable.last_client_time == 0.0 and (first > 1 or moved):
         raise InvalidGoal(
             point_field(first, 'time_from_start'),
             f'is {times[0]:g} s, but the points before have no times',
             'set it to 0 in all points',
         )
     before = np.append(appendable.last_client_time, times[:-1])
-    for i in rows_where(times <= before)[:1]:
+    steps = times - before
+    for i in rows_where(np.isfinite(steps) & (steps > options.max_segment_time))[:1]:
+        raise long_segment_error(first + i, float(steps[i]), options.max_segment_time)
+    for i in rows_where(steps <= 0.0)[:1]:
         raise InvalidGoal(
             point_field(first + i, 'time_from_start'),
             f'is {times[i]:g} s, not later than the {before[i]:g} s '

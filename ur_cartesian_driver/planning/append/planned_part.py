@@ -12,7 +12,8 @@ from ur_cartesian_driver.motion.geometry.arrays import Indices, Int32s
 from ur_cartesian_driver.motion.geometry.polynomials import evaluate
 from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline, SAME_TIME
-from ur_cartesian_driver.motion.plan.plan import PlannedSegment
+from ur_cartesian_driver.motion.plan.move_rows import SplineRows
+from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows
 from ur_cartesian_driver.motion.plan.primitive import Spline
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
@@ -48,7 +49,7 @@ class PlannedPart:
         qd, qdd = (vector6(round(rate, _DIGITS) + 0.0 for rate in rates) for rates in (qd, qdd))
         return SplineState(time=time, q=q, qd=qd, qdd=ZERO6 if self._is_cubic(row) else qdd)
 
-    def piece(self, row: int, end_time: float) -> PlannedSegment:
+    def piece(self, row: int, end_time: float) -> PlannedRows:
         """Return the piece of a row, cut off at the motion time ``end_time`` [s]."""
         end = self.state(row, end_time)
         piece = Spline(
@@ -57,20 +58,14 @@ class PlannedPart:
             accelerations=None if self._is_cubic(row) else end.qdd,
             duration=round(end_time - self.begin(row), _TIME_DIGITS),
         )
-        return unreported_segment(piece, int(self.waypoints[row]))
+        return unreported_piece(piece, int(self.waypoints[row]))
 
     def _is_cubic(self, row: int) -> bool:
         return not self.spline.coefficients[row, 4:].any()
 
 
-def unreported_segment(piece: Spline, waypoint: int) -> PlannedSegment:
-    """Return a piece to a waypoint as a segment without a line in the report."""
-    return PlannedSegment(
-        primitive=piece,
-        waypoint=waypoint,
-        length=0.0,
-        angle=0.0,
-        duration=piece.duration,
-        joints=piece.target,
-        report_line='',
-    )
+def unreported_piece(piece: Spline, waypoint: int) -> PlannedRows:
+    """Return a piece to a waypoint as a row without a line in the report."""
+    number, none = np.array([waypoint], dtype=np.int32), np.zeros(1)
+    line = LateLines(range(1), lambda _: [''])
+    return PlannedRows.of_pieces(SplineRows.of([piece]), number, none, none, line)

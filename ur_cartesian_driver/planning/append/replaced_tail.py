@@ -10,7 +10,9 @@ If the cut is in the middle of a piece, a shorter piece is sent in place of that
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import reduce
 from math import ceil, inf
+from operator import add
 
 import numpy as np
 
@@ -117,7 +119,7 @@ def cut_tail(before: AppendableGoal, time: float, arm: Arm) -> AppendableGoal:
     if first < 0:
         raise AlreadySent(*first_replaceable(before, part.begin(1)))
     last = row if part.begin(row) < time - SAME_TIME else row - 1
-    pieces = tuple(part.piece(k, min(part.begin(k + 1), time)) for k in range(first, last + 1))
+    pieces = [part.piece(k, min(part.begin(k + 1), time)) for k in range(first, last + 1)]
     point, due_again = int(part.waypoints[row]), part.begin(first + 1) - SAME_TIME
     commands = tuple(one for one in before.commands if one[1].waypoint < point)
     return replace(
@@ -127,7 +129,7 @@ def cut_tail(before: AppendableGoal, time: float, arm: Arm) -> AppendableGoal:
         time=part.begin(first),
         state=part.state(row, time),
         last_client_time=round(time - before.time_offset, _TIME_DIGITS),
-        replanned=(pieces, _path(before, part, first, time, arm)) if pieces else None,
+        replanned=(reduce(add, pieces), _path(before, part, first, time, arm)) if pieces else None,
         commands=commands,
         outputs=tuple(one for one in commands if one[0] >= due_again),
         parts=tuple(each for each in before.parts if each.begin(0) < time),

@@ -211,11 +211,12 @@ class _FreePath:
         self.poses = poses
         self.references, self.rotations = self._references()
         if is_timed(goal) and goal.waypoints.times[0] == 0.0 and free[0]:
-            # The arm is already at this point: keep its orientation if that is allowed.
+            # The arm is already at this point: keep its orientation, or the nearest allowed one.
             turn = _wrapped(-self.rotations[:1], 0.5 * (self.low + self.high)[:1])
-            may = self.is_any[0] or self.low[0] <= turn[0] <= self.high[0]
+            if not self.is_any[0]:
+                turn = np.clip(turn, self.low[0], self.high[0])
             self.low, self.high = self.low.copy(), self.high.copy()
-            self.low[0] = self.high[0] = turn[0] if may else 0.0
+            self.low[0] = self.high[0] = turn[0]
             self.is_any[0] = self.is_open[0] = False
 
     def _references(self) -> tuple[Floats, Floats]:

@@ -29,6 +29,8 @@ from ur_cartesian_driver.planning.geometry.curves import (
 
 # Segments that go straight on or straight back, to within this angle [rad], have no fillet.
 _STRAIGHT = 1e-6
+# Of Gauss-Legendre quadrature.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 # Least radius of the fillet between segments that go straight back [m].
 _MIN_RADIUS = 1e-9
 
@@ -156,11 +158,10 @@ def _parabola_lengths(start: Floats, waypoint: Floats, end: Floats) -> Floats:
     eight points its error is a millionth (a thousandth for blends that lead nearly straight back).
     """
     u, w = waypoint - start, start - 2.0 * waypoint + end
-    nodes, weights = np.polynomial.legendre.leggauss(8)
-    s = 0.5 * (nodes + 1.0)
+    s = 0.5 * (_NODES + 1.0)
     # |u + s w|^2 = |u|^2 + 2 s u w + s^2 |w|^2
     uu, uw, ww = (np.einsum('ij,ij->i', a, b)[:, None] for a, b in ((u, u), (u, w), (w, w)))
-    lengths: Floats = np.sqrt(np.maximum(uu + s * (2.0 * uw + s * ww), 0.0)) @ weights
+    lengths: Floats = np.sqrt(np.maximum(uu + s * (2.0 * uw + s * ww), 0.0)) @ _WEIGHTS
     return lengths
 
 

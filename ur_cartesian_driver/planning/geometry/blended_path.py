@@ -110,7 +110,9 @@ class CurveRows:
 
     def put_arcs(self, row: Indices, arcs: ArcRows) -> None:
         """Replace lines of some rows by arcs between the same poses."""
-        if len(row) and not len(self.arcs.sweep):
+        if not len(row):
+            return
+        if not len(self.arcs.sweep):
             self.arcs = unset_arcs(len(self))
         for column, values in zip(self.arcs, arcs, strict=True):
             column[row] = values

@@ -190,17 +190,8 @@ class JointLineCurve:
         chords = np.linalg.norm(np.diff(tcp_rows(arm, T_flange_tcp, q)[:, :3], axis=0), axis=1)
         length = float(chords.sum())
         unevenness = samples * float(chords.max()) / length if length > 0.0 else 1.0
-        return cls(
-            arm,
-            T_flange_tcp,
-            q_start,
-            q_end,
-            arm.forward(q_start) @ T_flange_tcp,
-            arm.forward(q_end) @ T_flange_tcp,
-            length,
-            samples,
-            unevenness,
-        )
+        start, end = (arm.forward(q) @ T_flange_tcp for q in (q_start, q_end))
+        return cls(arm, T_flange_tcp, q_start, q_end, start, end, length, samples, unevenness)
 
     @property
     def travel(self) -> Joints:
@@ -261,7 +252,7 @@ def goal_arcs(
     :param start: (n, 7) the pose in base at which each segment begins; ``end``: the target. Where
         arcs are FIXED, ends and the starts after them are turned as the arcs arrive, in place.
     """
-    rows = np.flatnonzero(segments.types == SegmentType.CIRCULAR)
+    rows = np.flatnonzero(segments.types == int(SegmentType.CIRCULAR))
     if not len(rows):
         return rows, NO_ARCS, {}
     vias = transform_rows(T_base_frame, segments.vias[rows])

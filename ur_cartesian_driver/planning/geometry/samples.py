@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices, Int32s
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, CurveSequence
@@ -33,6 +34,8 @@ STEP_ANGLE = pi / 180.0
 #: are no farther apart than the maximum distance divided by _MIN_REFINEMENT.
 MIN_SAMPLES = 8
 _MIN_REFINEMENT = 1.25
+#: Maximum number of samples of a goal; each needs a quarter of a kilobyte while it is checked.
+MAX_SAMPLES = 2_000_000
 
 
 def joined_columns(parts: list[Part]) -> Iterator[NDArray[Any]]:
@@ -52,7 +55,9 @@ def counted(counts: Indices) -> tuple[Indices, Indices]:
 
 def group_begins(segments: Int32s) -> Indices:
     """Return the first row of each segment; ``segments`` (n,) must not decrease."""
-    return np.flatnonzero(np.diff(segments, prepend=segments[0] - 1))
+    changes = np.ones(len(segments), dtype=np.bool_)
+    np.not_equal(segments[1:], segments[:-1], out=changes[1:])
+    return np.flatnonzero(changes)
 
 
 def first_least(values: Floats, segments: Int32s) -> Indices:
@@ -70,6 +75,30 @@ def first_least(values: Floats, segments: Int32s) -> Indices:
 def last_greatest(values: Floats, segments: Int32s) -> Indices:
     """Return the row of the greatest value of each segment, the last one if there are several."""
     return len(values) - 1 - first_least(-values[::-1], -segments[::-1])[::-1]
+
+
+def check_sample_count(
+    count: Floats | Indices,
+    points: Indices | Int32s,
+    remedy: str,
+    *,
+    before: int = 0,
+    most: int = MAX_SAMPLES,
+) -> None:
+    """
+    Refuse a goal that needs too many samples.
+
+    :param count: (n,) the number of samples of each part; ``points``: (n,) the point to which it
+        leads.
+    :param before: the number of samples on the path before these parts.
+    """
+    if (total := before + count.sum()) > most:
+        raise InvalidGoal(
+            'trajectory.points',
+            f'describe a path whose check needs {total:.3g} samples, more than {most:,}, most of '
+            f'all on the way to points[{points[np.argmax(count)]}]',
+            f'{remedy}, or split the goal',
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

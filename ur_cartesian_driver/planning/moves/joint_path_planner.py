@@ -36,7 +36,11 @@ from ur_cartesian_driver.motion.goal.goal_columns import (
     WaypointRows,
 )
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SAME_ANGLE, SAME_POSITION
-from ur_cartesian_driver.planning.geometry.samples import CurvePieces, joined_columns
+from ur_cartesian_driver.planning.geometry.samples import (
+    check_sample_count,
+    CurvePieces,
+    joined_columns,
+)
 from ur_cartesian_driver.planning.moves.path_samples import BlendSamples, PathSamples, speed_bounds
 from ur_cartesian_driver.planning.moves.segment_drafts import SegmentDrafts
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
@@ -61,6 +65,8 @@ from ur_cartesian_driver.planning.request.blend_limits import (
 )
 from ur_cartesian_driver.planning.request.goal_fields import (
     FOLLOWS_BLEND_LAWS,
+    IS_LINEAR,
+    IS_PROCESS,
     point_field,
     segment_field,
 )
@@ -76,8 +82,10 @@ _MAX_LINE_OFFSET = 0.05
 #: Maximum number of segments in the first run, if lines may become joint moves; the maximum
 #: doubles after each solved run, and is reset after a replacement.
 _FIRST_RUN = 8
+#: Maximum number of samples of a goal: a million short segments with blends need three million.
+_MAX_SAMPLES = 4_000_000
 
-_JOINT, _LINEAR, _PROCESS = SegmentType.JOINT, SegmentType.LINEAR, SegmentType.PROCESS
+_JOINT = SegmentType.JOINT
 #: Refusals after which a line or an arc can be replaced by a joint move.
 _NO_STRAIGHT_PATH = (InvalidPosture, NearSingularity, JointLimitExceeded, Unreachable)
 
@@ -123,6 +131,7 @@ class JointPathPlanner:
         """
         self.q_start = self._q = q
         self._parts: list[PathSamples] = []
+        self._sample_count = 0
         self._drafts = SegmentDrafts(
             self.goal, self.targets, begin, T_base_tcp, self.options, self.remarks
         )
@@ -179,6 +188,7 @@ class JointPathPlanner:
     def _add(self, joint_path: JointPath, measures: Floats) -> None:
         """Add the samples of a joint path; the next run begins in its last configuration."""
         self._parts.append(PathSamples.of(joint_path, measures))
+        self._sample_count += len(joint_path.q)
         if len(joint_path.q):
             self._q = vector6(joint_path.q[-1].tolist())
 
@@ -186,14 +196,16 @@ class JointPathPlanner:
         """Make the blends of a run and the blend into it; leave room for the blend after it."""
         drafts, path, first = self._drafts, self._path, max(k - 1, 0)
         path.remove_blends(first, stop)
+        if not drafts.is_blended[first:stop].any():
+            return
         rows = first + np.flatnonzero(drafts.is_blended[first:stop])
         by_laws = FOLLOWS_BLEND_LAWS[drafts.kinds]
         reach = drafts.radii * np.where(by_laws, self._laws.blend_begin, 1.0)
         path.leave(rows, reach[rows])
         made = rows[rows < stop - 1]
-        fillet = (drafts.kinds[made] == _PROCESS) & (drafts.kinds[made + 1] == _PROCESS)
+        fillet = IS_PROCESS[drafts.kinds[made]] & IS_PROCESS[drafts.kinds[made + 1]]
         path.make_blends(made, drafts.radii[made], reach[made], fillet)
-        is_line = drafts.kinds == _LINEAR
+        is_line = IS_LINEAR[drafts.kinds]
         measured = made[is_line[made] & is_line[made + 1]]
         path.blend_tolerance[measured] *= self._blend_uncertainty
         for row in rows_where(path.u_join[first:stop] > path.u_leave[first:stop]):
@@ -227,7 +239,15 @@ class JointPathPlanner:
     def _curve_pieces(self, pieces: Floats) -> CurvePieces:
         """Return the curve pieces of rows (n, 3): curve number, begin and end of each piece."""
         number, begin, end = pieces.T
-        return CurvePieces.of(self._path, self._drafts.begin, number.astype(np.intp), begin, end)
+        found = CurvePieces.of(self._path, self._drafts.begin, number.astype(np.intp), begin, end)
+        check_sample_count(
+            found.sample_count,
+            found.index,
+            'check the positions',
+            before=self._sample_count,
+            most=_MAX_SAMPLES,
+        )
+        return found
 
     def _arrivals(self, k: int, stop: int, joint_path: JointPath) -> Floats:
         """Return the configurations (n, 6) at the waypoints of solved segments."""
@@ -406,8 +426,8 @@ class JointPathPlanner:
         segment = SegmentRows.of([Segment(type=geometries.segments[0].type)])
         return replace(
             geometries,
-            waypoints=geometries.waypoints.with_first(waypoint),
-            segments=geometries.segments.with_first(segment),
+            waypoints=waypoint + geometries.waypoints[1:],
+            segments=segment + geometries.segments[1:],
             waits=waits,
         )
 

@@ -291,6 +291,8 @@ class MoveChain:
             times = _carry_out(moves, self._handed.take(rows))
             self.times.put(rows, times)
             rows = rows[(moves.tail > 0.0) & ((rows > 0) | (self._first is None))]
+            if not len(rows):
+                return
             new = _hand_over(self.moves.take(rows), self.times.take(rows))
             old = self._handed.take(rows + 1)
             changed = np.zeros(len(rows), dtype=np.bool_)
@@ -316,13 +318,14 @@ class MoveChain:
         rate: Floats,
         max_rate: Floats,
         at_rate: Callable[[Indices, Floats], Moves],
-    ) -> None:
+    ) -> Floats:
         """
         Change the speeds so that the moves take the wanted times, as far as possible.
 
         :param wanted: times from point to point (n,) [s]; NaN = the move stays as it is.
         :param rate: rates of the moves (n,) [1/s], changed in place up to ``max_rate``.
         :param at_rate: function of rows and rates that returns the moves.
+        :returns: the times that the moves take (n,) [s].
         """
         asked = np.isfinite(wanted)
         asked[0] &= self._first is None
@@ -338,7 +341,7 @@ class MoveChain:
             slow, fast = (off > _IN_TIME) & (rate < max_rate), (off < -_IN_TIME) & (rate > lowest)
             rows = np.flatnonzero(asked & (slow | fast))
             if not len(rows):
-                return
+                return spent
             rate[rows] = _fit(
                 lambda rows, x: self.durations_with(rows, at_rate(rows, x)),
                 rows,
@@ -349,6 +352,7 @@ class MoveChain:
             )
             self.moves.put(rows, at_rate(rows, rate[rows]))
             self.follow(rows)
+        return self.times.durations
 
 
 def _carry_out(moves: Moves, handed: Handover) -> MoveTimes:

@@ -78,7 +78,7 @@ class SegmentDrafts:
         self.segments = goal.motions[begin:]
         types = self.segments.types
         #: (n,) type numbers; AUTO has become LINEAR, and a segment replaced by a joint move JOINT.
-        self.kinds = np.where(types == SegmentType.AUTO, SegmentType.LINEAR, types)
+        self.kinds = np.where(types == int(SegmentType.AUTO), int(_LINEAR), types)
         #: (n,) whether each segment is a straight line in joint space.
         self.is_joint_move: Flags = IS_JOINT_MOVE[self.kinds]
         # Remarks with their rows, by which they are sorted below.
@@ -139,7 +139,7 @@ class SegmentDrafts:
         suspect[[*faults]] = True
         for row in rows_where(suspect):
             self._check(row, pose_from_row(starts[row]), faults.get(row))
-        for row in rows_where(self.segments.arc_modes == ArcMode.FIXED):
+        for row in rows_where(self.segments.arc_modes == int(ArcMode.FIXED)):
             remarks += [(row, text) for text in self._turn_remarks(row, pose_from_row(ends[row]))]
         return curves
 

@@ -37,6 +37,7 @@ from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometr
 from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_change
 from ur_cartesian_driver.planning.request.goal_fields import (
+    IS_ARC,
     IS_JOINT_MOVE,
     point_field,
     segment_field,
@@ -74,7 +75,7 @@ def segment_primitives(
     :raises InvalidPosture: the arm would not pass a via in the configuration of the via's posture.
     """
     kinds, vias = geometries.kinds, geometries.segments.vias
-    arcs = np.flatnonzero(kinds == SegmentType.CIRCULAR)
+    arcs = np.flatnonzero(IS_ARC[kinds])
     if len(arcs):
         vias = vias.copy()
         vias[arcs] = transform_rows(paths.goal.T_base_frame, vias[arcs])

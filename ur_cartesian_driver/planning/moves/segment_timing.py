@@ -18,19 +18,19 @@ import numpy as np
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
-from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_columns import rows_where
 from ur_cartesian_driver.motion.plan.plan import PlannedSegment
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
 from ur_cartesian_driver.planning.moves.move_chain import MoveChain, Moves, ramp_rate
 from ur_cartesian_driver.planning.moves.path_samples import BlendSamples
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
+from ur_cartesian_driver.planning.moves.speed_limits import arc_limit
 from ur_cartesian_driver.planning.moves.speed_requests import RAMP_SHARE, SpeedRequests
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
+    IS_ARC_OR_PROCESS,
     point_field,
     segment_field,
-    type_table,
 )
 
 #: Times that differ by less than the factor ``_NEARLY`` are the same. A time that is exceeded by
@@ -38,8 +38,6 @@ from ur_cartesian_driver.planning.request.goal_fields import (
 _NEARLY, _KEPT = 1.0 + 1e-5, 1.002
 #: Smallest speed or acceleration that the wire, which transmits millionths, carries accurately.
 MIN_SPEED = 1e-5
-#: Motions whose blend the robot skips if the tool covers the blend radius in one control cycle.
-_NEEDS_A_CYCLE = type_table((SegmentType.CIRCULAR, SegmentType.PROCESS))
 #: A limit exceeded by less than this factor counts as kept.
 _WITHIN = 1.0 + 1e-6
 #: Greatest number of rounds in which moves that are too fast are slowed.
@@ -102,7 +100,10 @@ class SegmentTimings:
         self._arc_time = distance / np.sqrt(options.max_linear_acceleration * radius)
         self._arc_leads = self._arc_time > np.maximum(blend_samples.joint_time, self._tool_time)
         n = len(geometries)
-        does_else = np.isin(geometries.begin + np.arange(n), list(stops))
+        does_else = np.zeros(n, dtype=np.bool_)
+        does_else[[point - geometries.begin for point in stops if point >= geometries.begin]] = (
+            True
+        )
         does_else[0] |= geometries.waits
         #: The requested speeds and times, with remarks on changes due to the limits.
         self.requests = requests = SpeedRequests(geometries, options, model, does_else, running)
@@ -136,8 +137,7 @@ class SegmentTimings:
         """Meet the times within the limits; a move that cannot meet its time takes longer."""
         for _ in range(_MAX_ROUNDS):
             wanted = self._wanted - self._ahead + np.append(0.0, self._ahead[:-1])
-            self.chain.meet(wanted, self._rate, self._max_rate, self._at_rate)
-            late = self.chain.times.durations - wanted
+            late = self.chain.meet(wanted, self._rate, self._max_rate, self._at_rate) - wanted
             late[~((late > wanted * (_NEARLY - 1.0)) & (self._rate >= self._max_rate))] = 0.0
             if not self._slow_down() and not self._go_ahead(late):
                 break
@@ -234,6 +234,8 @@ class SegmentTimings:
     def _slow_blends(self, rate: Floats, speed: Floats) -> None:
         """Lower, in place, the rates and speeds of moves whose blends exceed a limit."""
         samples, times = self._samples, self.chain.times
+        if not len(samples.index):
+            return
         after = samples.index - self._geometries.begin + 1
         begin, end = times.begin_rate[after], times.end_rate[after]
         # A measured law may make a blend slower, but never the arm faster than by the assumed law.
@@ -270,11 +272,7 @@ class SegmentTimings:
         if self._arc_leads[sample]:
             point = samples.index[sample]
             radius = self._geometries.path.arc_radius[point - self._geometries.begin]
-            return SpeedLimit(
-                SlowCause.ACCELERATION_LIMIT,
-                f'max_linear_acceleration = {self.options.max_linear_acceleration:g} m/s^2 (in '
-                f'the blend at point {point}, an arc with a radius of {1e3 * radius:.3g} mm)',
-            )
+            return arc_limit(self.options, f'in the blend at point {point},', float(radius))
         if samples.joint_time[sample] < self._tool_time[sample]:
             text = f'max_tool_speed = {self.options.max_tool_speed:g} m/s'
             return SpeedLimit(SlowCause.TOOL_LIMIT, text)
@@ -329,7 +327,8 @@ class SegmentTimings:
         takes_too_long = self.wire_times > self.options.max_segment_time
         slowest = np.minimum(self.velocities, self.accelerations)
         too_slow = by_speed & (slowest < MIN_SPEED)
-        needs_a_cycle = _NEEDS_A_CYCLE[self._geometries.kinds] & path.has_blend_after
+        # Their blend is skipped if the tool covers its radius in one control cycle.
+        needs_a_cycle = IS_ARC_OR_PROCESS[self._geometries.kinds] & path.has_blend_after
         # A blend that is too small for the requested speed is refused, not passed slowly.
         asked = np.where(self._is_slowed_in_arc(), requests.speed, self.velocities)
         too_small = needs_a_cycle & (path.radius < asked * self._model.control_cycle)

@@ -16,13 +16,14 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
-from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
+from ur_cartesian_driver.motion.goal.goal import ArcMode
 from ur_cartesian_driver.motion.goal.goal_columns import rows_where
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
 from ur_cartesian_driver.planning.geometry.blended_path import CurveRows
 from ur_cartesian_driver.planning.geometry.curves import SAME_POSITION
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.goal_fields import IS_ARC, IS_ARC_OR_PROCESS, IS_JOINT
 
 #: Lower bound of lengths, for a first segment that ends where the robot already is.
 _MIN_LENGTH = 1e-9
@@ -40,9 +41,7 @@ class SpeedLimits:
         #: Whether the tool's position changes; if not, the segment only turns the tool.
         self.translates: Flags = curves.length > SAME_POSITION
         self.is_optimized = geometries.is_optimized
-        turns_with_arc = (kinds == SegmentType.CIRCULAR) & (
-            geometries.segments.arc_modes == ArcMode.FIXED
-        )
+        turns_with_arc = IS_ARC[kinds] & (geometries.segments.arc_modes == int(ArcMode.FIXED))
         #: Whether the turn of the tool, or of a joint, leads.
         self.is_turn: Flags = ~self.is_optimized & (
             curves.is_joint_line | ((curves.length < curves.angle) & ~turns_with_arc)
@@ -56,13 +55,15 @@ class SpeedLimits:
         times = np.where(self.is_optimized, 0.0, self._bounds.times)
         joint_speed = np.where(times > 0.0, self.length / np.maximum(times, 1e-300), inf)
         self._joint = self._bounds.joints.copy()
-        self._is_joint_move = (kinds == SegmentType.JOINT) & curves.is_joint_line
+        self._is_joint_move = IS_JOINT[kinds] & curves.is_joint_line
         if len(rows := np.flatnonzero(self._is_joint_move)):
             joint_speed[rows], self._joint[rows] = self._joint_moves(rows, curves)
-        tool_speed = self._tool_speed(curves)
-        self._is_joint_limit = joint_speed < tool_speed
+        tool_speed, self._arcs = self._tool_speed(curves), curves.arcs
+        arc_speed = self._arc_speed(curves)
+        self._is_arc_limit = arc_speed < np.minimum(joint_speed, tool_speed)
+        self._is_joint_limit = ~self._is_arc_limit & (joint_speed < tool_speed)
         #: Maximum speed of the leading quantity.
-        self.speed: Floats = np.minimum(joint_speed, tool_speed)
+        self.speed: Floats = np.minimum.reduce([joint_speed, tool_speed, arc_speed])
         #: Maximum acceleration of the leading quantity.
         self.acceleration = self._acceleration(curves)
         # Lower the limits, so that they hold even if the robot turns the tool at up to
@@ -70,7 +71,7 @@ class SpeedLimits:
         turn = np.minimum(curves.angle, self.length)  # a FIXED arc turns the tool by the arc angle
         ratio = max(options.turn_ratio, options.laws.turn_ratio)
         counted = np.maximum(curves.length, turn / ratio) / self.length
-        ahead = (kinds == SegmentType.CIRCULAR) | (kinds == SegmentType.PROCESS)
+        ahead = IS_ARC_OR_PROCESS[kinds]
         faster = np.where(ahead, np.minimum(1.0, counted), 1.0)
         self.speed *= faster
         self.acceleration *= faster
@@ -85,6 +86,8 @@ class SpeedLimits:
 
     def limit(self, row: int) -> SpeedLimit:
         """Return the limit on the speed of a segment."""
+        if self._is_arc_limit[row]:
+            return arc_limit(self._options, 'on', float(self._arcs.radius[row]))
         if not self._is_joint_limit[row]:
             text = f'max_tool_speed = {self._options.max_tool_speed:g} m/s'
             return SpeedLimit(SlowCause.TOOL_LIMIT, text)
@@ -118,6 +121,17 @@ class SpeedLimits:
         speed = self._options.max_tool_speed / np.maximum(per_unit, 1e-300)
         return np.where(self.translates, speed, inf)
 
+    def _arc_speed(self, curves: CurveRows) -> Floats:
+        """
+        Return the greatest speeds (n,) of the leading quantities on arcs; inf on other curves.
+
+        A tool with the speed v on a circle of radius r has the acceleration v^2 / r.
+        """
+        speed, at = np.full(len(self.length), inf), np.flatnonzero(curves.is_arc)
+        fastest = np.sqrt(self._options.max_linear_acceleration * curves.arcs.radius[at])
+        speed[at] = fastest * self.length[at] / np.maximum(curves.length[at], 1e-300)
+        return speed
+
     def _acceleration(self, curves: CurveRows) -> Floats:
         options, length = self._options, self.length
         # Translation and turn of the tool per unit of the leading quantity.
@@ -128,3 +142,12 @@ class SpeedLimits:
             options.max_angular_acceleration / np.maximum(angular, 1e-300),
         )
         return np.where(self._is_joint_move, options.max_joint_acceleration, bound)
+
+
+def arc_limit(options: PlanningOptions, where: str, radius: float) -> SpeedLimit:
+    """Return the limit on the speed on an arc; ``where``: its place, before 'an arc'."""
+    return SpeedLimit(
+        SlowCause.ACCELERATION_LIMIT,
+        f'max_linear_acceleration = {options.max_linear_acceleration:g} m/s^2 ({where} an arc '
+        f'with a radius of {1e3 * radius:.3g} mm)',
+    )

@@ -26,8 +26,11 @@ from ur_cartesian_driver.planning.moves.speed_limits import SpeedLimits
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     FOLLOWS_BLEND_LAWS,
+    IS_ARC_OR_PROCESS,
+    IS_JOINT,
+    IS_LINEAR,
+    IS_PROCESS,
     point_field,
-    type_table,
 )
 from ur_cartesian_driver.planning.request.program_features import takes_times
 
@@ -39,9 +42,7 @@ RAMP_SHARE = 1.0 / 3.0
 #: not published. It is only used to estimate the time of such a move.
 _OPTIMIZED_JOINT_ACCELERATION = 40.0
 #: Motions that accept a time on the wire.
-_TIMED_ON_WIRE = type_table((SegmentType.LINEAR, SegmentType.JOINT))
-#: Motions that accept no time, and whose speed has not been measured if the turn leads.
-_UNMEASURED_TURNS = type_table((SegmentType.CIRCULAR, SegmentType.PROCESS))
+_TIMED_ON_WIRE = IS_LINEAR | IS_JOINT
 #: Ratios of peak speed to mean speed of a timed move: ``_PEAK`` for the trapezoid in thirds;
 #: ``_PEAK_OF_TURN`` for the triangle that results on a line whose turn leads, if the robot turns
 #: the tool at a higher number [rad/s] than it moves the tool [m/s].
@@ -117,7 +118,7 @@ class SpeedRequests:
         self._kinds, self._curves = geometries.kinds, geometries.path.curves
         self.length: Floats = limits.length
         #: Whether each segment is a line on which the turn leads.
-        self.turn_leads_line = limits.is_turn & (self._kinds == SegmentType.LINEAR)
+        self.turn_leads_line = limits.is_turn & IS_LINEAR[self._kinds]
         self.peak = np.where(self.turn_leads_line, _PEAK_OF_TURN, _PEAK)
         # The length that the robot uses, by the turn ratio, as a fraction of the leading length.
         ratio = options.laws.turn_ratio
@@ -189,7 +190,7 @@ class SpeedRequests:
             self.turn_leads_line, 1.0 / (1.0 + np.maximum(1.0, 2.0 * self._counted)), RAMP_SHARE
         )
         fillet, arc = path.fillet & after, path.blend_length
-        at_radius = after & (self._kinds == SegmentType.PROCESS)
+        at_radius = after & IS_PROCESS[self._kinds]
         # Lengths per unit of ``s``.
         leaving = np.maximum(2.0 * tail, 1e-12)
         joining = np.maximum(2.0 * head, 1e-12)
@@ -274,26 +275,25 @@ class SpeedRequests:
         choices = (
             (segments.velocities > 0.0, np.maximum(segments.velocities, _TINY)),
             (limits.is_optimized, options.optimized_velocity),
-            (kinds == SegmentType.JOINT, options.joint_velocity),
+            (IS_JOINT[kinds], options.joint_velocity),
             (speeds > 0.0, np.maximum(speeds, _TINY)),
             (~limits.translates, options.angular_velocity),
-            (limits.is_turn & (kinds != SegmentType.LINEAR), both),
+            (limits.is_turn & ~IS_LINEAR[kinds], both),
         )
-        conditions = [condition for condition, _ in choices]
-        self._source = np.select(conditions, range(len(choices)), len(choices))
-        return np.select(conditions, [speed for _, speed in choices], options.linear_velocity)
+        found = np.full(len(kinds), options.linear_velocity)
+        self._source[:] = len(choices)
+        for number, (condition, speed) in reversed([*enumerate(choices)]):
+            self._source[condition] = number
+            found = np.where(condition, speed, found)
+        return found
 
     def _default_accelerations(self) -> Floats:
         options = self._options
-        return np.select(
-            [self.limits.is_optimized, self._kinds == SegmentType.JOINT, self.limits.translates],
-            [
-                options.optimized_acceleration,
-                options.joint_acceleration,
-                options.linear_acceleration,
-            ],
-            options.angular_acceleration,
+        of_tool = np.where(
+            self.limits.translates, options.linear_acceleration, options.angular_acceleration
         )
+        moves = np.where(IS_JOINT[self._kinds], options.joint_acceleration, of_tool)
+        return np.where(self.limits.is_optimized, options.optimized_acceleration, moves)
 
     def _turning_lines(self, velocity: Floats, acceleration: Floats) -> None:
         """
@@ -340,7 +340,8 @@ class SpeedRequests:
     def _by_time(self) -> None:
         """Request times."""
         geometries, limits, timed = self.geometries, self.limits, self.has_wire_time
-        unmeasured = ~timed & limits.is_turn & _UNMEASURED_TURNS[self._kinds]
+        # How fast these run if the turn leads has not been measured.
+        unmeasured = ~timed & limits.is_turn & IS_ARC_OR_PROCESS[self._kinds]
         for row in rows_where(unmeasured)[:1]:
             raise InvalidGoal(
                 point_field(geometries.begin + row, 'time_from_start'),
@@ -355,7 +356,7 @@ class SpeedRequests:
         self.allowed_acceleration, most = most, np.minimum(most, _UNLIMITED)
         # Speeding up, cruising and braking take a third of the time each; a move that is blended
         # begins to brake for its point only in the blend.
-        brakes = path.has_blend_after & (self._kinds != SegmentType.PROCESS)
+        brakes = path.has_blend_after & ~IS_PROCESS[self._kinds]
         tail = np.where(brakes, self.length * (1.0 - path.u_leave), inf)
         needed = np.maximum(4.5 * length / self.time**2, (length / self.time) ** 2 / tail)
         by_speed = np.where(own > 0.0, own, np.maximum(self._default_accelerations(), needed))

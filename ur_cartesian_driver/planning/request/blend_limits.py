@@ -13,7 +13,7 @@ import numpy as np
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.goal_fields import is_spline, segment_field
+from ur_cartesian_driver.planning.request.goal_fields import is_spline, is_timed, segment_field
 
 #: The laws that together determine path and time of a blend.
 BLEND_LAWS = ('blend_begin', 'blend_shape', 'blend_speed_ratio')
@@ -24,6 +24,8 @@ def check_blends(goal: GoalTable, options: PlanningOptions) -> None:
     if is_spline(goal):
         return
     radii = goal.segments.blend_radii
+    if is_timed(goal) and goal.waypoints.times[0] == 0.0 and len(radii):
+        radii = np.append(0.0, radii[1:])  # the arm is at the first point already
     if not radii.any():
         return
     after = np.append(radii[1:-1], 0.0)  # the last point is never blended

@@ -29,6 +29,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     is_spline,
     is_timed,
     point_field,
+    resolve_execution_mode,
     segment_field,
 )
 
@@ -119,12 +120,13 @@ def _check_no_rotation(goal: GoalTable, T_base_start: Pose) -> None:
     points, segments = goal.waypoints, goal.motions
     start = goal.T_base_frame.inverse() @ T_base_start
     follows_path = ~IS_JOINT_MOVE[segments.types]
+    takes_joint_moves = not resolve_execution_mode(goal).traits.is_spline
     if is_timed(goal) and points.times[0] == 0.0:
         follows_path[0] = False
     for i in rows_where(follows_path):
         angle = (points.pose(i - 1) if i > 0 else start).angle_to(points.pose(i))
         segment = segments[i]
-        joint = '' if is_spline(goal) else 'use JOINT for that segment, '
+        joint = 'use JOINT for that segment, ' if takes_joint_moves else ''
         remedy = f'keep the orientation, {joint}or set allow_tcp_change to true'
         if angle > MAX_FIXED_ANGLE:
             raise InvalidGoal(

@@ -70,6 +70,8 @@ def check_record(
     for each in goal_fields(type(record) if kind is None else kind):
         field = f'{where}.{each.message_name}' if where else each.message_name
         value = getattr(record, each.name)
+        if value == each.default:
+            continue
         if each.form is Form.CHOICE:
             _check_member(field, value, each.type)
         elif each.form is Form.POSE and value is not None:
@@ -105,9 +107,11 @@ def _check_rows(
     """Check all rows at once; pass only the suspect ones to :func:`check_record`."""
     fine = np.ones(len(rows), dtype=np.bool_)
     for each in rows.columns():
+        if rows.is_default(each):
+            continue
         column, field = getattr(rows, each.name), each.field
-        if field.form is Form.CHOICE:
-            fine &= (column == np.array(list(field.type))[:, None]).any(axis=0)
+        if field.form is Form.CHOICE:  # numbered from 0
+            fine &= (column >= 0) & (column < len(field.type))
         elif field.form is Form.POSE:
             is_pose = np.isfinite(column).all(axis=1) & _are_units(column[:, 3:])
             fine &= is_pose | ~getattr(rows, each.mask) if each.mask else is_pose

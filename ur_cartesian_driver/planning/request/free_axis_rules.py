@@ -21,6 +21,8 @@ _ROUNDING = 1e-3
 def check_free_axes(goal: GoalTable, options: PlanningOptions) -> None:
     """Refuse invalid ranges, different free axes, and free axes with FIXED arcs or keep_open."""
     segments = goal.segments
+    if not any(map(np.any, (segments.free_axes, segments.free_minima, segments.free_maxima))):
+        return
     free = segments.free_axes != FreeAxis.NONE
     low, high = segments.free_minima, segments.free_maxima
     too_wide = high - low > tau + _ROUNDING

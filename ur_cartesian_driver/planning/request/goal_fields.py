@@ -16,23 +16,23 @@ from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 
 
 def type_table(types: Collection[SegmentType]) -> Flags:
-    """Return an array by segment type, True for ``types``; indexing it is faster than np.isin."""
+    """
+    Return an array by segment type, True for ``types``.
+
+    Indexing it is faster than np.isin, and than to compare an array with a member.
+    """
     return np.array([kind in types for kind in SegmentType])
 
 
+IS_LINEAR, IS_JOINT = type_table((SegmentType.LINEAR,)), type_table((SegmentType.JOINT,))
+IS_ARC, IS_PROCESS = type_table((SegmentType.CIRCULAR,)), type_table((SegmentType.PROCESS,))
+IS_ARC_OR_PROCESS = IS_ARC | IS_PROCESS
 _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 #: By segment type: whether it moves the tool on a straight line; whether it is a straight line in
 #: joint space; whether its speeds are fractions of the robot's limits; and whether it takes a
 #: speed of the tool.
-IS_STRAIGHT = type_table(
-    (
-        SegmentType.AUTO,
-        SegmentType.LINEAR,
-        SegmentType.PROCESS,
-        SegmentType.OPTIMIZED_LINEAR,
-    )
-)
 IS_JOINT_MOVE = type_table((SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT))
+IS_STRAIGHT = ~(IS_JOINT_MOVE | IS_ARC)
 IS_OPTIMIZED = type_table(_OPTIMIZED)
 TAKES_TOOL_SPEED = ~type_table((SegmentType.JOINT, *_OPTIMIZED))
 #: By segment type: whether the blend behind it follows the measured laws of blends. Those of

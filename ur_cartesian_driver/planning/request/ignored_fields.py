@@ -12,14 +12,23 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, rows_where
 from ur_cartesian_driver.motion.plan.slow_stretch import name_points
-from ur_cartesian_driver.planning.request.goal_fields import is_timed, TAKES_TOOL_SPEED, type_table
+from ur_cartesian_driver.planning.request.goal_fields import (
+    is_rounded,
+    is_timed,
+    TAKES_TOOL_SPEED,
+    type_table,
+)
 
 #: Types of segments that, if the goal has times, are sent with a time and ignore acceleration.
 _IS_TIMED = type_table((SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT))
 
 
-def ignored_remarks(goal: GoalTable, first: int = 0) -> list[str]:
-    """Return a remark for each field without effect; the first point has the number ``first``."""
+def ignored_remarks(goal: GoalTable, first: int = 0, translates: Flags | None = None) -> list[str]:
+    """
+    Return a remark for each field without effect; the first point has the number ``first``.
+
+    :param translates: (n,) whether each segment moves the tool; None = not known.
+    """
     remarks: list[str] = []
     points, segments, motions = goal.waypoints, goal.segments, goal.motions
     add = partial(add_remark, remarks, first)
@@ -32,9 +41,21 @@ def ignored_remarks(goal: GoalTable, first: int = 0) -> list[str]:
             has_twist & ~takes_twist,
             'twist is ignored: the segment has a velocity, or its type takes no tool speed',
         )
+        if translates is not None:
+            part = np.where(translates[:, None], points.twists[:, :3], points.twists[:, 3:])
+            add(
+                has_twist & takes_twist & ~part.any(axis=1),
+                'twist is ignored: the speed is that of its linear part, or of its angular part '
+                'where the tool only turns, and that part is 0',
+            )
     add(
         points.accelerations.any(axis=1),
-        'acceleration is ignored: UR motion commands cannot meet it',
+        'acceleration is ignored: '
+        + (
+            'corners are rounded with those of the segments'
+            if is_rounded(goal)
+            else 'UR motion commands cannot meet it'
+        ),
     )
     add(points.jerks.any(axis=1), 'jerk is ignored: no robot motion takes it')
     if timed:

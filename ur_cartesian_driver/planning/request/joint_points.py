@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.inverse import format_distinct
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import JointLimitExceeded, NotAvailable
 from ur_cartesian_driver.motion.geometry.arrays import Flags
@@ -97,7 +98,9 @@ def _check_ranges(index: int, q: Joints, arm: Arm) -> None:
     """Refuse joint positions out of their ranges: whole turns are not taken off."""
     limits = np.array(arm.model.position_limits)
     for k in rows_where((q < limits[:, 0]) | (q > limits[:, 1]))[:1]:
+        nearest = limits[k, 0] if q[k] < limits[k, 0] else limits[k, 1]
+        value, _ = format_distinct(q[k], float(nearest))
         raise JointLimitExceeded(
-            f'{point_field(index, "posture")} has {JOINT_NAMES[k]} at {q[k]:.4f} rad, outside its '
+            f'{point_field(index, "posture")} has {JOINT_NAMES[k]} at {value} rad, outside its '
             f'range of {arm.model.range_text(k)}; keep within it.'
         )

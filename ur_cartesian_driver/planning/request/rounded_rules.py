@@ -21,9 +21,8 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     is_timed,
     resolve_execution_mode,
     segment_field,
+    TAKES_TOOL_SPEED,
 )
-
-_TYPES = (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.PROCESS, SegmentType.CIRCULAR)
 
 
 def corner_bounds(goal: GoalTable) -> Floats:
@@ -42,6 +41,7 @@ def corner_bounds(goal: GoalTable) -> Floats:
 
 def check_rounded(goal: GoalTable, options: PlanningOptions) -> None:
     """Refuse a goal with rounded corners if its mode, times or segments exclude them."""
+    _check_angles(goal)
     if not is_rounded(goal):
         return
     mode = resolve_execution_mode(goal)
@@ -66,10 +66,28 @@ def check_rounded(goal: GoalTable, options: PlanningOptions) -> None:
             'send the whole path',
         )
     segments = goal.segments
-    wrong = ~np.isin(segments.types, _TYPES) | (segments.blend_radii > 0.0)
+    wrong = ~TAKES_TOOL_SPEED[segments.types] | (segments.blend_radii > 0.0)
     wrong |= segments.free_axes != FreeAxis.NONE
     for i in rows_where(wrong)[:1]:
         _refuse_segment(i, segments[i])
+
+
+def _check_angles(goal: GoalTable) -> None:
+    """Refuse a bound on the turn in corners that are not rounded."""
+    segments = goal.segments
+    without = (segments.corner_deviations == 0.0) & (goal.corner_deviation == 0.0)
+    given = [
+        (segment_field(i, 'corner_angle'), float(segments.corner_angles[i]))
+        for i in rows_where((segments.corner_angles > 0.0) & without)[:1]
+    ]
+    if goal.corner_angle and not is_rounded(goal):
+        given.insert(0, ('corner_angle', goal.corner_angle))
+    for field, angle in given[:1]:
+        raise InvalidGoal(
+            field,
+            f'is {angle:g} rad, but without corner_deviation the arm rounds no corner there',
+            'set corner_deviation as well, or set it to 0',
+        )
 
 
 def _first_corner(goal: GoalTable) -> str:

@@ -21,6 +21,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     resolve_execution_mode,
     segment_field,
     short_segment_error,
+    type_table,
 )
 
 #: Shortest time from point to point [s].
@@ -32,6 +33,7 @@ MAX_TWIST = 100.0
 #: Largest plausible component of an acceleration [m/s^2], [rad/s^2].
 MAX_ACCELERATION = 10_000.0
 
+_IS_PLAIN = type_table((SegmentType.AUTO, SegmentType.LINEAR))
 _USE_PRIMITIVES = 'set execution to PRIMITIVES (which ignores twists and accelerations at points)'
 
 
@@ -62,8 +64,7 @@ def check_spline(goal: GoalTable, options: PlanningOptions) -> None:
     name = resolve_execution_mode(goal).name
     _check_points(goal)
     segments = goal.segments
-    is_plain = np.isin(segments.types, (SegmentType.AUTO, SegmentType.LINEAR))
-    for i in rows_where(~is_plain | (segments.blend_radii > 0.0)):
+    for i in rows_where(~_IS_PLAIN[segments.types] | (segments.blend_radii > 0.0)):
         _check_segment(i, segments[i], name)
     if goal.waypoints[0].time == 0.0:
         _check_at_rest(goal, 0, 'starts')

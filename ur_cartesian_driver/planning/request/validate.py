@@ -3,8 +3,8 @@
 """
 The checks of a goal that need no robot.
 
-:data:`RULES` lists the checks in the order in which they run; each is a function that raises a
-refusal or returns. Reach, postures and speeds need the robot:
+:data:`FIELD_RULES` and :data:`RULES` list the checks in the order in which they run; each is a
+function that raises a refusal or returns. Reach, postures and speeds need the robot:
 :mod:`~ur_cartesian_driver.planning.planner` checks them.
 
 Refusals name fields as the ROS messages do (``trajectory.points[2].pose.orientation``).
@@ -57,6 +57,7 @@ from ur_cartesian_driver.planning.request.field_rules import (
 from ur_cartesian_driver.planning.request.free_axis_rules import check_free_axes
 from ur_cartesian_driver.planning.request.goal_fields import (
     gives_joints,
+    IS_ARC,
     IS_OPTIMIZED,
     is_rounded,
     is_spline,
@@ -90,8 +91,11 @@ def check(goal: Goal, options: PlanningOptions) -> GoalTable:
         table = goal_table(goal)
     except WrongType as error:
         raise InvalidGoal(error.field, error.problem) from None
-    table = replace(table, io_commands=options.lead_times(table.io_commands))
     with np.errstate(over='ignore', invalid='ignore'):  # a goal may contain any numbers
+        for rule in FIELD_RULES:
+            rule(table, options)
+        if table.io_commands:
+            table = replace(table, io_commands=options.lead_times(table.io_commands))
         for rule in RULES:
             rule(table, options)
     return table
@@ -158,14 +162,21 @@ def _keep_open(goal: GoalTable, options: PlanningOptions) -> None:
 
 def _supported(goal: GoalTable, options: PlanningOptions) -> None:
     check_mode(goal, GOAL_RULES['on_path_tolerance'])
-    tolerance = apply_default_tolerances(goal, options).path_tolerance
-    limits = (*tolerance.position, *tolerance.orientation, *tolerance.twist)
-    is_limited = max((*limits, *tolerance.acceleration)) > 0.0
-    if goal.on_path_tolerance == OnPathTolerance.STALL and not is_limited:
+    if goal.on_path_tolerance == OnPathTolerance.STALL:
+        tolerance = apply_default_tolerances(goal, options).path_tolerance
+        limits = (*tolerance.position, *tolerance.orientation, *tolerance.twist)
+        if max((*limits, *tolerance.acceleration)) <= 0.0:
+            raise InvalidGoal(
+                'path_tolerance',
+                'limits nothing, so that the arm is never off its path; on_path_tolerance is '
+                'STALL',
+                'set a limit, or on_path_tolerance to ABORT',
+            )
+    elif goal.stall_timeout:
         raise InvalidGoal(
-            'path_tolerance',
-            'limits nothing, so that the arm is never off its path; on_path_tolerance is STALL',
-            'set a limit, or on_path_tolerance to ABORT',
+            'stall_timeout',
+            f'is {goal.stall_timeout:g} s, but on_path_tolerance is ABORT, which waits for no arm',
+            'set on_path_tolerance to STALL, or stall_timeout to 0',
         )
     check_outputs(goal, options)
     known = ('', options.tf_prefix + 'tool0_controller')
@@ -184,9 +195,10 @@ def _times(goal: GoalTable, options: PlanningOptions) -> None:
     steps = np.diff(times, prepend=0.0)
     # The first point may have the time 0: then the robot is already there.
     is_late = (steps > 0.0) | ((steps == 0.0) & (np.arange(len(times)) == 0))
-    for i in rows_where(~is_late | (steps > options.max_segment_time))[:1]:
+    motion_times = steps - np.append(0.0, goal.motions.dwells[:-1])
+    for i in rows_where(~is_late | (motion_times > options.max_segment_time))[:1]:
         if is_late[i]:
-            raise long_segment_error(i, float(steps[i]), options.max_segment_time)
+            raise long_segment_error(i, float(motion_times[i]), options.max_segment_time)
         remedy = (
             'increase it' if is_spline(goal) else 'increase it, or set all times to 0 for speeds'
         )
@@ -196,7 +208,7 @@ def _times(goal: GoalTable, options: PlanningOptions) -> None:
 def _segment_rules(goal: GoalTable, options: PlanningOptions) -> None:
     timed, segments = is_timed(goal), goal.segments
     is_fast = np.maximum(segments.velocities, segments.accelerations) > 1.0
-    is_arc = segments.types == SegmentType.CIRCULAR
+    is_arc = IS_ARC[segments.types]
     has_via_fields = segments.arc_modes != ArcMode.UNCONSTRAINED
     has_via_fields |= segments.has_via & (segments.vias != IDENTITY.row()).any(axis=1)
     has_via_fields[list(segments.via_postures)] = True
@@ -243,9 +255,9 @@ def _joint_points(goal: GoalTable, options: PlanningOptions) -> None:
 
 
 def _motions(goal: GoalTable, options: PlanningOptions) -> None:
-    if is_spline(goal):
-        return  # a spline can wait at a point
     points, segments = goal.waypoints, goal.motions
+    if len(points) < 2 or is_spline(goal):
+        return  # a spline can wait at a point
     lengths = np.linalg.norm(np.diff(points.poses[:, :3], axis=0), axis=1)
     suspect = IS_STRAIGHT[segments.types[1:]] & (lengths < 2.0 * SAME_POSITION)
     starts, ends = points.poses[:-1].copy(), points.poses[1:].copy()
@@ -261,10 +273,10 @@ def _motions(goal: GoalTable, options: PlanningOptions) -> None:
                 raise duplicate_point_error(goal, i)
 
 
-#: All rules in order: later rules rely on the checks of earlier ones.
+#: All rules in order: later rules rely on the checks of earlier ones. Leads are applied after the
+#: first rules, which compare each field alone with its range.
+FIELD_RULES: tuple[Rule, ...] = (_number_of_points, check_fields)
 RULES: tuple[Rule, ...] = (
-    _number_of_points,
-    check_fields,
     _joint_points,
     check_frames,
     _keep_open,

@@ -25,10 +25,13 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
 )
 from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.planning.geometry.blended_path import curves_of
-from ur_cartesian_driver.planning.geometry.samples import STEP_ANGLE, STEP_LENGTH
+from ur_cartesian_driver.planning.geometry.samples import (
+    check_sample_count,
+    STEP_ANGLE,
+    STEP_LENGTH,
+)
 from ur_cartesian_driver.planning.request.validate import arc_error
 from ur_cartesian_driver.planning.rounded.rounded_path import Polyline
-from ur_cartesian_driver.planning.spline.spline_path import check_sample_count
 
 #: A turn of the tool adds its angle times this radius [m] to the place ``s`` on the path.
 TURN_RADIUS = 0.05

@@ -32,7 +32,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
-from ur_cartesian_driver.planning.geometry.samples import sample_parameters
+from ur_cartesian_driver.planning.geometry.samples import check_sample_count, sample_parameters
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
@@ -53,7 +53,6 @@ from ur_cartesian_driver.planning.spline.joint_polynomials import (
     JointPolynomials,
 )
 from ur_cartesian_driver.planning.spline.spline_path import (
-    check_sample_count,
     solve_spline_path,
     spline_pieces,
     SplinePath,
@@ -77,8 +76,8 @@ _NO_TRAVEL, _NO_TURN = 1e-6, 1e-6
 #: Samples inside each piece that measure its deviation and its accelerations: a quintic that
 #: starts and ends like the law is farthest from it near these quarters.
 _SAMPLES_INSIDE = 3
-#: Accelerations are measured on pieces that may have more of it by this part of its limit, and
-#: joints that reach more than this part of a limit.
+#: Accelerations are measured inside a piece if they may exceed those of the tool spline by more
+#: than the first fraction of their limit, or if a joint exceeds the second fraction of a limit.
 _MORE_ACCELERATION, _FAST = 0.002, 0.5
 
 
@@ -321,10 +320,11 @@ def _coarse_times(motion: RoundedMotion, tolerance: float, options: PlanningOpti
 
 def _may_exceed(motion: RoundedMotion, options: PlanningOptions) -> Flags:
     """
-    Return whether a piece (n,) may have more acceleration than the tool spline, or fast joints.
+    Return whether the accelerations inside each piece (n,) have to be measured.
 
-    The accelerations of the spline are known to be right. A piece that ends as it does deviates by
-    about 64 d t^3 (1 - t)^3, d at its middle; this has the second derivative 24 d.
+    The tool spline keeps its limits. A piece has the states of the spline at its ends, so its
+    deviation is about 64 d t^3 (1 - t)^3, with d in the middle. The second derivative of this is
+    at most 24 d.
     """
     pieces, limits = motion.polynomials, motion.limits
     durations = np.diff(pieces.times)

@@ -84,9 +84,9 @@ class RoundedReport:
             f'joints: {pieces} quintic pieces in {duration:.3f} s ({pieces / duration:.0f} a '
             f'second), which keep the tool within {1e3 * polynomials.distance:.3f} mm and '
             f'{polynomials.angle:.5f} rad of the rounded path',
-            'assumed of the robot: speedj is followed within a step, the program steps in every '
-            'cycle, a socket goes on after a pause; ur-cartesian check-robot --with-motion checks '
-            'them (corner_*, steps_*, corner_pause); all else here is planned',
+            'assumptions about the robot: it follows speedj within a step, runs its program in '
+            'every cycle, and reads a socket again after a pause; ur-cartesian check-robot '
+            '--with-motion checks them (corner_*, steps_*, corner_pause)',
             motion.path.tightest_margins.remark,
         ]
 

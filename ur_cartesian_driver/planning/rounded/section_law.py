@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
-from ur_cartesian_driver.planning.rounded.path_joints import path_joints, ToolPeaks
+from ur_cartesian_driver.planning.rounded.joint_derivatives import joint_derivatives, Peaks
 from ur_cartesian_driver.planning.rounded.programmed_path import ProgrammedSection
 from ur_cartesian_driver.planning.rounded.rounded_path import PathRows, RoundedPath
 from ur_cartesian_driver.planning.rounded.time_law import (
@@ -169,7 +169,7 @@ class SectionLaw:
         #: By name of a limit: the greatest ds/dt that it allows at each place (m,).
         self.caps = self._tool_caps()
         derivatives = np.concatenate([x1, w1], axis=1), np.concatenate([x2, w2], axis=1)
-        self._joints = path_joints(
+        self._joints = joint_derivatives(
             kinematics, q_start, s, poses, derivatives, self._tool_peaks(), options
         )
         #: The configuration at the end of the section [rad].
@@ -237,18 +237,15 @@ class SectionLaw:
             'turn': _corner_speed(samples.w1, samples.w2, tool.turn_accelerations),
         }
 
-    def _tool_peaks(self) -> ToolPeaks:
+    def _tool_peaks(self) -> Peaks:
         samples, fastest = self.samples, np.minimum.reduce(list(self.caps.values()))
         travel, turn = length_rows(samples.x1), length_rows(samples.w1)
         along = turn * self._ramp / np.maximum(travel, _TINY)
         across = length_rows(samples.w2) * fastest**2
-        return ToolPeaks(
-            speed=float((travel * fastest).max()),
-            turn_rate=float((turn * fastest).max()),
-            acceleration=float(self._tool.accelerations.max()),
-            turn_acceleration=float(
-                np.minimum(along + across, self._limits_at.turn_accelerations).max()
-            ),
+        turns = np.minimum(along + across, self._limits_at.turn_accelerations)
+        return (
+            (float((travel * fastest).max()), float((turn * fastest).max())),
+            (float(self._tool.accelerations.max()), float(turns.max())),
         )
 
     def _joint_caps(self) -> dict[str, Floats]:
@@ -333,7 +330,12 @@ class SectionLaw:
         return excess
 
     def _excess_at(self, law: PathTimes, jerk: Floats, at: Indices) -> Floats:
-        """Return the greatest such ratio (b,) of a law at some times; ``at`` = places before."""
+        """
+        Return the greatest ratio (b,) of a quantity to its limit at b times.
+
+        :param law: the law at these times; ``jerk``: (b,) its third derivative there.
+        :param at: (b,) the numbers of the places before these times.
+        """
         samples, tool, joints = self.samples, self._tool, self._joints
         part = ((law.s - samples.s[at]) / (samples.s[at + 1] - samples.s[at]))[:, None]
         row = self._rows_between[at]

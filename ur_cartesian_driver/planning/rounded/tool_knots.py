@@ -26,8 +26,8 @@ from ur_cartesian_driver.planning.spline.spline_path import sample_density
 
 #: Shortest time of a piece [s] that robot program and sockets sustain over any number of pieces.
 MIN_PIECE_TIME = 0.02
-#: Greatest acceptable ratio of an acceleration inside a shortest piece to its limit; inside pieces
-#: that can be split; and of the jerk there to the limit of the law.
+#: Greatest ratios to their limits: of accelerations inside the shortest pieces, of accelerations
+#: inside pieces that can be split, and of the jerk inside the latter.
 CLOSE_ENOUGH, _SPLIT_EXCESS, _SPLIT_JERK = 1.017, 1.012, 1.01
 #: Greatest number of times that the law is slowed around pieces that are too coarse.
 TRIES = 6
@@ -138,7 +138,7 @@ class _HalfSteps:
     def fits(self, begin: Indices, end: Indices, tolerance: float) -> Flags:
         """Return whether quintics between grid times (r,) follow the law closely enough."""
         pieces, fits = self._pieces(begin, end), np.ones(len(begin), dtype=np.bool_)
-        # Most that do not are off at a quarter, so few long ones are compared at all half steps.
+        # Pieces that do not fit are mostly off at a quarter: long ones are compared there first.
         long = np.flatnonzero(end - begin > 2)
         if len(long):
             fits[long] = self._follows(pieces.take(long), tolerance, at_quarters=True)
@@ -150,7 +150,7 @@ class _HalfSteps:
         return fits
 
     def _follows(self, pieces: _Pieces, tolerance: float, *, at_quarters: bool) -> Flags:
-        """Return whether they do at all half steps, or at those next to the quarters."""
+        """Return whether pieces follow the law at all half steps, or at those near quarters."""
         begin, end = pieces.begin, pieces.end
         exact, times = self._points, self._points.times
         steps = 2 * (end - begin)
@@ -197,7 +197,7 @@ class _HalfSteps:
         return largest
 
     def _pieces(self, begin: Indices, end: Indices) -> _Pieces:
-        knots = np.unique(np.concatenate([begin, end]))
+        knots = np.flatnonzero(np.bincount(np.concatenate([begin, end])))
         # The spline also has pieces across the gaps between the given ones.
         spline = ToolSpline.through(self.points(2 * knots))
         return _Pieces(spline, np.searchsorted(knots, begin), begin, end)

@@ -16,10 +16,11 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
+from ur_cartesian_driver.kinematics.inverse import format_distinct
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded, NotAvailable
-from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
-from ur_cartesian_driver.motion.geometry.polynomials import evaluate, MotionRows
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
+from ur_cartesian_driver.motion.geometry.polynomials import evaluate, MotionRows, values
 from ur_cartesian_driver.motion.geometry.pose_rows import keep_hemisphere
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import ContactEnd, Press, START_OF_MOTION
@@ -45,9 +46,9 @@ from ur_cartesian_driver.planning.request.program_features import check_program
 from ur_cartesian_driver.planning.request.validate import check_measurable_tolerances
 from ur_cartesian_driver.planning.spline.joint_polynomials import JointKnots, piece_rows, to_ticks
 from ur_cartesian_driver.planning.spline.spline_limits import (
-    RateSamples,
+    Rates,
     stretch_remark,
-    worst_excess_of,
+    worst_excess_between,
 )
 from ur_cartesian_driver.planning.spline.spline_path import coarse_samples, sample_count
 from ur_cartesian_driver.planning.spline.spline_planner import stretch_times
@@ -58,6 +59,9 @@ from ur_cartesian_driver.planning.stop_prediction import at_set_point
 _MAX_MONOTONE = 3.0
 # Rounding of a joint position [rad].
 _ROUNDING = 1e-9
+# A joint may leave its range between samples if it comes closer than this at samples [rad]; its
+# positions on such a piece are computed at this many steps.
+_NEAR, _DENSE = 0.02, 256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,11 +83,15 @@ class _Trajectory(JointKnots):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Samples(RateSamples):
+class _Samples:
     """Joints and tool along a trajectory; row 0 is the start."""
 
+    #: (m,) the point to which each sample's piece leads.
+    points: Int32s
     #: (m,) the piece of each sample.
     piece: Indices
+    #: (m,) the fraction of the piece's time at each sample.
+    u: Floats
     #: (m, 6) joint positions [rad].
     q: Floats
     #: (m, 7) poses of the TCP in base.
@@ -110,8 +118,8 @@ def plan_joint_goal(
     check_approach(state, table.waypoints.pose(0), options)
     given = _trajectory(checked, state, options)
     samples = _sampled(given, state, arm)
-    _check_ranges(samples, arm)
-    trajectory, remark = _fit_to_limits(given, samples, arm, options)
+    _check_ranges(given, samples, arm)
+    trajectory, remark = _fit_to_limits(given, samples, state, arm, options)
     path = JointSamples(samples.points[1:], samples.u[1:], samples.q[1:])
     clearance = clearance_lines(arm, (state.T_flange_tcp,), options, path, state.actual_q)
     poses = samples.poses.copy()
@@ -193,6 +201,8 @@ def _trajectory(
     if times[0] == 0.0:
         _check_start(checked, state, options)
         remarks.append('point 0: the robot is there at time 0, so nothing is sent for it')
+        if np.nan_to_num(joints.a[0]).any():
+            remarks.append('point 0: accelerations are ignored, because the arm rests there')
         times, first = times[1:], 1
         joints = MotionRows(*(rows[1:] for rows in joints))
     rest = np.zeros((1, 6))
@@ -271,42 +281,57 @@ def _sampled(trajectory: _Trajectory, state: RobotState, arm: Arm) -> _Samples:
     )
     piece, number = (np.concatenate([[0], rows]) for rows in counted(count))
     u = number / count[piece]
-    t = u * np.diff(times)[piece]
-    q, qd, qdd = evaluate(spline.coefficients[piece], t)
-    twists, accelerations = tool_rates(arm, state.T_flange_tcp, q, qd, qdd)
+    q = values(spline.coefficients[piece], u * np.diff(times)[piece])
     return _Samples(
+        points=(trajectory.first + piece).astype(np.int32),
         piece=piece,
         u=u,
         q=q,
-        qd=qd,
-        qdd=qdd,
         poses=tcp_rows(arm, state.T_flange_tcp, q),
-        twists=twists,
-        accelerations=accelerations,
-        points=(trajectory.first + piece).astype(np.int32),
     )
 
 
-def _check_ranges(samples: _Samples, arm: Arm) -> None:
+def _check_ranges(trajectory: _Trajectory, samples: _Samples, arm: Arm) -> None:
     low, high = np.array(arm.model.position_limits).T
+    # A joint that turns back between two samples gets a little farther than at these.
     q = samples.q
+    close = ((q < low + _NEAR) | (q > high - _NEAR)).any(axis=1)
+    if not close.any():
+        return
+    pieces, u = np.unique(samples.piece[close]), np.linspace(0.0, 1.0, _DENSE + 1)
+    piece, u = np.repeat(pieces, len(u)), np.tile(u, len(pieces))
+    q = values(trajectory.spline.coefficients[piece], u * np.diff(trajectory.times)[piece])
     outside = (q < low - _ROUNDING) | (q > high + _ROUNDING)
     if not outside.any():
         return
     row = int(np.flatnonzero(outside.any(axis=1))[0])
     k = int(np.argmax(outside[row]))
+    bound = float(low[k] if q[row, k] < low[k] else high[k])
     raise JointLimitExceeded(
-        f'{point_field(int(samples.points[row]), "positions")}, at '
-        f'{100.0 * samples.u[row]:.1f} % of its segment: {JOINT_NAMES[k]} turns to '
-        f'{q[row, k]:.4f} rad, its range is {arm.model.range_text(k)}; keep it within.'
+        f'{point_field(trajectory.first + int(piece[row]), "positions")}, at '
+        f'{100.0 * u[row]:.1f} % of its segment: {JOINT_NAMES[k]} turns to '
+        f'{format_distinct(float(q[row, k]), bound)[0]} rad, its range is '
+        f'{arm.model.range_text(k)}; keep it within.'
     )
 
 
 def _fit_to_limits(
-    trajectory: _Trajectory, samples: _Samples, arm: Arm, options: PlanningOptions
+    trajectory: _Trajectory,
+    samples: _Samples,
+    state: RobotState,
+    arm: Arm,
+    options: PlanningOptions,
 ) -> tuple[_Trajectory, tuple[str, ...]]:
     """Return the trajectory, slowed if the limits require it, and a remark on the slowing."""
-    found = worst_excess_of(samples, arm.model, options)
+    coefficients, durations = trajectory.spline.coefficients, np.diff(trajectory.times)
+
+    def rates(piece: Indices, u: Floats) -> Rates:
+        q, qd, qdd = evaluate(coefficients[piece], u * durations[piece])
+        return Rates(*tool_rates(arm, state.T_flange_tcp, q, qd, qdd), qd, qdd)
+
+    found = worst_excess_between(
+        rates, samples.piece, samples.u, trajectory.first, arm.model, options
+    )
     if found is None:
         return trajectory, ()
     if options.on_too_fast != 'slow':

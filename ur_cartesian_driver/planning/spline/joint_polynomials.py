@@ -33,7 +33,6 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     distance_rows,
     length_rows,
 )
-from ur_cartesian_driver.motion.goal.goal_columns import zeros
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.move_rows import SplineRows
 from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows, ReferencePath
@@ -114,23 +113,18 @@ def piece_rows(
     )
     n = len(durations)
     q, qd, qdd = (rows[1:] for rows in knots.joints)
-    return PlannedRows(
-        waypoints=waypoints.astype(np.int32),
-        lengths=lengths,
-        angles=angles,
-        durations=durations,
-        blend_entries=zeros(n, 5),
-        joints=q,
-        primitives=SplineRows(
+    return PlannedRows.of_pieces(
+        SplineRows(
             targets=q,
             velocities=qd,
             accelerations=qdd,
             durations=durations,
             quintic=np.full(n, knots.quintic),
         ),
-        report_lines=LateLines.at_once(
-            n, lambda: lines(np.stack([lengths, angles, durations], axis=1))
-        ),
+        waypoints.astype(np.int32),
+        lengths,
+        angles,
+        LateLines.at_once(n, lambda: lines(np.stack([lengths, angles, durations], axis=1))),
     )
 
 

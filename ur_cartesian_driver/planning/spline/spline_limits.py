@@ -9,24 +9,35 @@ speeds and 1/f^2 of the accelerations.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import ceil
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
+from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates, largest_joint_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
-from ur_cartesian_driver.motion.geometry.arrays import Floats, Int32s
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
+from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
+from ur_cartesian_driver.motion.goal.goal_columns import zeros
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SpeedLimit
+from ur_cartesian_driver.planning.geometry.samples import MIN_SAMPLES
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 
 _ROUNDING = 1e-6
+#: A joint is near a limit if the bound of its rate exceeds this part of the limit: the inverse of
+#: the Jacobian differs a little from place to place. It is computed at every so many samples.
+_NEAR, _FEW = 0.5, 3
+# Fractions of a short piece at which its rates are computed, beside those at its samples.
+_QUARTERS = (0.25, 0.5, 0.75)
+# The rates of a piece are computed at this many steps if a quantity may exceed the known greatest
+# excess by this factor between samples. So many pieces or rows at a time, to stay in the cache.
+_DENSE, _HIGHER, _BLOCK = 64, 1.001, 1024
 
 
 #: A quantity along a spline: name of the tool or joint to which it belongs, values (m,), limit,
@@ -106,21 +117,14 @@ def stretch_remark(factor: float, limit: SpeedLimit, duration: float) -> str:
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RateSamples:
-    """The rates of tool and joints at samples of a spline."""
+class Rates(NamedTuple):
+    """The rates of tool and joints at m places of a spline, each (m, 6)."""
 
-    #: (m,) the point to which the sample's piece leads.
-    points: Int32s
-    #: (m,) the fraction of the piece's time at the sample.
-    u: Floats
-    #: (m, 6) twists of the TCP in base.
+    #: Twists of the TCP in base, and its accelerations.
     twists: Floats
-    #: (m, 6) accelerations of the TCP in base.
     accelerations: Floats
-    #: (m, 6) joint velocities [rad/s].
+    #: Joint velocities [rad/s] and accelerations [rad/s^2].
     qd: Floats
-    #: (m, 6) joint accelerations [rad/s^2].
     qdd: Floats
 
 
@@ -128,26 +132,112 @@ def worst_excess(
     kinematics: TcpKinematics, path: SplinePath, options: PlanningOptions
 ) -> LimitExcess | None:
     """Return the quantity along a path that exceeds its limit most; None if none does."""
-    begin, end = path.spline.times[path.piece], path.spline.times[path.piece + 1]
-    twists, accelerations = path.spline.rates(path.piece, path.u * (end - begin))
-    qd, qdd = joint_rates(kinematics.arm, kinematics.T_flange_tcp, path.q, twists, accelerations)
-    samples = RateSamples(
-        points=path.points,
-        u=path.fractions,
-        twists=twists,
-        accelerations=accelerations,
-        qd=qd,
-        qdd=qdd,
-    )
-    return worst_excess_of(samples, kinematics.arm.model, options)
+    sampled, durations = path.piece + path.u, np.diff(path.spline.times)
+    arm = kinematics.arm
+    joint_speeds = np.abs(np.diff(path.q, axis=0)) / np.diff(path.times)[:, None]
+    is_near = bool((joint_speeds > _NEAR * np.array(arm.model.max_joint_speed)).any())
+    if not is_near:
+        speeds, accelerations = (
+            (float(length_rows(rows[:, :3]).max()), float(length_rows(rows[:, 3:]).max()))
+            for rows in path.spline.rates(path.piece, path.u * durations[path.piece])
+        )
+        is_near = may_near_limits(kinematics, path.q[::_FEW], speeds, accelerations, options)
+
+    def rates(piece: Indices, u: Floats) -> Rates:
+        tool = path.spline.rates(piece, u * durations[piece])
+        if not is_near:
+            return Rates(*tool, zeros(len(u)), zeros(len(u)))
+        q = np.stack([np.interp(piece + u, sampled, joint) for joint in path.q.T], axis=1)
+        return Rates(*tool, *joint_rates(arm, kinematics.T_flange_tcp, q, *tool))
+
+    return worst_excess_between(rates, path.piece, path.u, path.first, arm.model, options)
 
 
-def worst_excess_of(
-    samples: RateSamples, model: RobotModel, options: PlanningOptions
+def may_near_limits(
+    kinematics: TcpKinematics,
+    q: Floats,
+    rates: tuple[float, float],
+    accelerations: tuple[float, float],
+    options: PlanningOptions,
+) -> bool:
+    """
+    Return whether a joint may come near a limit in one of the configurations (n, 6) [rad].
+
+    The inverse of the Jacobian bounds the joint rates by those of the tool.
+
+    :param rates: greatest speed and turn rate of the tool [m/s], [rad/s].
+    :param accelerations: likewise [m/s^2], [rad/s^2].
+    """
+    arm, T_flange_tcp = kinematics.arm, kinematics.T_flange_tcp
+    for k in range(0, len(q), _BLOCK):
+        qd, qdd = largest_joint_rates(arm, T_flange_tcp, q[k : k + _BLOCK], rates, accelerations)
+        speeds = qd / arm.model.max_joint_speed
+        if max(speeds.max(), qdd.max() / options.max_joint_acceleration) > _NEAR:
+            return True
+    return False
+
+
+def worst_excess_between(
+    rates: Callable[[Indices, Floats], Rates],
+    piece: Indices,
+    u: Floats,
+    first: int,
+    model: RobotModel,
+    options: PlanningOptions,
 ) -> LimitExcess | None:
-    """Return the quantity in samples that exceeds its limit most; None if none does."""
+    """
+    Return the quantity that exceeds its limit most, also between samples; None if none does.
+
+    :param rates: returns the rates at fractions (m,) of the times of pieces (m,).
+    :param piece: (n,) pieces of samples that follow the path closely; ``u``: (n,) the fractions.
+    :param first: the number of the point at the end of the first piece.
+    """
+    count = np.bincount(piece)
+    short = np.flatnonzero(count < MIN_SAMPLES)
+    # Accelerations of cubics jump where pieces meet; those of quintics peak near the quarters.
+    later, inner = np.arange(1, len(count)), np.array(_QUARTERS)
+    piece = np.concatenate([piece, later, np.repeat(short, len(inner))])
+    u = np.concatenate([u, np.zeros(len(later)), np.tile(inner, len(short))])
+    order = np.lexsort((u, piece))
+    piece, u = piece[order], u[order]
+    sampled = rates(piece, u)
+    found = _worst_excess_at(sampled, first + piece, u, model, options)
+    possible = np.zeros(len(piece))
+    for _, values, limit, power, *_ in _quantities(sampled, model, options):
+        factors = (_possible_peaks(values, piece) / limit) ** (1.0 / power)
+        possible = np.maximum(possible, factors)
+    high = np.unique(piece[possible > _HIGHER * (found.factor if found else 1.0)])
+    dense = np.linspace(0.0, 1.0, _DENSE + 1)
+    for begin in range(0, len(high), _BLOCK):
+        piece = np.repeat(high[begin : begin + _BLOCK], len(dense))
+        u = np.tile(dense, len(piece) // len(dense))
+        between = _worst_excess_at(rates(piece, u), first + piece, u, model, options)
+        if between and (not found or between.factor > found.factor):
+            found = between
+    return found
+
+
+def _possible_peaks(values: Floats, piece: Indices) -> Floats:
+    """
+    Return how high a quantity (n,) may get beside each sample of pieces (n,).
+
+    A parabola through three samples is higher than these by up to an eighth of their second
+    difference; twice as much is allowed for.
+    """
+    bend = np.zeros(len(values))
+    bend[1:-1] = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
+    bend[1:-1][piece[2:] != piece[:-2]] = 0.0
+    around = np.maximum(bend, np.maximum(np.append(bend[1:], 0.0), np.append(0.0, bend[:-1])))
+    peaks: Floats = values + 0.25 * around
+    return peaks
+
+
+def _worst_excess_at(
+    rates: Rates, points: Indices, u: Floats, model: RobotModel, options: PlanningOptions
+) -> LimitExcess | None:
+    """Return the worst excess at places on the pieces to points (m,), at fractions (m,)."""
     worst: LimitExcess | None = None
-    for what, values, limit, power, unit, name, cause in _quantities(samples, model, options):
+    for what, values, limit, power, unit, name, cause in _quantities(rates, model, options):
         row = int(np.argmax(values))
         peak = float(values[row])
         factor = (peak / limit) ** (1.0 / power)
@@ -158,19 +248,17 @@ def worst_excess_of(
                 unit=unit,
                 name=name,
                 factor=factor,
-                point=int(samples.points[row]),
-                fraction=float(samples.u[row]),
+                point=int(points[row]),
+                fraction=float(u[row]),
                 needed=peak,
                 cause=cause,
             )
     return worst
 
 
-def _quantities(
-    samples: RateSamples, model: RobotModel, options: PlanningOptions
-) -> Iterator[_Quantity]:
+def _quantities(rates: Rates, model: RobotModel, options: PlanningOptions) -> Iterator[_Quantity]:
     if options.max_tool_speed > 0.0:
-        speed = np.linalg.norm(samples.twists[:, :3], axis=1)
+        speed = np.linalg.norm(rates.twists[:, :3], axis=1)
         limit, name = options.max_tool_speed, 'max_tool_speed'
         yield 'the tool', speed, limit, 1, 'm/s', name, SlowCause.TOOL_LIMIT
     cause = SlowCause.ACCELERATION_LIMIT
@@ -178,11 +266,11 @@ def _quantities(
         (slice(0, 3), 'max_linear_acceleration', 'm/s^2'),
         (slice(3, 6), 'max_angular_acceleration', 'rad/s^2'),
     ):
-        values = np.linalg.norm(samples.accelerations[:, part], axis=1)
+        values = np.linalg.norm(rates.accelerations[:, part], axis=1)
         yield 'the tool', values, getattr(options, name), 2, unit, name, cause
     bound, name = options.max_joint_acceleration, 'max_joint_acceleration'
     cause = SlowCause.JOINT_LIMIT
     for k, (joint, limit) in enumerate(zip(JOINT_NAMES, model.max_joint_speed, strict=True)):
         source = f'the joint speed limit{model.speed_source(k)}'
-        yield joint, np.abs(samples.qd[:, k]), limit, 1, 'rad/s', source, cause
-        yield joint, np.abs(samples.qdd[:, k]), bound, 2, 'rad/s^2', name, cause
+        yield joint, np.abs(rates.qd[:, k]), limit, 1, 'rad/s', source, cause
+        yield joint, np.abs(rates.qdd[:, k]), bound, 2, 'rad/s^2', name, cause

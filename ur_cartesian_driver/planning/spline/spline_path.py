@@ -30,6 +30,7 @@ from ur_cartesian_driver.motion.goal.goal import Posture
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.planning.geometry.curves import ARC_CHORD_ERROR, HALF_TURN
 from ur_cartesian_driver.planning.geometry.samples import (
+    check_sample_count,
     CurvePieces,
     MIN_SAMPLES,
     STEP_ANGLE,
@@ -59,8 +60,6 @@ _COARSE_SAMPLES = 9
 _SPEED_MARGIN = 1.05
 #: Maximum turn within a piece [rad]: rotation vectors of larger turns are ambiguous.
 _MAX_TURN = 2.0 * pi
-#: Maximum number of samples of a goal; each needs a quarter of a kilobyte while it is checked.
-MAX_SAMPLES = 2_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -287,7 +286,7 @@ def sample_count(
     density = sample_density(speed, turn_rate, acceleration).reshape(len(h), _COARSE_SAMPLES)
     steps = _SPEED_MARGIN * h * density.max(axis=1)
     count = np.maximum(np.ceil(steps), np.minimum(MIN_SAMPLES, np.ceil(1.25 * steps) + 1.0))
-    check_sample_count(count, first + np.arange(len(h)), 'check twists and accelerations')
+    check_sample_count(count, first + np.arange(len(h)), 'check positions, times and rates')
     found: Indices = count.astype(np.intp)
     return found
 
@@ -312,23 +311,6 @@ def sample_density(
         ]
     )
     return density
-
-
-def check_sample_count(count: Floats | Indices, points: Indices, remedy: str) -> None:
-    """
-    Refuse a goal that needs too many samples.
-
-    :param count: (n,) the number of samples of each part; ``points``: (n,) the point to which it
-        leads.
-    """
-    if (total := count.sum()) > MAX_SAMPLES:
-        raise InvalidGoal(
-            'trajectory.points',
-            'ask for a path so long, or so fast (most of all to points['
-            f'{points[np.argmax(count)]}]), that its check needs {total:.3g} samples, more than '
-            f'{MAX_SAMPLES:,}',
-            f'{remedy}, or split the goal',
-        )
 
 
 def _cumulative(steps: Floats) -> Floats:

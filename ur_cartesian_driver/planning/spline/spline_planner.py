@@ -14,15 +14,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
-from math import degrees, inf
+from functools import cache, lru_cache
+from math import ceil, degrees, inf
 
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.errors import JointLimitExceeded
+from ur_cartesian_driver.motion.errors import GoalRefused, JointLimitExceeded, TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.polynomials import MotionRows
 from ur_cartesian_driver.motion.geometry.pose import Pose
@@ -39,11 +39,12 @@ from ur_cartesian_driver.planning.min_speed import slower_by
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines, JointSamples
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
-from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
+from ur_cartesian_driver.planning.request.goal_fields import point_field, resolve_execution_mode
 from ur_cartesian_driver.planning.spline.joint_polynomials import (
     fit_joint_polynomials,
     JointPolynomials,
     piece_rows,
+    TICK,
 )
 from ur_cartesian_driver.planning.spline.slow_spline import slow_spline_stretches
 from ur_cartesian_driver.planning.spline.spline_limits import stretch_remark, worst_excess
@@ -54,8 +55,8 @@ from ur_cartesian_driver.planning.spline.spline_points import point_remarks, too
 _SAMPLES = 17
 # Factor on the time of a stopping piece for the next try.
 _SHORTENING = 0.8
-# Greatest number of tries.
-_TRIES = 20
+# Rounding of a joint position [rad], and of a speed as a fraction of it.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -211,48 +212,76 @@ def end_state(plan: Plan) -> SplineState:
     )
 
 
-def plan_stop(state: SplineState, arm: Arm, deceleration: float) -> Spline:
+@lru_cache(maxsize=8)  # it is checked, then sent
+def plan_stop(state: SplineState, arm: Arm, options: PlanningOptions, point: int) -> Spline:
     """
     Return the piece that brings a moving arm to rest, each joint in its direction of motion.
 
-    The joint velocities are cubics of time that end at 0 with acceleration 0, so the peak
-    deceleration of the fastest joint is 1.5 times its mean deceleration. The arm brakes harder if
-    a joint would otherwise leave its range or, while still accelerating, exceed its speed limit.
+    The joint velocities are cubics of time that end at 0 with acceleration 0. With the speed v and
+    the acceleration a at the start, a joint needs up to 1.5 v / T + a / 3 in the time T. The
+    fastest joint brakes with ``keep_open_deceleration``. The arm brakes harder, with up to
+    ``max_joint_acceleration``, if a joint would otherwise leave its range or, while still
+    accelerating, exceed its speed limit.
 
-    :param deceleration: peak deceleration of the fastest joint [rad/s^2].
+    :param point: the last point, at which the arm has the state.
     :raises JointLimitExceeded: a joint is too close to the end of its range.
+    :raises TooFast: a joint that still accelerates is too close to its speed limit.
     """
-    v, a = np.array(state.qd), np.array(state.qdd)
-    speed = np.maximum(arm.model.max_joint_speed, np.abs(v))
-    T = max(1.5 * float(np.abs(v).max()) / deceleration, _SAMPLES * 1e-3)
-    for _ in range(_TRIES):
+    v, a = np.abs([state.qd, state.qdd])
+    hardest = np.maximum(options.max_joint_acceleration, a)
+    shortest = max(1.5 * float((v / (hardest - a / 3.0)).max()), _SAMPLES * 1e-3)
+    shortest = round(ceil(shortest / TICK) * TICK, 6)
+    T = max(1.5 * float(v.max()) / options.keep_open_deceleration, shortest)
+    while True:
         T = round(T, 6)
-        target = np.array(state.q) + 0.5 * T * v + T**2 / 12.0 * a
+        end = np.array([1.0, 0.5 * T, T**2 / 12.0]) @ np.array([state.q, state.qd, state.qdd])
         piece = Spline(
-            target=vector6(target.tolist()), velocities=ZERO6, accelerations=ZERO6, duration=T
+            target=vector6(end.tolist()), velocities=ZERO6, accelerations=ZERO6, duration=T
         )
         q, qd, _ = rows_along(piece, state, _SAMPLES)
-        joint = _joint_outside_range(arm, q)
-        if joint is None and (np.abs(qd) <= speed * (1.0 + 1e-9)).all():
+        fault = _stop_fault(q, qd, arm, options, point)
+        if fault is None:
             return piece
-        T *= _SHORTENING
-    raise JointLimitExceeded(
-        f'{JOINT_NAMES[joint or 0]} is too fast to stop before the end of its range; end the '
-        'motion earlier.'
+        if shortest >= T:
+            raise fault
+        T = max(_SHORTENING * T, shortest)
+
+
+def _stop_fault(
+    q: Floats, qd: Floats, arm: Arm, options: PlanningOptions, point: int
+) -> GoalRefused | None:
+    """Return the refusal of a stop with joints (m, 6) out of range or too fast, else None."""
+    model = arm.model
+    low, high = np.array(model.position_limits).T
+    outside = ((q < low - _ROUNDING) | (q > high + _ROUNDING)).any(axis=0)
+    if outside.any():
+        k = int(np.argmax(outside))
+        return JointLimitExceeded(
+            f'{point_field(point)}: {JOINT_NAMES[k]} is too fast there to stop before the end of '
+            f'its range, {model.range_text(k)}: with max_joint_acceleration = '
+            f'{options.max_joint_acceleration:g} rad/s^2 it stops at {q[-1, k]:.4f} rad; '
+            'end the motion earlier, or slower.'
+        )
+    speeds = np.abs(qd)
+    bounds = np.maximum(model.max_joint_speed, speeds[0]) * (1.0 + _ROUNDING)
+    too_fast = (speeds > bounds).any(axis=0)
+    if not too_fast.any():
+        return None
+    k = int(np.argmax(too_fast))
+    return TooFast(
+        point_field(point, 'acceleration'),
+        f'still speeds up {JOINT_NAMES[k]}, which reaches {speeds[:, k].max():.3f} rad/s while it '
+        f'stops behind the point, more than the joint speed limit{model.speed_source(k)} = '
+        f'{model.max_joint_speed[k]:.3f} rad/s',
+        'reduce it, or the twist',
     )
 
 
+@lru_cache(maxsize=8)
 def rows_along(piece: Spline, state: SplineState, samples: int) -> tuple[Floats, Floats, Floats]:
     """Return joint positions and their rates at times evenly along a piece that begins so."""
     spline = JointSpline.of(state.q, [piece], velocities=state.qd, accelerations=state.qdd)
     return spline.rows(np.linspace(0.0, piece.duration, samples))
-
-
-def _joint_outside_range(arm: Arm, q: Floats) -> int | None:
-    """Return a joint that leaves its range; None if none does."""
-    low, high = np.array(arm.model.position_limits).T
-    outside = ((q < low - 1e-9) | (q > high + 1e-9)).any(axis=0)
-    return int(np.argmax(outside)) if outside.any() else None
 
 
 def _fit_to_limits(
@@ -324,7 +353,8 @@ def _clearance_remarks(
     """Return the remarks on clearance, including the stop after a moving end."""
     samples = path.samples
     if end.is_moving:
-        on = rows_along(plan_stop(end, arm, options.keep_open_deceleration), end, _SAMPLES)[0]
+        stop = plan_stop(end, arm, options, path.first + len(path.spline.positions) - 1)
+        on = rows_along(stop, end, _SAMPLES)[0]
         samples = JointSamples(
             np.append(samples.segment, np.full(len(on), samples.segment[-1])),
             np.append(samples.fraction, np.ones(len(on))),

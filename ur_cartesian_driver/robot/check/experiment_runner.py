@@ -5,15 +5,13 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
 from math import dist
-from typing import Any
 
 import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.vectors import vector6
-from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     encode_command,
     PrimaryCommand,
@@ -33,12 +31,13 @@ from ur_cartesian_driver.robot.check.experiments import (
 )
 from ur_cartesian_driver.robot.check.finding import RobotAddress
 from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
-from ur_cartesian_driver.robot.check.primary_observations import (
-    LOCAL_CONTROL,
-    PrimaryProbe,
+from ur_cartesian_driver.robot.check.program_run import (
+    END_TIMEOUT,
+    ProgramRun,
+    START_TIMEOUT,
+    Surprise,
 )
 from ur_cartesian_driver.robot.check.rtde_recorder import RtdeRecorder
-from ur_cartesian_driver.robot.rtde.probe import read_state
 from ur_cartesian_driver.robot.services.rtde_input_writer import speed_slider_write, write_inputs
 from ur_cartesian_driver.robot.services.service_calls import SetSpeedSliderCall
 from ur_cartesian_driver.robot.transport import TcpConnection, TcpListener
@@ -50,31 +49,12 @@ RECORDED = (
     'speed_scaling', 'target_speed_fraction', 'runtime_state', 'safety_mode',
     _PIECES_BEGUN, _SPLINE_TIME,
 )  # fmt: skip
-#: Longest time until a program moves the arm, and longest time until it ends [s].
-START_TIMEOUT, END_TIMEOUT = 3.0, 30.0
 #: How long a program is paused [s].
 PAUSE = 0.5
 #: Time recorded before and after the motion [s].
 MARGIN = 0.3
 #: The tool is moved back if it ends farther than this from its start [m].
 NEAR = 1e-4
-_SAFE = (SafetyMode.NORMAL, SafetyMode.REDUCED)
-
-
-async def motion_refusal(address: RobotAddress) -> str:
-    """
-    Return a clause that says why the arm must not be moved now; empty = it may be moved.
-
-    :raises OSError: the robot does not answer.
-    """
-    state = await read_state(address.host, address.rtde_port)
-    if state.safety_mode not in _SAFE:
-        return f'the safety mode is {state.safety_mode.name}'
-    if state.robot_mode is not RobotMode.RUNNING:
-        return f'the arm is in mode {state.robot_mode.name}; switch it on and release the brakes'
-    if state.runtime_state is not RuntimeState.STOPPED:
-        return f'a program is {state.runtime_state.name}; stop it'
-    return ''
 
 
 async def run_experiment(address: RobotAddress, experiment: Experiment) -> MotionSamples:
@@ -83,62 +63,57 @@ async def run_experiment(address: RobotAddress, experiment: Experiment) -> Motio
 
     At the end, even after an error, the program is stopped and the slider is restored.
 
-    :raises OSError: a connection fails, the safety system stops the robot, the slider or the arm
-        does not move, or the program does not end.
+    :raises OSError: a connection fails, or the slider does not move.
+    :raises Surprise: the safety system stops the robot, the arm does not move, or the program
+        does not end.
     """
-    recorder = RtdeRecorder(RECORDED, address.host, address.rtde_port)
-    probe = PrimaryProbe()
+    run = ProgramRun(address, RECORDED)
     try:
-        await recorder.open()
-        await probe.open(address)
-        if not await recorder.wait_for(lambda row: True, START_TIMEOUT):
-            raise OSError('the robot streams nothing')
-        return await _run(address, experiment, recorder, probe)
+        await run.open()
+        return await _run(address, experiment, run)
     finally:
-        recorder.close()
-        await probe.close()
+        await run.close()
 
 
-async def _run(
-    address: RobotAddress, experiment: Experiment, recorder: RtdeRecorder, probe: PrimaryProbe
-) -> MotionSamples:
-    before = recorder.newest
-    if experiment.slider is not None:
-        await _set_slider(address, experiment.slider)
+async def _run(address: RobotAddress, experiment: Experiment, run: ProgramRun) -> MotionSamples:
+    recorder, before = run.recorder, run.recorder.newest
     try:
-        stop_sent = await _move(experiment, recorder, probe)
+        if experiment.slider is not None:
+            await _set_slider(address, experiment.slider)
+        stop_sent = await _move(experiment, run)
         samples = _samples(recorder, stop_sent)
         if dist(recorder.newest['target_TCP_pose'][:3], before['target_TCP_pose'][:3]) > NEAR:
-            await _play(recorder, probe, return_program(before['target_TCP_pose']))
+            await run.play(return_program(before['target_TCP_pose']))
         return samples
     finally:
-        probe.send(encode_command(PrimaryCommand.STOP_PROGRAM))
-        if experiment.slider is not None:
-            await _set_slider(address, before['target_speed_fraction'])
+        try:
+            await run.stop()
+        finally:
+            if experiment.slider is not None:
+                await _set_slider(address, before['target_speed_fraction'])
 
 
-async def _move(experiment: Experiment, recorder: RtdeRecorder, probe: PrimaryProbe) -> float:
+async def _move(experiment: Experiment, run: ProgramRun) -> float:
     """Run the program; return the stop command's time by the controller's clock [s], or NaN."""
     await asyncio.sleep(MARGIN)
     stop_sent = float('nan')
     if experiment.is_corner:
-        await _follow_corner(experiment, recorder, probe)
+        await _follow_corner(experiment, run)
         return stop_sent
-    await _start(recorder, probe, program(experiment.check, experiment.script))
+    await run.start(program(experiment.check, experiment.script))
     if experiment.stop_after is not None:
-        due = recorder.newest['timestamp'] + experiment.stop_after
-        await recorder.wait_for(lambda row: row['timestamp'] >= due, END_TIMEOUT)
-        stop_sent = recorder.newest['timestamp']
-        probe.send(encode_command(PrimaryCommand.STOP_PROGRAM))
-    await _finish(recorder)
+        due = run.recorder.newest['timestamp'] + experiment.stop_after
+        await run.wait_for(lambda row: row['timestamp'] >= due, END_TIMEOUT)
+        stop_sent = run.recorder.newest['timestamp']
+        run.send(encode_command(PrimaryCommand.STOP_PROGRAM))
+    await run.ended()
     await asyncio.sleep(MARGIN)
     return stop_sent
 
 
-async def _follow_corner(
-    experiment: Experiment, recorder: RtdeRecorder, probe: PrimaryProbe
-) -> None:
+async def _follow_corner(experiment: Experiment, run: ProgramRun) -> None:
     """Run the program that follows a corner, and send it the messages for its socket."""
+    recorder = run.recorder
     first, rest = corner_messages(vector6(recorder.newest['target_q']))
 
     def send(robot: TcpConnection) -> None:
@@ -155,62 +130,29 @@ async def _follow_corner(
     await listener.open(host, 0, frozenset({recorder.connection.peer_address}))
     try:
         script = experiment.script.replace(HOST, host).replace(PORT, str(listener.port))
-        await _start(recorder, probe, program(experiment.check, script))
+        await run.start(program(experiment.check, script))
         if experiment.pauses:
-            await _pause(recorder, probe)
+            await _pause(run)
             if listener.connection is not None:
                 listener.connection.send(rest)
-            probe.send(encode_command(PrimaryCommand.RESUME_PROGRAM))
-        await _finish(recorder)
+            run.send(encode_command(PrimaryCommand.RESUME_PROGRAM))
+        await run.ended()
         await asyncio.sleep(MARGIN)
     finally:
         listener.close()
 
 
-async def _pause(recorder: RtdeRecorder, probe: PrimaryProbe) -> None:
+async def _pause(run: ProgramRun) -> None:
     """
     Pause the program in the corner for a while, if the robot takes the command.
 
-    :raises OSError: the program does not get as far as the corner.
+    :raises Surprise: the program does not get as far as the corner.
     """
-    if not await recorder.wait_for(lambda row: row[_PIECES_BEGUN] >= PAUSE_IN, END_TIMEOUT):
-        raise OSError('the program does not follow its pieces')
-    probe.send(encode_command(PrimaryCommand.PAUSE_PROGRAM))
-    if await recorder.wait_for(
-        lambda row: row['runtime_state'] == RuntimeState.PAUSED, START_TIMEOUT
-    ):
+    if not await run.wait_for(lambda row: row[_PIECES_BEGUN] >= PAUSE_IN, END_TIMEOUT):
+        raise Surprise('the program does not follow its pieces')
+    run.send(encode_command(PrimaryCommand.PAUSE_PROGRAM))
+    if await run.wait_for(lambda row: row['runtime_state'] == RuntimeState.PAUSED, START_TIMEOUT):
         await asyncio.sleep(PAUSE)
-
-
-async def _play(recorder: RtdeRecorder, probe: PrimaryProbe, script: bytes) -> None:
-    await _start(recorder, probe, script)
-    await _finish(recorder)
-
-
-async def _start(recorder: RtdeRecorder, probe: PrimaryProbe, script: bytes) -> None:
-    """Send a program and wait until the arm moves."""
-    begin = recorder.newest['target_q']
-
-    def refusal() -> str:
-        return next((line for line in probe.lines if LOCAL_CONTROL in line), '')
-
-    probe.send(script)
-    await recorder.wait_for(lambda row: row['target_q'] != begin or bool(refusal()), START_TIMEOUT)
-    if recorder.newest['target_q'] == begin:
-        said = refusal() or ''.join(probe.lines[-1:]) or f'nothing in {START_TIMEOUT:g} s'
-        raise OSError(f'the arm does not move: {said}')
-
-
-async def _finish(recorder: RtdeRecorder) -> None:
-    """Wait until the program has ended."""
-
-    def ended(row: Mapping[str, Any]) -> bool:
-        return row['runtime_state'] == RuntimeState.STOPPED or row['safety_mode'] not in _SAFE
-
-    if not await recorder.wait_for(ended, END_TIMEOUT):
-        raise OSError(f'the program does not end within {END_TIMEOUT:g} s')
-    if (mode := recorder.newest['safety_mode']) not in _SAFE:
-        raise OSError(f'the robot stopped, with safety mode {SafetyMode(mode).name}')
 
 
 async def _set_slider(address: RobotAddress, fraction: float) -> None:

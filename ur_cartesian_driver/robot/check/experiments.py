@@ -219,15 +219,15 @@ movej(goal, a={JOINT_ACCELERATION:g}, v={JOINT_SPEED:g})
 movej(start, a={JOINT_ACCELERATION:g}, v={JOINT_SPEED:g})"""
 _BESIDE = f"""start = get_target_tcp_pose()
 away = pose_trans(start, p[0, 0, -1, 0, 0, 0])
-size = 0.0
+offset = 0.0
 thread follow():
   while True:
-    if size < {OFFSET:g}:
-      size = size + {OFFSET_SPEED:g} * get_steptime()
+    if offset < {OFFSET:g}:
+      offset = offset + {OFFSET_SPEED:g} * get_steptime()
     end
-    x = size * (away[0] - start[0])
-    y = size * (away[1] - start[1])
-    z = size * (away[2] - start[2])
+    x = offset * (away[0] - start[0])
+    y = offset * (away[1] - start[1])
+    z = offset * (away[2] - start[2])
     path_offset_set([x, y, z, 0, 0, 0], 1)
     sync()
   end
@@ -347,11 +347,12 @@ def program(name: str, body: str) -> bytes:
     return f'def ur_check_{name}():\n{lines}\nend\n'.encode()
 
 
-def return_program(pose: Sequence[float]) -> bytes:
+def return_program(pose: Sequence[float], speed: str = _SLOW) -> bytes:
     """
     Return a program that moves straight to a pose.
 
     :param pose: ``x y z rx ry rz`` of the TCP in the base [m, rad].
+    :param speed: arguments of ``movel``, such as ``a=0.5, v=0.05``.
     """
     numbers = ', '.join(f'{value:.6f}' for value in pose)
-    return program('return', f'movel(p[{numbers}], {_SLOW})')
+    return program('return', f'movel(p[{numbers}], {speed})')

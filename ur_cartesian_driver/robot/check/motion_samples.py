@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,11 @@ class MotionSamples:
     :param scaling: speed_scaling (n,).
     :param fraction: target_speed_fraction (n,).
     :param stop_sent: time of the stop command by the controller's clock [s]; NaN = none was sent.
+    :param target_distance: distance of the target TCP from its first position (n,) [m].
+    :param actual_distance: distance of the measured TCP from its first position (n,) [m].
+    :param spline_time: time in its piece that the program of a corner reports (n,) [s].
+    :param pieces_begun: number of pieces that this program has begun (n,).
+    :param runtime_state: (n,) see :class:`~...motion.state.rtde_state.RuntimeState`.
     """
 
     time: Floats
@@ -32,17 +37,12 @@ class MotionSamples:
     tool_speed: Floats
     scaling: Floats
     fraction: Floats
-    stop_sent: float = float('nan')
-    #: Distances of the target TCP from its first position (n,) [m].
-    target_distance: Floats = field(default_factory=lambda: np.empty(0))
-    #: Distances of the measured TCP from its first position (n,) [m].
-    actual_distance: Floats = field(default_factory=lambda: np.empty(0))
-    #: Time in its piece that the program of a corner reports (n,) [s].
-    spline_time: Floats = field(default_factory=lambda: np.empty(0))
-    #: Number of pieces that it has begun (n,).
-    pieces_begun: Floats = field(default_factory=lambda: np.empty(0))
-    #: Runtime state (n,), see :class:`RuntimeState`.
-    runtime_state: Floats = field(default_factory=lambda: np.empty(0))
+    stop_sent: float
+    target_distance: Floats
+    actual_distance: Floats
+    spline_time: Floats
+    pieces_begun: Floats
+    runtime_state: Floats
 
     def as_lists(self) -> dict[str, Any]:
         """Return the columns as lists for JSON, rounded to 6 decimals."""

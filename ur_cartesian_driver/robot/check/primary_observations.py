@@ -54,7 +54,8 @@ class PrimaryProbe:
         self.geometry: DhTable | None = None
         #: Texts and errors of the robot, oldest first.
         self.lines: list[str] = []
-        self._failure = ''
+        #: Why connections failed or were lost, oldest first.
+        self.failures: list[str] = []
         self._news = asyncio.Event()
         self._client = PrimaryClient(
             PrimaryCallbacks(
@@ -62,7 +63,7 @@ class PrimaryProbe:
                 geometry=lambda found: self._learn(geometry=found),
                 error=lambda text: self._learn(lines=[*self.lines, text]),
                 text=lambda text: self._learn(lines=[*self.lines, text]),
-                connection_error=lambda text: self._learn(_failure=text),
+                connection_error=lambda text: self._learn(failures=[*self.failures, text]),
             )
         )
         self._task: asyncio.Task[Any] | None = None
@@ -76,13 +77,13 @@ class PrimaryProbe:
         self._task = asyncio.create_task(
             self._client.stay_connected(address.host, address.primary_port)
         )
-        await self._wait(lambda: bool(self.configuration or self._failure), CONFIGURATION_TIMEOUT)
+        await self._wait(lambda: bool(self.configuration or self.failures), CONFIGURATION_TIMEOUT)
         if self.configuration is None:
-            raise OSError(
-                self._failure
-                or f'primary interface: {address.host} port {address.primary_port}: no '
+            reason = (
+                f'primary interface: {address.host} port {address.primary_port}: no '
                 'configuration is reported (the usual port is 30001)'
             )
+            raise OSError(next(iter(self.failures), reason))
 
     async def close(self) -> None:
         """Disconnect."""

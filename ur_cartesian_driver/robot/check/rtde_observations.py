@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Mapping
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from ur_cartesian_driver.robot.check.finding import (
     RobotAddress,
     skipped,
 )
-from ur_cartesian_driver.robot.check.rtde_recorder import RtdeRecorder
+from ur_cartesian_driver.robot.check.rtde_recorder import name_in, RtdeRecorder
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 from ur_cartesian_driver.robot.rtde.state_decoding import REQUIRED_FIELDS
 
@@ -116,9 +115,9 @@ def _stream(recorder: RtdeRecorder, version: ControllerVersion) -> Finding:
 
 def _state(recorder: RtdeRecorder) -> Finding:
     modes = {
-        'robot_mode': _name(RobotMode, recorder.newest['robot_mode']),
-        'safety_mode': _name(SafetyMode, recorder.newest['safety_mode']),
-        'program': _name(RuntimeState, recorder.newest['runtime_state']),
+        'robot_mode': name_in(RobotMode, recorder.newest['robot_mode']),
+        'safety_mode': name_in(SafetyMode, recorder.newest['safety_mode']),
+        'program': name_in(RuntimeState, recorder.newest['runtime_state']),
     }
     text = 'Arm {robot_mode}, safety {safety_mode}, program {program}.'.format(**modes)
     return ok('state', text, **modes)
@@ -147,7 +146,7 @@ def _rest(recorder: RtdeRecorder) -> Finding:
     return ok(
         'rest',
         f'At rest the joints tremble by {noise:.3f} mrad (peak to peak), up to {speed:.2g} rad/s, '
-        f'and stand up to {error:.3f} mrad beside their targets.',
+        f'and rest up to {error:.3f} mrad off their targets.',
         noise_mrad=round(float(noise), 4),
         static_error_mrad=round(float(error), 4),
         max_speed=float(speed),
@@ -232,10 +231,3 @@ async def _request_inputs(
         await connection.open(address.host, address.rtde_port)
     finally:
         connection.close()
-
-
-def _name(kind: Any, number: int) -> str:
-    try:
-        return str(kind(number).name)
-    except ValueError:
-        return f'unknown ({number})'

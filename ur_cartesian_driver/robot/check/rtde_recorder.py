@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,14 @@ from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
+
+
+def name_in(kind: type[IntEnum], number: int) -> str:
+    """Return the name of a number that a robot reports, also of one that no list has."""
+    try:
+        return kind(number).name
+    except ValueError:
+        return f'unknown ({number})'
 
 
 class RtdeRecorder:

@@ -67,6 +67,7 @@ class GoalServer:
         )
         # Guards ``_closing`` and ``_runs``.
         self._lock = threading.Lock()
+        self._logger: Any = node.get_logger()
         #: The goals that have not ended, by their ids.
         self._runs: dict[bytes, GoalRun] = {}
         self._closing = False
@@ -185,4 +186,14 @@ class GoalServer:
         finally:
             with self._lock:
                 self._runs.pop(run.key, None)
+        if not run.action.is_validation(run.handle.request):
+            self._log_end(outcome)
         return run.action.result(outcome)
+
+    def _log_end(self, outcome: Outcome) -> None:
+        """Log how a goal has ended, for the one who reads the log later."""
+        text = f'goal: {outcome.code.name}: {outcome.text}'
+        if outcome.succeeded or outcome.code is ErrorCode.CANCELLED:
+            self._logger.info(text)
+        else:
+            self._logger.warning(text)

@@ -46,6 +46,9 @@ def run_command(
         return status
     except KeyboardInterrupt as interrupt:
         return SIGNAL_STATUS + (interrupt.args[0] if interrupt.args else ended_by)
+    except EOFError:
+        print(f'{name}: the input ended before the answer', file=sys.stderr)
+        return 1
     except (DriverError, OSError, ValueError) as error:
         _discard_unwritten_output()
         notes = getattr(error, '__notes__', ())

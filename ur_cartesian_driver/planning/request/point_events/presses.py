@@ -75,8 +75,8 @@ class Presses(PointEvent[Press]):
             if after < len(goal.waypoints) and goal.motions.types[after] == SegmentType.CIRCULAR:
                 raise InvalidGoal(
                     segment_field(after, 'type'),
-                    f'is CIRCULAR, but it begins where {field} has brought the tool, which makes '
-                    'another arc of it',
+                    f'is CIRCULAR, but {field} may have displaced the tool at its start, and the '
+                    'robot would draw another arc from there',
                     'lead the tool back by a LINEAR segment first',
                 )
 

@@ -58,4 +58,5 @@ def add_safe_outputs(goal: GoalTable, options: PlanningOptions) -> GoalTable:
             (train.output, train.pin),
             SafeOutput(output=train.output, pin=train.pin, value=0.0, restore=True),
         )
-    return replace(goal, safe_outputs=tuple(outputs.values()))
+    every = tuple(outputs.values())
+    return goal if every == goal.safe_outputs else replace(goal, safe_outputs=every)

@@ -1,0 +1,173 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Runs programs that move the arm, and records what the robot reports meanwhile."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
+    encode_command,
+    PrimaryCommand,
+)
+from ur_cartesian_driver.robot.check.finding import RobotAddress
+from ur_cartesian_driver.robot.check.primary_observations import LOCAL_CONTROL, PrimaryProbe
+from ur_cartesian_driver.robot.check.rtde_recorder import name_in, RtdeRecorder
+from ur_cartesian_driver.robot.rtde.probe import read_state
+
+#: Timeouts for the first motion, the next event, and rest after a stop [s].
+START_TIMEOUT, END_TIMEOUT, REST_TIMEOUT = 3.0, 30.0, 3.0
+#: Time in which the loss of a connection is noticed [s].
+LOSS_TIME = 0.1
+SAFE = (SafetyMode.NORMAL, SafetyMode.REDUCED)
+
+
+class Surprise(Exception):
+    """Something happened that nobody asked for; the text is a clause."""
+
+
+async def motion_refusal(address: RobotAddress) -> str:
+    """
+    Return a clause that says why the arm must not be moved now; empty = it may be moved.
+
+    :raises OSError: the robot does not answer.
+    """
+    state = await read_state(address.host, address.rtde_port)
+    if state.safety_mode not in SAFE:
+        return f'the safety mode is {state.safety_mode.name}'
+    if state.robot_mode is not RobotMode.RUNNING:
+        return f'the arm is in mode {state.robot_mode.name}; switch it on and release the brakes'
+    if state.runtime_state is not RuntimeState.STOPPED:
+        return f'a program is {state.runtime_state.name}; stop it'
+    return ''
+
+
+class ProgramRun:
+    """
+    The connections by which programs run one after the other; used once.
+
+    All methods that wait raise OSError if RTDE is lost, and :class:`Surprise` if the robot stops,
+    the primary interface is lost, or the watch of the caller finds something.
+    """
+
+    def __init__(
+        self,
+        address: RobotAddress,
+        names: Sequence[str],
+        watch: Callable[[Mapping[str, Any]], str] = lambda row: '',
+    ) -> None:
+        """
+        Prepare; :meth:`open` connects.
+
+        :param names: RTDE outputs to record; ``target_q``, ``runtime_state`` and ``safety_mode``
+            are among them.
+        :param watch: returns what is wrong with a row, as a clause; '' = nothing.
+        """
+        self._address, self._watch = address, watch
+        self.recorder = RtdeRecorder(names, address.host, address.rtde_port)
+        self.probe = PrimaryProbe()
+        self._seen = 0
+
+    async def open(self) -> None:
+        """
+        Connect, and wait for the first row.
+
+        :raises OSError: the robot does not answer.
+        """
+        await self.recorder.open()
+        await self.probe.open(self._address)
+        await self.until(lambda row: True, START_TIMEOUT, 'the robot streams nothing')
+
+    async def close(self) -> None:
+        """Disconnect."""
+        self.recorder.close()
+        await self.probe.close()
+
+    async def start(self, script: bytes) -> None:
+        """Send a program, and wait until the arm moves."""
+        begin, said = self.recorder.newest['target_q'], len(self.probe.lines)
+
+        def lines(mark: str) -> list[str]:
+            return [line for line in self.probe.lines[said:] if mark in line]
+
+        self.send(script)
+        await self.wait_for(
+            lambda row: row['target_q'] != begin or bool(lines(LOCAL_CONTROL)), START_TIMEOUT
+        )
+        if self.recorder.newest['target_q'] == begin:
+            texts = lines(LOCAL_CONTROL) or lines('') or [f'nothing in {START_TIMEOUT:g} s']
+            raise Surprise(f'the arm does not move: {texts[-1]}')
+
+    async def ended(self) -> None:
+        """Wait until the program has ended."""
+        await self.until(
+            lambda row: row['runtime_state'] == RuntimeState.STOPPED,
+            END_TIMEOUT,
+            'the program does not end',
+        )
+
+    async def play(self, script: bytes) -> None:
+        """Run a program to its end."""
+        await self.start(script)
+        await self.ended()
+
+    def send(self, request: bytes) -> None:
+        """Send a program or a command."""
+        if not self.probe.send(request):
+            raise Surprise('the primary interface was lost')
+
+    async def stop(self) -> bool:
+        """
+        Stop the program; return whether a connection took the command.
+
+        On a lost connection the command is sent again for up to :data:`REST_TIMEOUT`.
+        """
+        loop, request = asyncio.get_running_loop(), encode_command(PrimaryCommand.STOP_PROGRAM)
+        end = loop.time() + REST_TIMEOUT
+        while loop.time() < end:
+            losses = len(self.probe.failures)
+            was_sent = self.probe.send(request)
+            await asyncio.sleep(LOSS_TIME)
+            # A connection that has just been cut takes the command, and loses it.
+            if was_sent and len(self.probe.failures) == losses:
+                return True
+        return False
+
+    async def wait_for(self, is_reached: Callable[[Mapping[str, Any]], bool], time: float) -> bool:
+        """Watch each row until one meets a condition; return whether one did in time [s]."""
+        wrong = ''
+
+        def check(row: Mapping[str, Any]) -> bool:
+            nonlocal wrong
+            rows, self._seen = self.recorder.rows[self._seen :], len(self.recorder.rows)
+            for values in rows:
+                wrong = wrong or self._wrong(dict(zip(self.recorder.names, values, strict=True)))
+            return bool(wrong or self.probe.failures) or is_reached(row)
+
+        reached = await self.recorder.wait_for(check, time)
+        if wrong:
+            raise Surprise(wrong)
+        if self.probe.failures:
+            await self.recorder.wait_for(lambda row: False, LOSS_TIME)  # RTDE lost, too?
+            raise Surprise(self.probe.failures[0])
+        return reached
+
+    async def until(
+        self, is_reached: Callable[[Mapping[str, Any]], bool], time: float, otherwise: str
+    ) -> None:
+        """
+        Watch each row until one meets a condition.
+
+        :param otherwise: what to say if none did within a time [s], as a clause.
+        """
+        if not await self.wait_for(is_reached, time):
+            raise Surprise(f'{otherwise} within {time:g} s')
+
+    def _wrong(self, row: Mapping[str, Any]) -> str:
+        if row['safety_mode'] not in SAFE:
+            mode = name_in(SafetyMode, row['safety_mode'])
+            return f'the robot stopped, with safety mode {mode}'
+        return self._watch(row)
