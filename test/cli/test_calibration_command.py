@@ -53,12 +53,21 @@ def test_a_file_is_written_that_a_simulator_can_have(run, tmp_path):
     assert arm.max_flange_distance(Arm(UR5E, GEOMETRY)) < 1e-9
 
 
-def test_a_file_that_cannot_be_written_is_named(run, tmp_path):
+def test_a_file_that_cannot_be_written_is_named(run, tmp_path, capsys):
     path = tmp_path / 'missing' / 'arm.yaml'
-    status, printed, errors = run('--output', str(path))
+    with pytest.raises(SystemExit, match='2'):
+        run('--output', str(path))
+    assert capsys.readouterr().err.endswith(
+        f'argument -o/--output: {path} cannot be written: there is no folder {path.parent}\n'
+    )
+
+
+def test_a_port_of_another_interface_is_named(ur_sim, run):
+    status, printed, errors = run(port=ur_sim.ports.rtde)
     assert (status, printed) == (1, '')
     assert errors == (
-        f'ur-cartesian calibration: {path} cannot be written: No such file or directory\n'
+        f'ur-cartesian calibration: primary interface: 127.0.0.1 port {ur_sim.ports.rtde}: no '
+        'configuration is reported (the usual port is 30001)\n'
     )
 
 

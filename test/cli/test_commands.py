@@ -5,6 +5,7 @@
 from argparse import Namespace
 import asyncio
 from contextlib import nullcontext
+import errno
 from io import StringIO
 import json
 import os
@@ -174,6 +175,70 @@ def test_where_prints_a_point_that_can_be_pasted_into_a_goal(ur_sim, capsys):
     assert (position.x, position.y, position.z) == pytest.approx(expected, abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ('text', 'sentence'),
+    [
+        ('trajectory: {points: [{time_from_strat: {sec: 1}}]}', 'did you mean time_from_start?'),
+        (
+            f'trajectory: {{points: [{{pose: {{position: {{x: {[0] * 1000}}}}}}}]}}',
+            'trajectory.points[0].pose.position.x is [0, 0, ',
+        ),
+        (
+            f'trajectory: {{header: {{frame_id: {"w" * 6000}}}, points: [{{}}]}}',
+            f'trajectory.header.frame_id is "{"w" * 77}...", which',
+        ),
+        (
+            'trajectory: {points: [{time_from_start: {sec: 9}, pose: {position: {x: 1.0e+308}}}]}',
+            'is 1e+308 m away from the tool',
+        ),
+    ],
+)
+def test_a_mistake_in_a_goal_is_one_short_sentence(text, sentence, tmp_path, capsys):
+    file = tmp_path / 'goal.yaml'
+    file.write_text(text)
+    assert main(['validate', str(file)]) == 1
+    error = capsys.readouterr().err
+    assert sentence in error
+    assert len(error) < len(str(file)) + 400
+
+
+def test_a_misspelt_example_is_suggested(capsys):
+    assert main(['validate', 'squre']) == 1
+    assert capsys.readouterr().err == (
+        'ur-cartesian validate: squre is neither a file nor an example; did you mean square?\n'
+    )
+
+
+@pytest.mark.parametrize(
+    ('words', 'sentence'),
+    [
+        (['validate', 'DIR'], 'DIR is a folder; name a goal file'),
+        (['import', 'DIR'], 'DIR: this is a folder; name a file.'),
+        (['identify', 'DIR'], 'DIR is a folder, but no recording; name one in it'),
+        (
+            ['validate', 'square', '--params-file', 'DIR/none'],
+            'DIR/none: No such file or directory',
+        ),
+        (['validate', 'square', '--calibration', 'DIR'], 'DIR: Is a directory'),
+        (['sim', '--programs', '/dev/null'], '/dev/null: Not a directory'),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_named(words, sentence, tmp_path, capsys):
+    folder = str(tmp_path)
+    assert main([word.replace('DIR', folder) for word in words]) == 1
+    assert capsys.readouterr().err == (
+        f'ur-cartesian {words[0]}: {sentence.replace("DIR", folder)}\n'
+    )
+
+
+def test_the_port_of_another_interface_is_named(ur_sim, capsys):
+    port = ur_sim.ports.primary
+    assert main(['where', '--rtde-port', str(port)]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith(f'ur-cartesian where: 127.0.0.1 port {port} (RTDE): ')
+    assert error.endswith('; is this the RTDE port (30004)?\n')
+
+
 def test_where_nobody_is_says_so(capsys, closed_port):
     assert main(['where', '--rtde-port', str(closed_port)]) == 1
     assert f'port {closed_port}' in capsys.readouterr().err
@@ -273,6 +338,23 @@ def own_signals():
 
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@pytest.mark.parametrize(
+    ('notes', 'error'),
+    [((), ''), (('the goal goes on',), 'send: [Errno 32] Broken pipe; the goal goes on\n')],
+)
+def test_a_closed_output_is_no_error_unless_there_is_something_to_say(
+    own_signals, notes, error, capsys
+):
+    def run(_):
+        broken = BrokenPipeError(errno.EPIPE, 'Broken pipe')
+        for note in notes:
+            broken.add_note(note)
+        raise broken
+
+    assert run_command('send', run, Namespace()) == 128 + signal.SIGPIPE
+    assert capsys.readouterr().err == error
 
 
 @pytest.mark.parametrize('number', SIGNALS)

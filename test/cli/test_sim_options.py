@@ -260,5 +260,6 @@ def test_a_loaded_program_that_is_no_urscript_is_one_sentence(capsys, tmp_path):
     assert main(['sim', '--program', str(tmp_path / 'bad.script')]) == 1
     error = capsys.readouterr().err
     assert 'bad.urp' in error
+    assert error.endswith(f'; bad.urp is {tmp_path}/bad.script\n')
     assert 'nothing' in error
     assert error.count('\n') == 1

@@ -11,10 +11,11 @@ from ur_cartesian_driver.path import DOWN, Path
 
 def test_a_file_that_cannot_be_written_is_refused_before_the_robot_is_connected(tmp_path, capsys):
     file = tmp_path / 'missing' / 'path.yaml'
-    assert main(['teach', '-o', str(file), '--wait', '0']) == 1
-    assert capsys.readouterr().err == (
-        f'ur-cartesian teach: {file} cannot be written: No such file or directory; choose another '
-        'file by -o\n'
+    with pytest.raises(SystemExit, match='2'):
+        main(['teach', '-o', str(file), '--wait', '0'])
+    assert capsys.readouterr().err.endswith(
+        f'ur-cartesian teach: error: argument -o/--output: {file} cannot be written: there is no '
+        f'folder {file.parent}\n'
     )
 
 

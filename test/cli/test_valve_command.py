@@ -52,8 +52,15 @@ def test_a_time_a_little_below_zero_is_zero_and_one_far_below_a_mistake():
     limit = 3.0 * sqrt(2.0) * 0.0005  # 2.12 mm
     with pytest.raises(ValueError, match=r'the fast bead ends 2\.2 mm before the slow one'):
         dead_times(0.0, -limit - 0.00008, **SPEEDS, reading=0.0005, cycle=0.0)
-    with pytest.raises(ValueError, match='the fast bead begins'):
+    with pytest.raises(ValueError, match='the fast bead begins behind is nan; give a number'):
         dead_times(float('nan'), 0.0, **SPEEDS, reading=0.0005, cycle=0.0)
+
+
+@pytest.mark.parametrize(('begins', 'ends'), [(0.0108e-3, 0.0063e-3), (0.0, 0.00002)])
+def test_metres_in_place_of_millimetres_are_refused(begins, ends):
+    with pytest.raises(ValueError, match=r'a ruler .* of 0\.5 mm does not show; give --measured'):
+        dead_times(begins, ends, **SPEEDS, reading=0.0005, cycle=0.0)
+    assert dead_times(0.0, 0.0, **SPEEDS, reading=0.0005, cycle=0.0).open == 0.0
 
 
 @pytest.mark.parametrize(

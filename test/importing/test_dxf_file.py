@@ -526,6 +526,7 @@ def test_what_stands_at_a_strange_place_is_said(tmp_path, text, what):
     ('change', 'line', 'part'),
     [
         (lambda t: 'hello\nworld\n', 1, 'no group code'),
+        (lambda t: 'garbage', 1, "this is no DXF: 'garbage' is no group code"),
         (lambda t: t[: len(t) // 2], None, 'ends here'),
         (lambda t: t.replace('\n11\n10\n', '\n11\nten\n'), 26, "'ten' is no number"),
         (

@@ -45,7 +45,7 @@ def test_a_text_that_yaml_chokes_on_is_one_sentence(text, sentence):
     with pytest.raises(GoalFileError) as error:
         load_goal(text)
     assert str(error.value).startswith(sentence)
-    assert str(error.value).endswith('.')
+    assert str(error.value).endswith(('.', '?'))
     assert '\n' not in str(error.value)
 
 
@@ -77,12 +77,20 @@ def test_an_empty_text_is_an_empty_goal(text):
     [
         (
             'trajectory: {points: [{}, {pose: {positon: {}}}]}',
-            'trajectory.points[1].pose.positon is not a field; trajectory.points[1].pose '
+            'trajectory.points[1].pose.positon is not a field; did you mean position?',
+        ),
+        (
+            'trajectory: {points: [{}, {pose: {place: {}}}]}',
+            'trajectory.points[1].pose.place is not a field; trajectory.points[1].pose '
             'has position, orientation.',
         ),
         (
             'trajectry: {}',
-            'trajectry is not a field; a goal has trajectory, path_tolerance,',
+            'trajectry is not a field; did you mean trajectory?',
+        ),
+        (
+            'goal: {}',
+            'goal is not a field; a goal has trajectory, path_tolerance,',
         ),
         ('trajectory: {points: {}}', 'trajectory.points is {}, but must be a list.'),
         (

@@ -6,7 +6,10 @@ from __future__ import annotations
 
 import argparse
 from contextlib import suppress
+import os
 from os.path import samefile
+from pathlib import Path
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +18,11 @@ from ur_cartesian_driver.kinematics.robot_models import MAX_JOINT_VALUE
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.twin.twin import checked_day, checked_software
 from ur_cartesian_driver.robot.services.service_calls import MAX_TOOL_OFFSET
-from ur_cartesian_driver.sim.command_line.simulator_options import parsed, six_numbers
+from ur_cartesian_driver.sim.command_line.simulator_options import (
+    check_magnitude,
+    parsed,
+    six_numbers,
+)
 
 if TYPE_CHECKING:
     from ur_cartesian_driver.importing import CodeOutput
@@ -24,6 +31,10 @@ if TYPE_CHECKING:
 MAX_SECONDS = 86400.0
 #: Largest offset of a goal [m], [rad].
 MAX_OFFSET = 50.0
+#: Largest factor or speed; more must be a mistake.
+MAX_FACTOR = 1e6
+#: Name of a node, with its namespace if it has one.
+_NODE_NAME = re.compile(r'/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*/?', re.ASCII)
 #: Largest number of variants in a grid; more must be a mistake.
 MAX_VARIANTS = 100_000
 
@@ -52,6 +63,55 @@ def code_output(text: str) -> tuple[str, CodeOutput]:
     return parsed(parse_code_output, text)
 
 
+def output_file(text: str) -> str:
+    """Return the name of a file; refuse one that cannot be written before the work begins."""
+    try:
+        check_writable(text)
+    except OSError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return text
+
+
+def check_writable(name: str) -> None:
+    """
+    Refuse the name of a file that cannot be written, and change nothing on the disk.
+
+    :raises OSError: it is a folder, its folder does not exist, or the permission is missing.
+    """
+    file = Path(name)
+    try:
+        written = file if file.exists() else file.parent
+    except OSError as error:  # such as a name that is too long
+        raise OSError(f'{name} cannot be written: {error.strerror}') from None
+    if file.is_dir():
+        raise OSError(f'{name!r} is a folder; name a file')
+    if not file.parent.is_dir():
+        raise OSError(f'{name} cannot be written: there is no folder {file.parent}')
+    if not os.access(written, os.W_OK):
+        raise OSError(f'{name} cannot be written: no permission to write {written}')
+
+
+def picture_file(text: str) -> str:
+    """Return the name of a picture; refuse its format or place before the work begins."""
+    from ur_cartesian_driver.preview.pictures import check_suffix
+
+    try:
+        check_suffix(Path(text))
+    except (OSError, ValueError) as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return output_file(text)
+
+
+def node_name(text: str) -> str:
+    """Return the name of a node, with its namespace if it has one."""
+    if not _NODE_NAME.fullmatch(text):
+        raise argparse.ArgumentTypeError(
+            f'{text!r} is no name of a node; write NODE or NAMESPACE/NODE, each of letters, '
+            'digits and _, without a digit in front'
+        )
+    return text
+
+
 def day(text: str) -> str:
     """Return a date, YYYY-MM-DD."""
     return parsed(checked_day, text)
@@ -64,12 +124,14 @@ def software(text: str) -> str:
 
 def pose(text: str) -> Pose:
     """Return the pose of six numbers [m], [rad]."""
-    return Pose.from_rotation_vector(six_numbers(text, (MAX_TOOL_OFFSET, MAX_JOINT_VALUE)))
+    return Pose.from_rotation_vector(
+        six_numbers(text, (MAX_TOOL_OFFSET, 'm'), (MAX_JOINT_VALUE, 'rad'))
+    )
 
 
 def box(text: str) -> tuple[float, ...]:
     """Return the least and greatest coordinates of a box [m]."""
-    return six_numbers(text, (MAX_OFFSET, MAX_OFFSET))
+    return six_numbers(text, (MAX_OFFSET, 'm'), (MAX_OFFSET, 'm'))
 
 
 def experiments(text: str) -> tuple[str, ...]:
@@ -83,21 +145,34 @@ def experiments(text: str) -> tuple[str, ...]:
     return tuple(text.split(','))
 
 
-def offsets(text: str) -> tuple[float, ...]:
+def lengths(text: str) -> tuple[float, ...]:
+    """Return equally spaced offsets [m]."""
+    return _offsets(text, 'm')
+
+
+def angles(text: str) -> tuple[float, ...]:
+    """Return equally spaced offsets [rad]."""
+    return _offsets(text, 'rad')
+
+
+def _offsets(text: str, unit: str) -> tuple[float, ...]:
     """Return the equally spaced numbers of a text like ``-0.1,0.1,5`` (FROM,TO,COUNT)."""
     try:
         first, last, number = text.split(',')
-        numbers = np.linspace(float(first), float(last), count(number)).round(9).tolist()
+        ends = float(first), float(last)
     except ValueError:
         raise argparse.ArgumentTypeError(f'{text!r} is not FROM,TO,COUNT') from None
-    if not numbers or not all(abs(offset) <= MAX_OFFSET for offset in numbers):  # or NaN
-        raise argparse.ArgumentTypeError(f'{text!r} is not within {MAX_OFFSET:g}, or has no count')
+    for end in ends:
+        check_magnitude(end, MAX_OFFSET, unit)
+    numbers = np.linspace(*ends, count(number)).round(9).tolist()
+    if not numbers:
+        raise argparse.ArgumentTypeError(f'{text!r} has the count 0; give 1 or more')
     return tuple(numbers)
 
 
 def count(text: str) -> int:
     """Return a number of things, such as variants of a sweep."""
-    number = int(text)
+    number = _whole(text)
     if not 0 <= number <= MAX_VARIANTS:
         raise argparse.ArgumentTypeError(f'{text} is not within 0 and {MAX_VARIANTS}')
     return number
@@ -105,17 +180,29 @@ def count(text: str) -> int:
 
 def point_index(text: str) -> int:
     """Return the index of a point, any number that fits into uint32."""
-    number = int(text)
+    number = _whole(text)
     if not 0 <= number < 2**32:
         raise argparse.ArgumentTypeError(f'{text} is not an index from 0')
     return number
 
 
+def _whole(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{text!r} is no whole number') from None
+
+
 def factor(text: str) -> float:
-    """Return a number above 0."""
-    number = float(text)
-    if not 0.0 < number <= 1e6:  # or NaN
+    """Return a number above 0, such as a speed."""
+    try:
+        number = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{text!r} is no number') from None
+    if not number > 0.0:  # or NaN
         raise argparse.ArgumentTypeError(f'{text} is not above 0')
+    if number > MAX_FACTOR:
+        raise argparse.ArgumentTypeError(f'{text} is above {MAX_FACTOR:.0f}')
     return number
 
 

@@ -123,7 +123,10 @@ def _add_demo(command: CommandParser) -> None:
         help='goal file, or the name of an example in config/examples',
     )
     command.add_argument(
-        '--picture', default='demo.png', help='picture of the planned and executed path'
+        '--picture',
+        type=argument_types.picture_file,
+        default='demo.png',
+        help='picture of the planned and executed path',
     )
     command.add_argument(
         '--arms',
@@ -166,6 +169,7 @@ def _add_goal(command: CommandParser, optional: bool = False) -> None:
 def _add_driver(command: CommandParser) -> None:
     command.add_argument(
         '--driver',
+        type=argument_types.node_name,
         default='ur_cartesian_driver',
         help='name of the driver node, with its namespace if it has one',
     )
@@ -243,7 +247,12 @@ def _add_send(command: CommandParser) -> None:
     command.add_argument(
         '--report', action='store_true', help='print the report: what was done, and why'
     )
-    command.add_argument('--record', metavar='FILE', help='write the feedback as JSON lines')
+    command.add_argument(
+        '--record',
+        type=argument_types.output_file,
+        metavar='FILE',
+        help='write the feedback as JSON lines',
+    )
     command.add_argument(
         '--no-cancel',
         action='store_true',
@@ -303,7 +312,11 @@ def _add_show(command: CommandParser) -> None:
     command.set_defaults(run=plan_commands.show)
     _add_planning(command, optional=True)
     command.add_argument(
-        '-o', '--output', metavar='PAGE', help='HTML file to write instead of opening a browser'
+        '-o',
+        '--output',
+        type=argument_types.output_file,
+        metavar='PAGE',
+        help='HTML file to write instead of opening a browser',
     )
     command.add_argument(
         '--live',
@@ -333,10 +346,16 @@ def _add_sweep(command: CommandParser) -> None:
 
     command.set_defaults(run=sweep_command.sweep_goal)
     _add_planning(command)
-    for name, unit in (('x', 'm'), ('y', 'm'), ('z', 'm'), ('rz', 'rad')):
+    lengths, angles = argument_types.lengths, argument_types.angles
+    for name, unit, kind in (
+        ('x', 'm', lengths),
+        ('y', 'm', lengths),
+        ('z', 'm', lengths),
+        ('rz', 'rad', angles),
+    ):
         command.add_argument(
             f'--{name}',
-            type=argument_types.offsets,
+            type=kind,
             default=(0.0,),
             metavar='FROM,TO,COUNT',
             help=f"offsets of the goal's frame [{unit}], like -0.1,0.1,5",
@@ -371,8 +390,16 @@ def _add_sweep(command: CommandParser) -> None:
         metavar='N',
         help='0 = one for each core',
     )
-    command.add_argument('-o', '--output', metavar='TABLE', help='file of comma-separated values')
-    command.add_argument('--picture', help='heat maps of all margins')
+    command.add_argument(
+        '-o',
+        '--output',
+        type=argument_types.output_file,
+        metavar='TABLE',
+        help='file of comma-separated values',
+    )
+    command.add_argument(
+        '--picture', type=argument_types.picture_file, help='heat maps of all margins'
+    )
 
 
 def _add_import(command: CommandParser) -> None:
@@ -381,7 +408,12 @@ def _add_import(command: CommandParser) -> None:
 
     command.set_defaults(run=import_command.import_goal)
     command.add_argument('file', help='what is read; doc/importing.md says what of each format')
-    command.add_argument('-o', '--output', help='goal file; by default standard output')
+    command.add_argument(
+        '-o',
+        '--output',
+        type=argument_types.output_file,
+        help='goal file; by default standard output',
+    )
     command.add_argument(
         '--format',
         default='',
@@ -473,7 +505,10 @@ def _add_teach(command: CommandParser) -> None:
 
     command.set_defaults(run=teach_command.teach_path)
     command.add_argument(
-        '-o', '--output', help='goal file; path.yaml by default, which must not exist yet'
+        '-o',
+        '--output',
+        type=argument_types.output_file,
+        help='goal file; path.yaml by default, which must not exist yet',
     )
     _add_own_driver(command)
     command.add_argument(
@@ -494,7 +529,13 @@ def _add_valve(command: CommandParser) -> None:
         metavar=('KIND', 'PIN'),
         help='digital output that opens the valve, like standard_digital 2',
     )
-    command.add_argument('--lead-file', default='leads.yaml', metavar='FILE', help='file to write')
+    command.add_argument(
+        '--lead-file',
+        type=argument_types.output_file,
+        default='leads.yaml',
+        metavar='FILE',
+        help='file to write',
+    )
     command.add_argument(
         '--measured',
         type=float,
@@ -535,7 +576,11 @@ def _add_calibration(command: CommandParser) -> None:
     command.set_defaults(run=calibration_command.write_calibration)
     _add_robot(command, 'its primary port', primary=30001)
     command.add_argument(
-        '-o', '--output', metavar='FILE', help='YAML file; by default standard output'
+        '-o',
+        '--output',
+        type=argument_types.output_file,
+        metavar='FILE',
+        help='YAML file; by default standard output',
     )
 
 
@@ -559,7 +604,11 @@ def _add_check_robot(command: CommandParser) -> None:
         help='also move the arm a little, after asking on the terminal before each motion',
     )
     command.add_argument(
-        '--report', default='robot_report.json', metavar='FILE', help='report to send in'
+        '--report',
+        type=argument_types.output_file,
+        default='robot_report.json',
+        metavar='FILE',
+        help='report to send in',
     )
 
 
@@ -573,6 +622,7 @@ def _add_plot(command: CommandParser) -> None:
     command.add_argument(
         '-o',
         '--output',
+        type=argument_types.picture_file,
         metavar='PICTURE',
         help='picture file, its suffix is the format; by default beside the recording, as .png',
     )
@@ -588,6 +638,7 @@ def _add_export(command: CommandParser) -> None:
     command.add_argument(
         '-o',
         '--output',
+        type=argument_types.output_file,
         metavar='FILE',
         help=f'its suffix is the format, {" or ".join(export_command.EXPORTERS.suffixes())}; by '
         'default beside the recording, as .mcap',
@@ -640,7 +691,11 @@ def _add_identify(command: CommandParser) -> None:
         help='the calls of movej and movel behind the moves of all recordings, one a line',
     )
     command.add_argument(
-        '-o', '--output', default='', metavar='FILE', help='twin to write, such as twin.yaml'
+        '-o',
+        '--output',
+        type=argument_types.output_file,
+        metavar='FILE',
+        help='twin to write, such as twin.yaml',
     )
     arm = command.add_argument_group('the arm', 'where the recordings do not name it')
     arm.add_argument('--model', default='', choices=sorted(MODELS), help='model of the robot')

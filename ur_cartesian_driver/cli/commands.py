@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 from ur_cartesian_driver.cli.argument_types import is_same_file
 from ur_cartesian_driver.cli.stopped_place import digest, read_place, write_place
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
+from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal, suggestion
 from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
@@ -278,8 +278,11 @@ def goal_file(name: str) -> Path:
     for path in (Path(name), share_path() / 'config' / 'examples' / f'{name}.yaml'):
         if path.exists() and not path.is_dir():  # also a pipe
             return path
+    if Path(name).is_dir():
+        raise OSError(f'{name} is a folder; name a goal file')
     examples = sorted(p.stem for p in (share_path() / 'config' / 'examples').glob('*.yaml'))
-    raise OSError(f'{name} is neither a file nor one of the examples {", ".join(examples)}')
+    hint = suggestion(name, examples, f'the examples are {", ".join(examples)}')
+    raise OSError(f'{name} is neither a file nor an example; {hint}')
 
 
 def _position(point: Any) -> list[float]:

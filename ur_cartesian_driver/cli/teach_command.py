@@ -10,6 +10,7 @@ from pathlib import Path as FilePath
 import sys
 import threading
 
+from ur_cartesian_driver.cli.argument_types import check_writable
 from ur_cartesian_driver.cli.own_driver import ready_driver
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
@@ -33,14 +34,14 @@ def teach_path(arguments: argparse.Namespace) -> int:
     """
     Connect, let a person guide the arm, and write the taken points, even after Ctrl-C.
 
-    :raises OSError: the file cannot be written. This is found out before the robot is connected;
-        if it happens afterwards, the goal is printed instead.
+    :raises OSError: the file cannot be written any more; the goal is printed instead.
     """
     lesson = Lesson(Path().at(speed=arguments.speed, blend=arguments.blend))
     output = arguments.output or DEFAULT_OUTPUT
-    if not arguments.output and FilePath(output).exists():
-        raise OSError(f'{output} exists already; name the file by -o')
-    _check_writable(FilePath(output))
+    if not arguments.output:
+        if FilePath(output).exists():
+            raise OSError(f'{output} exists already; name the file by -o')
+        check_writable(output)
     try:
         with ready_driver(arguments, allow_freedrive=True) as driver:
             guide(driver, lesson, _keys(), _say)
@@ -51,19 +52,6 @@ def teach_path(arguments: argparse.Namespace) -> int:
         else:
             _say('no point was taken, so nothing is written')
     return 0
-
-
-def _check_writable(file: FilePath) -> None:
-    """Open a file for writing, and leave it as it is."""
-    existed = file.exists()
-    try:
-        file.open('a').close()
-    except OSError as error:
-        raise OSError(
-            f'{file} cannot be written: {error.strerror}; choose another file by -o'
-        ) from None
-    if not existed:
-        file.unlink()
 
 
 def save(path: Path, file: str) -> None:

@@ -14,7 +14,7 @@ the offset of the nozzle cancel out. The lengths of the beads do not suffice: th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot, sqrt
+from math import hypot, isfinite, sqrt
 
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import MAX_OUTPUT_LEAD
@@ -40,6 +40,8 @@ BEAD_POINTS = (1, 8)
 SHORTEST = 0.08
 #: A dead time that is negative by more standard uncertainties is a mistake of the measurement.
 _MAX_NEGATIVE = 3.0
+#: A ruler shows no smaller part of its uncertainty: a distance below it has another unit.
+_FINEST = 4.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,15 +139,24 @@ def dead_times(
     :param slow: speed of the slow bead [m/s]; ``fast``: of the fast one.
     :param reading: standard uncertainty of one reading of the ruler [m].
     :param cycle: the cycle time of the controller [s].
-    :raises ValueError: the fast bead begins or ends before the slow one, or too far behind it.
+    :raises ValueError: the fast bead begins or ends before the slow one, or too far behind it, or
+        a distance is not finite, or smaller than the ruler shows.
     """
     difference = fast - slow
     switching = cycle / sqrt(12.0) * hypot(slow, fast)
     uncertainty = hypot(sqrt(2.0) * reading, switching) / difference
     times = []
     for verb, shift in (('begins', begins), ('ends', ends)):
+        if not isfinite(shift):
+            raise ValueError(f'how far the fast bead {verb} behind is {shift}; give a number')
+        if 0.0 < abs(shift) < reading / _FINEST:
+            raise ValueError(
+                f'the fast bead {verb} {1e3 * shift:.3g} mm behind the slow one, which a ruler '
+                f'with the uncertainty of {1e3 * reading:g} mm does not show; give --measured in '
+                'millimetres, or the --ruler that was used'
+            )
         time = shift / difference
-        if not time >= -_MAX_NEGATIVE * uncertainty:  # or NaN
+        if time < -_MAX_NEGATIVE * uncertainty:
             raise ValueError(
                 f'the fast bead {verb} {1e3 * abs(shift):.3g} mm before the slow one, although a '
                 'valve can only be late; measure from the slow bead to the fast one, positive in '

@@ -18,6 +18,7 @@ from importlib import import_module
 from types import SimpleNamespace
 from typing import Any, TypeAlias
 
+from ur_cartesian_driver.motion.errors import shortened, suggestion
 from ur_cartesian_driver.motion.goal.field_annotations import Form, goal_fields, GoalField
 from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.goal.goal_columns import SegmentRows, WaypointRows
@@ -121,26 +122,30 @@ def with_defaults(values: object, schema: Any = GOAL, key: str = '') -> Message:
         return _fields(values, schema, key)
     if isinstance(schema, list):
         if not isinstance(values, list):
-            raise FieldError(f'{key} is {values!r}, but must be a list.')
+            raise FieldError(f'{key} is {_echo(values)}, but must be a list.')
         return [with_defaults(item, schema[0], f'{key}[{i}]') for i, item in enumerate(values)]
     if isinstance(schema, str):
         if not isinstance(values, str):
-            raise FieldError(f'{key} is {values!r}, but must be a text; put it in quotes.')
+            raise FieldError(f'{key} is {_echo(values)}, but must be a text; put it in quotes.')
         return values
     if isinstance(schema, bool):
         if not isinstance(values, bool):
-            raise FieldError(f'{key} is {values!r}, but must be true or false.')
+            raise FieldError(f'{key} is {_echo(values)}, but must be true or false.')
         return values
     return _whole(values, schema, key) if isinstance(schema, Whole) else _number(values, key)
 
 
 def _fields(values: object, schema: Mapping[str, Any], key: str) -> SimpleNamespace:
     if not isinstance(values, dict):
-        raise FieldError(f'{key or "the goal"} is {values!r}, but must be a mapping of fields.')
+        raise FieldError(
+            f'{key or "the goal"} is {_echo(values)}, but must be a mapping of fields.'
+        )
     for name in values:
         if name not in schema:
-            path = f'{key}.{name}' if key else name
-            raise FieldError(f'{path} is not a field; {key or "a goal"} has {", ".join(schema)}.')
+            path = shortened(f'{key}.{name}' if key else str(name))
+            fields = f'{key or "a goal"} has {", ".join(schema)}.'
+            hint = suggestion(str(name), schema, fields)
+            raise FieldError(f'{path} is not a field; {hint}')
     return SimpleNamespace(
         **{
             name: with_defaults(values[name], kind, f'{key}.{name}' if key else name)
@@ -183,6 +188,10 @@ def _slot_value(value: Any, slot: Any) -> Any:
     return value
 
 
+def _echo(value: object) -> str:
+    return shortened(repr(value))
+
+
 def _number(value: object, key: str) -> float:
     # YAML reads 1e-3 as a text, because its own notation is 1.0e-3.
     with suppress(ValueError, OverflowError):
@@ -190,7 +199,7 @@ def _number(value: object, key: str) -> float:
             return float(value)
     if isinstance(value, int) and not isinstance(value, bool):
         raise FieldError(f'{key} is {value!r:.20}..., which is too large for a number.')
-    raise FieldError(f'{key} is {value!r}, but must be a number.')
+    raise FieldError(f'{key} is {_echo(value)}, but must be a number.')
 
 
 def _whole(value: object, kind: Whole, key: str) -> int:

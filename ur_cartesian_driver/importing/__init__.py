@@ -96,6 +96,8 @@ def import_file(
     path, options = Path(file), options or ImportOptions()
     name = form or path.suffix.lower()
     if name not in FORMATS:
+        if path.is_dir():
+            raise BrokenFile(0, 'this is a folder; name a file')
         raise BrokenFile(
             0,
             f'{form or path.suffix!r} is no {"" if form else "suffix of a "}known format; '

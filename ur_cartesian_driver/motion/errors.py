@@ -32,7 +32,8 @@ The errors of this package: a class, with the action's code, for each way a goal
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
 from enum import IntEnum
 from typing import ClassVar, TypeVar
 
@@ -61,6 +62,21 @@ class ErrorCode(IntEnum):
     CANCELLED = -16
     EXECUTION_FAILED = -17
     ROBOT_NOT_READY = -18
+
+
+#: Longest text of a user that is repeated in an error.
+_MAX_ECHO = 80
+
+
+def shortened(text: str) -> str:
+    """Return a text of the user as an error repeats it: at most 80 characters."""
+    return text if len(text) <= _MAX_ECHO else f'{text[: _MAX_ECHO - 3]}...'
+
+
+def suggestion(name: str, known: Iterable[str], otherwise: str) -> str:
+    """Return what to do about a name that is none of the known ones, for the end of an error."""
+    near = get_close_matches(name, list(known), n=1)
+    return f'did you mean {near[0]}?' if near else otherwise
 
 
 class DriverError(Exception):

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 
@@ -21,3 +22,18 @@ def pyplot() -> Any:
     from matplotlib import pyplot as plt
 
     return plt
+
+
+def check_suffix(picture: Path) -> None:
+    """
+    Refuse a picture in a format that matplotlib does not write; without a suffix it writes PNG.
+
+    :raises OSError: matplotlib is not installed.
+    :raises ValueError: the suffix is that of another format.
+    """
+    formats = pyplot().Figure().canvas.get_supported_filetypes()
+    if picture.suffix and picture.suffix[1:].lower() not in formats:
+        raise ValueError(
+            f'{picture} has the suffix {picture.suffix!r}, but a picture is written as '
+            f'{", ".join(formats)}'
+        )

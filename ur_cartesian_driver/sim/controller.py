@@ -42,6 +42,7 @@ from ur_cartesian_driver.sim.pendant_programs.program_tree import (
     FetchedScript,
     ProgramTree,
     SavedProgram,
+    UnloadableProgram,
     UnreadableProgram,
 )
 from ur_cartesian_driver.sim.programs.interpreter_mode import InterpreterMode
@@ -173,7 +174,9 @@ class Controller:
         )
         self.external_control = ExternalControl(urcap, self.messages.note)
         if config.program and (refusal := self.load_program(config.program)):
-            raise ValueError(f'program is {config.program}, which cannot be loaded: {refusal}')
+            raise UnloadableProgram(
+                f'program is {config.program}, which cannot be loaded: {refusal}'
+            )
         self.messages.on_error = self._pause_if_wanted
         #: The faults, set by the assembly; None = no faults.
         self.faults: CycleFaults | None = None

@@ -263,6 +263,8 @@ def _from_file(path: Path, max_rows: int) -> Recording:
 
 
 def _from_folder(path: Path, max_rows: int) -> Recording:
+    if not (path / disk.EXECUTED_FILE).exists():
+        raise _NoRecording(f'{path} is a folder, but no recording; name one in it')
     rows, plan = (
         np.load(path / name, mmap_mode='r') for name in (disk.EXECUTED_FILE, disk.PLANNED_FILE)
     )

@@ -227,6 +227,8 @@ def read_records(file: Path) -> Iterator[Record]:
     if data.startswith(b'AutoCAD Binary DXF'):
         raise BrokenFile(0, 'this is a binary DXF; save it as a text (ASCII) DXF')
     lines = file_lines(decoded(data, _code_page(data)))
+    if lines and not _INTEGER.fullmatch(first := lines[0].strip()):
+        raise BrokenFile(1, f'this is no DXF: {quoted(first)} is no group code')
     codes: dict[str, int] = {}
     record = Record('the beginning of the file', -1, [])
     for i in range(0, len(lines) - 1, 2):

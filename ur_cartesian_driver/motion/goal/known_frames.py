@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 from math import isfinite, sqrt
 from typing import Protocol, TypeVar
 
-from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady, shortened
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, normalize, Pose
 from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
@@ -185,7 +185,7 @@ class Frames:
             return self._transforms.T_target_source(_FRAME_ID, self.base, name, at)
         raise InvalidGoal(
             _FRAME_ID,
-            f'is "{name}", which is not a known frame',
+            f'is "{shortened(name)}", which is not a known frame',
             f'name one of {", ".join([*self._T_base, *self._T_flange, *self._T_tcp])}; others '
             'can be added to static_frames',
         )
@@ -208,14 +208,14 @@ class Frames:
         if name in self._T_base:
             raise InvalidGoal(
                 _CONTROLLED,
-                f'is "{name}", which does not move with the arm',
+                f'is "{shortened(name)}", which does not move with the arm',
                 f'leave it empty for the active TCP of the robot, or name one of {known}',
             )
         if self._transforms is not None:
             return self._transforms.T_static(_CONTROLLED, self.tool0, name)
         raise InvalidGoal(
             _CONTROLLED,
-            f'is "{name}", which is not a known frame',
+            f'is "{shortened(name)}", which is not a known frame',
             f'leave it empty for the active TCP of the robot, or name one of {known}; others can '
             f'be added to static_frames, with {self.tool0} as their parent',
         )

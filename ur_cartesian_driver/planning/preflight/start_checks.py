@@ -39,7 +39,7 @@ def check_approach(state: RobotState, target: Pose, options: PlanningOptions) ->
     if 0.0 < bound < distance:
         raise InvalidGoal(
             point_field(0, 'pose.position'),
-            f'is {distance:.3f} m away from the tool, more '
+            f'is {distance:.4g} m away from the tool, more '
             f'than max_approach_distance = {bound:g} m',
             'move closer first, add points in between, or raise the parameter',
         )

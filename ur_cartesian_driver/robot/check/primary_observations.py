@@ -79,7 +79,10 @@ class PrimaryProbe:
         )
         await self._wait(lambda: bool(self.configuration or self.failures), CONFIGURATION_TIMEOUT)
         if self.configuration is None:
-            reason = 'primary interface: no configuration is reported'
+            reason = (
+                f'primary interface: {address.host} port {address.primary_port}: no '
+                'configuration is reported (the usual port is 30001)'
+            )
             raise OSError(next(iter(self.failures), reason))
 
     async def close(self) -> None:

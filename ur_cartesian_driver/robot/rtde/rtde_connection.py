@@ -125,7 +125,10 @@ class RtdeConnection:
             for event in self._client.feed(data):
                 self._take(event)
         except ProtocolError as error:
-            self.abort(str(error))
+            reason = str(error)
+            if self._version is None:  # it may be another of the robot's interfaces
+                reason = f'{reason.rstrip(".")}; is this the RTDE port (30004)?'
+            self.abort(reason)
             return
         self._send_request(self._client.data_to_send())
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from geometry_msgs.msg import Vector3Stamped
 from rclpy.node import Node
 
-from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal
+from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal, shortened
 from ur_cartesian_driver.ros.goals.action_server import GoalServer
 from ur_cartesian_driver.ros.message_fields import checked_age
 from ur_cartesian_driver.ros.node_endpoints import newest_subscription
@@ -53,7 +53,7 @@ class PathOffsetSubscriber:
         if header.frame_id not in FRAMES:
             raise InvalidGoal(
                 'header.frame_id',
-                f"is '{header.frame_id}', but offsets are in the frame of the path",
+                f"is '{shortened(header.frame_id)}', but offsets are in the frame of the path",
                 "leave it empty, or set it to 'path'",
             )
         now = self._clock.now().nanoseconds

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 import contextlib
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any
 
 from rclpy.exceptions import InvalidParameterException, InvalidParameterTypeException
@@ -20,6 +19,7 @@ from rclpy.parameter import Parameter
 
 from ur_cartesian_driver.driver import DriverConfig
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.errors import suggestion
 from ur_cartesian_driver.motion.goal.known_frames import Frames, StaticFrame
 from ur_cartesian_driver.motion.goal.parameter_fields import parameter_fields
 from ur_cartesian_driver.planning.options import PlanningOptions
@@ -173,8 +173,7 @@ def refuse_unknown(names: Iterable[str], known: Iterable[str], page: str) -> Non
     for name in names:
         if name in known or name.startswith(_RCLPY_PARAMETERS):
             continue
-        near = get_close_matches(name, list(known), n=1)
-        hint = f'did you mean {near[0]}?' if near else f'{page} lists all.'
+        hint = suggestion(name, known, f'{page} lists all.')
         raise ParameterError(f'There is no parameter {name}; {hint}')
 
 

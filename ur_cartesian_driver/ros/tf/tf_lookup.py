@@ -17,7 +17,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.time import Time
 
-from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.errors import InvalidGoal, shortened
 from ur_cartesian_driver.motion.geometry.pose import normalize, Pose
 from ur_cartesian_driver.ros.message_fields import Message, nanoseconds
 
@@ -79,7 +79,7 @@ class TransformLookup:
         if age > self._max_age:
             raise InvalidGoal(
                 field,
-                f'is "{source}", and its newest transform to "{target}" is {age:.3f} s '
+                f'is "{shortened(source)}", and its newest transform to "{target}" is {age:.3f} s '
                 f'old, tf_max_age is {self._max_age:g} s',
                 'check why it is not published any more, or raise the parameter',
             )
@@ -94,7 +94,7 @@ class TransformLookup:
         if nanoseconds(message.header.stamp) != 0:
             raise InvalidGoal(
                 field,
-                f'is "{source}", which is not fixed to "{target}": tf2 has only a '
+                f'is "{shortened(source)}", which is not fixed to "{target}": tf2 has only a '
                 'transform between them that changes',
                 'publish it as a static transform if it '
                 'does not, or name it in the parameter static_frames',
@@ -110,8 +110,8 @@ class TransformLookup:
             when = ' for the stamp of the goal' if at else ''
             raise InvalidGoal(
                 field,
-                f'is "{source}", and tf2 has no transform from it to "{target}"{when} '
-                f'({str(error).rstrip(".")})',
+                f'is "{shortened(source)}", and tf2 has no transform from it to "{target}"{when} '
+                f'({str(error).replace(source, shortened(source)).rstrip(".")})',
                 'check that it is published, or name the frame in the parameter static_frames',
             ) from None
 

@@ -51,11 +51,19 @@ def run_command(
         return 1
     except (DriverError, OSError, ValueError) as error:
         _discard_unwritten_output()
-        with contextlib.suppress(OSError):
-            text = '; '.join([str(error), *getattr(error, '__notes__', ())])
-            print(f'{name}: {text}', file=sys.stderr)
+        notes = getattr(error, '__notes__', ())
         is_output_closed = isinstance(error, BrokenPipeError)
+        if notes or not is_output_closed:  # as of `| head`, which has seen enough
+            with contextlib.suppress(OSError):
+                print(f'{name}: {"; ".join([_sentence(error), *notes])}', file=sys.stderr)
         return SIGNAL_STATUS + signal.SIGPIPE if is_output_closed else 1
+
+
+def _sentence(error: Exception) -> str:
+    """Return the text of an error; that of the system without its number, behind the file."""
+    if isinstance(error, OSError) and error.filename and error.strerror:
+        return f'{error.filename}: {error.strerror}'
+    return str(error)
 
 
 def _discard_unwritten_output() -> None:

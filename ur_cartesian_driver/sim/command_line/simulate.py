@@ -20,6 +20,7 @@ from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections, typical_
 from ur_cartesian_driver.sim.pendant_programs.program_tree import (
     BUILT_IN_PROGRAMS,
     SavedProgram,
+    UnloadableProgram,
     UnreadableProgram,
 )
 from ur_cartesian_driver.sim.pendant_programs.urp_file import read_urp
@@ -37,7 +38,12 @@ _MODEL = 'ur5e'
 
 def simulate(arguments: argparse.Namespace) -> int:
     """Run a simulated controller until it is interrupted."""
-    robot = SimulatedRobot(simulator_config(arguments))
+    config = simulator_config(arguments)
+    try:
+        robot = SimulatedRobot(config)
+    except UnloadableProgram as error:
+        error.add_note(f'{config.program} is {arguments.program}')
+        raise
     asyncio.run(_simulate(robot))
     return 0
 

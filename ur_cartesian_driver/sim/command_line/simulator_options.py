@@ -194,7 +194,7 @@ def fault(text: str) -> Fault:
 
 def joints(text: str) -> tuple[float, ...]:
     """Return six joint positions [rad], given with commas between them."""
-    return six_numbers(text, (MAX_JOINT_VALUE, MAX_JOINT_VALUE))
+    return six_numbers(text, (MAX_JOINT_VALUE, 'rad'), (MAX_JOINT_VALUE, 'rad'))
 
 
 def port_number(text: str) -> int:
@@ -212,11 +212,11 @@ def parsed(parse: Callable[[str], T], text: str) -> T:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def six_numbers(text: str, bounds: tuple[float, float]) -> tuple[float, ...]:
+def six_numbers(text: str, *bounds: tuple[float, str]) -> tuple[float, ...]:
     """
     Return six numbers separated by commas.
 
-    :param bounds: largest magnitude of the first three numbers, and of the last three.
+    :param bounds: largest magnitude and unit of the first three numbers, and of the last three.
     """
     try:
         numbers = tuple(float(part) for part in text.split(','))
@@ -225,7 +225,14 @@ def six_numbers(text: str, bounds: tuple[float, float]) -> tuple[float, ...]:
     if len(numbers) != 6:
         raise argparse.ArgumentTypeError(f'{len(numbers)} numbers; give six, separated by commas')
     for i, number in enumerate(numbers):
-        bound = bounds[i // 3]
-        if not abs(number) <= bound:  # refuses NaN, too
-            raise argparse.ArgumentTypeError(f'{number:g} is not within {-bound:g} and {bound:g}')
+        check_magnitude(number, *bounds[i // 3])
     return numbers
+
+
+def check_magnitude(number: float, bound: float, unit: str) -> None:
+    """Refuse a number that is not within minus and plus a bound in the same unit."""
+    if not abs(number) <= bound:  # refuses NaN, too
+        hint = '; give radians, not degrees' if unit == 'rad' else ''
+        raise argparse.ArgumentTypeError(
+            f'{number:g} is not within {-bound:g} and {bound:g} {unit}{hint}'
+        )

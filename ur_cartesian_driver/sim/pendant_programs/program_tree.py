@@ -81,6 +81,10 @@ class ProgramTree:
         return '\n'.join([*lines, 'end', ''])
 
 
+class UnloadableProgram(ValueError):
+    """The program that is loaded from the start cannot be loaded."""
+
+
 @dataclass(frozen=True, slots=True)
 class UnreadableProgram:
     """A program that the robot has on its disk, but refuses to load."""
