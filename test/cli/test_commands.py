@@ -203,9 +203,9 @@ def test_a_mistake_in_a_goal_is_one_short_sentence(text, sentence, tmp_path, cap
 
 
 def test_a_misspelt_example_is_suggested(capsys):
-    assert main(['validate', 'squre']) == 1
+    assert main(['validate', 'squaare']) == 1
     assert capsys.readouterr().err == (
-        'ur-cartesian validate: squre is neither a file nor an example; did you mean square?\n'
+        'ur-cartesian validate: squaare is neither a file nor an example; did you mean square?\n'
     )
 
 

@@ -331,7 +331,9 @@ def test_a_file_of_another_kind_and_no_place_to_write_are_named(recording, tmp_p
     other = tmp_path / 'x.npz'
     other.write_text('no archive')
     assert 'is no recording' in refused(capsys, other)
-    assert 'nowhere' in refused(capsys, recording, '-o', tmp_path / 'nowhere' / 'a.csv')
+    with pytest.raises(SystemExit, match='2'):
+        main(['export', str(recording), '-o', str(tmp_path / 'nowhere' / 'a.csv')])
+    assert f'a.csv cannot be written: there is no folder {tmp_path}' in capsys.readouterr().err
     assert 'there is no recording' in refused(capsys, tmp_path)
 
 
