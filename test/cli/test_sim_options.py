@@ -234,7 +234,9 @@ def test_a_directory_lists_the_programs_that_cannot_be_loaded(
         assert str(file) in answer
         assert reason in answer
     [key] = set(config.programs) - {'good.urp'}
-    assert DashboardHandlers(controller).load(key) == f'Error while loading program: {key}'
+    with pytest.raises(StopIteration) as answered:  # at once: nothing compiles aside here
+        next(DashboardHandlers(controller).load(key))
+    assert answered.value.value == f'Error while loading program: {key}'
     assert reason in controller.messages.log[-1]
     assert reason in caplog.text
     assert controller.load_program('good.urp') == ''

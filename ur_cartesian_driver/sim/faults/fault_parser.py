@@ -180,7 +180,8 @@ def parse_fault(text: str) -> Fault:
         name, read = endings.pop(words.take())
         fields[name] = read(words)
     if words.peek() != _END:
-        raise words.wrong(' or '.join((*(f"'{word}'" for word in endings), 'the end')))
+        possible = ', '.join(f"'{word}'" for word in endings)
+        raise words.wrong(f'{possible} or the end' if possible else 'the end')
     return make(**fields)
 
 
