@@ -9,18 +9,17 @@ OPEN, CLOSE = 0.060, 0.035  # [s] how late your valve is: "ur-cartesian valve" m
 
 
 def photo_bead(start: Pose) -> Path:
-    x, y, z = start.position
     return (
         Path(start)
         .at(speed=0.05)
-        .line((x, y + mm(20), z))
+        .by(dy=mm(20))
         .pulses(CAMERA, mm(5), width=0.02)
         .set(VALVE, True, distance=mm(10), lead=OPEN)
-        .line((x, y + mm(90), z))
-        .line((x + mm(70), y + mm(90), z))
+        .by(dy=mm(70))
+        .by(dx=mm(70))
         .end_pulses(CAMERA)
         .set(VALVE, False, distance=mm(-10), lead=CLOSE)
-        .line((x + mm(70), y + mm(60), z))
+        .by(dy=mm(-30))
         .safe(VALVE, False)
     )
 

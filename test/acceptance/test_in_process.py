@@ -12,6 +12,7 @@ import pytest
 from rclpy.action.client import ActionClient
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
@@ -30,10 +31,14 @@ class Client:
         self.driver, self.executor = driver, executor
         self.node = Node('test_client')
         self.feedback = []
+        # Answers beyond the depth of a queue are lost, and ten are the default.
+        queue = QoSProfile(depth=100)
         self._actions = ActionClient(
             self.node,
             FollowCartesianTrajectory,
             '/ur_cartesian_driver/follow_cartesian_trajectory',
+            goal_service_qos_profile=queue,
+            result_service_qos_profile=queue,
         )
         executor.add_node(driver)
         executor.add_node(self.node)

@@ -98,13 +98,15 @@ def test_what_has_been_sent_is_refused_with_what_is_possible(mode):
             {'replace_from_point': 1},
         ):
             known = motion.points
-            with pytest.raises(AlreadySent, match=r'^What is to be replaced has been') as refusal:
+            with pytest.raises(
+                AlreadySent, match=r'^The points to be replaced have been'
+            ) as refusal:
                 await motion.append(points, **choice)
             assert motion.points == known
             first = refusal.value.first_time
             assert 0.03 < first - motion.progress.time < 0.2
             assert str(refusal.value).endswith(
-                f'from point {refusal.value.first_point} on, from {first:.3f} s on, or later.'
+                f'from point {refusal.value.first_point} or from {first:.3f} s on, or later.'
             )
             answer = await motion.append(
                 planner.chunk(first + 0.1), replace_from_point=refusal.value.first_point + 1

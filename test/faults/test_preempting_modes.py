@@ -40,6 +40,7 @@ MIDDLE = {
     'Appendable goals': 'moving',
     'Outputs': 'before the trigger pose',
     'Outputs, SERVO': 'before the trigger pose',
+    'Pulses': 'between pulses',
     'Freedrive': 'freedrive',
 }
 #: No joint sees more [rad/s^2], whatever takes the place of what.

@@ -52,6 +52,8 @@ class RtdeConnection:
         self._silence, self._on_text = silence, on_text
         self._names: tuple[str, ...] = ()
         self._inputs: Recipe | None = None
+        #: Whether the peer has sent something that RTDE understands.
+        self._has_answered = False
         self._last_packet = self._last_request = 0.0
         #: Shortest time between a request of the handshake and its answer [s].
         self.round_trip = inf
@@ -124,9 +126,10 @@ class RtdeConnection:
                 self.round_trip = min(self.round_trip, now - self._last_request)
             for event in self._client.feed(data):
                 self._take(event)
+            self._has_answered = True
         except ProtocolError as error:
             reason = str(error)
-            if self._version is None:  # it may be another of the robot's interfaces
+            if not self._has_answered:  # it may be another of the robot's interfaces
                 reason = f'{reason.rstrip(".")}; is this the RTDE port (30004)?'
             self.abort(reason)
             return
