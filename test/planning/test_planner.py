@@ -430,7 +430,7 @@ def test_a_wrist_cannot_flip_on_a_line_and_can_with_a_joint_move(make_cell):
 def test_a_far_first_point_is_refused_with_both_numbers(cell):
     goal = Goal(waypoints=(cell.point(0.0, 0.3), cell.point(0.0, 0.35)))
     text = refusal(InvalidGoal, cell, goal, PlanningOptions(max_approach_distance=0.25))
-    assert '0.300 m' in text
+    assert 'is 0.3 m away' in text
     assert 'max_approach_distance = 0.25 m' in text
     plan(goal, cell.state, cell.arm, PlanningOptions(max_approach_distance=0.0))
 

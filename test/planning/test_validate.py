@@ -138,11 +138,6 @@ REFUSALS = [
         InvalidGoal,
         'corner_angle is 0.2 rad, but without corner_deviation the arm rounds no corner there',
     ),
-    (
-        replace(TIMED, stall_timeout=3.0),
-        InvalidGoal,
-        'stall_timeout is 3 s, but on_path_tolerance is ABORT, which waits for no arm; set on',
-    ),
     # number of things
     (Goal(waypoints=()), InvalidGoal, 'trajectory.points is empty'),
     (

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from importlib import import_module
 from types import SimpleNamespace
@@ -34,7 +34,7 @@ class Whole:
     low: int
     high: int
     #: What the numbers mean; None = they count.
-    choices: type[IntEnum] | None = None
+    choices: type[IntEnum] | None = field(default=None, compare=False)
 
 
 _UINT8, _UINT32 = Whole(0, 2**8 - 1), Whole(0, 2**32 - 1)

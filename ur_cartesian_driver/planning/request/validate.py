@@ -172,12 +172,6 @@ def _supported(goal: GoalTable, options: PlanningOptions) -> None:
                 'STALL',
                 'set a limit, or on_path_tolerance to ABORT',
             )
-    elif goal.stall_timeout:
-        raise InvalidGoal(
-            'stall_timeout',
-            f'is {goal.stall_timeout:g} s, but on_path_tolerance is ABORT, which waits for no arm',
-            'set on_path_tolerance to STALL, or stall_timeout to 0',
-        )
     check_outputs(goal, options)
     known = ('', options.tf_prefix + 'tool0_controller')
     if goal.T_flange_controlled is None and goal.controlled_frame not in known:
