@@ -5,7 +5,7 @@
 from math import pi
 from unittest import mock
 
-from hypothesis import assume, given, HealthCheck, Phase, settings
+from hypothesis import assume, example, given, HealthCheck, Phase, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
@@ -88,9 +88,18 @@ def run(r, program, longest=None):
     r.step(times=2)
 
 
+#: A stop in real time at a lowered slider, and a set-point that is stopped before its first cycle.
+STOPPED_SET_POINT = [
+    ('movej', (0.0, 0.0, 0.0, 0.0, 0.25, 0.0), 1.0, 1.0, 0.05, 0.001, None, 1.0),
+    ('stopj', (0.0,) * 6, 1.0, 1.0, 0.0, 0.0, 3, 0.4),
+    ('servoj', (0.0,) * 6, 1.0, 1.0, 0.0, 0.0, None, 1.0),
+]
+
+
 @pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.lists(calls, min_size=2, max_size=8))
+@example(STOPPED_SET_POINT)
 def test_arm_never_jumps_and_comes_to_rest(recorder, program):
     r = recorder()
     run(r, program)

@@ -53,6 +53,8 @@ class RunningMotion:
         """Run a servo-like motion from now on, and return its call."""
         self.abort()
         self._target.activate_tcp()
+        if not isinstance(self.motion, SetpointMotion):
+            self.rate = self.scale  # the new motion begins at the speed before, by this scale
         self.motion, self.move = motion, Move()
         if isinstance(motion, SetpointMotion) and motion.duration is not None:
             self.move.returned = motion.is_over
