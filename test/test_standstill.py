@@ -9,6 +9,7 @@ pytest.importorskip('xdist')
 pytest.importorskip('pytest_rerunfailures')
 
 CASES = """
+import logging
 import os
 from pathlib import Path
 import signal
@@ -34,6 +35,11 @@ def test_of_a_loop():
     if ran('loop') == 1:
         raise TimeoutError('The robot loop ended unexpectedly, or hangs; wait.')
 
+def test_of_a_logged_loop():
+    if ran('log') == 1:
+        logging.getLogger('ur_cartesian_driver.loop').error('the robot loop ended unexpectedly')
+        raise AssertionError
+
 def test_that_is_wrong():
     ran('wrong')
     raise AssertionError
@@ -48,9 +54,9 @@ def test_that_is_always_wrong():
 @pytest.mark.slow
 def test_a_test_runs_again_only_if_the_computer_stood_still(tmp_path):
     done = run_small_suite(tmp_path, {'test_cases.py': CASES})
-    assert '2 failed, 2 passed, 3 rerun' in done.stdout, done.stdout + done.stderr
+    assert '2 failed, 3 passed, 4 rerun' in done.stdout, done.stdout + done.stderr
     runs = {
         name: len((tmp_path / name).read_text().splitlines())
-        for name in ('time', 'loop', 'wrong', 'always')
+        for name in ('time', 'loop', 'log', 'wrong', 'always')
     }
-    assert runs == {'time': 2, 'loop': 2, 'wrong': 1, 'always': 2}
+    assert runs == {'time': 2, 'loop': 2, 'log': 2, 'wrong': 1, 'always': 2}

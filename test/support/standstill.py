@@ -10,6 +10,7 @@ or if a driver in it says that its robot loop was silent for 5 s or ended; no ot
 summary counts it as rerun.
 """
 
+import logging
 from threading import Thread
 from time import monotonic, sleep
 
@@ -19,15 +20,18 @@ import pytest
 STEP = 0.02  # [s]
 #: As long as the shortest deadlines of the driver [s].
 LIMIT = 0.2
-#: What a driver says when its robot loop sent nothing for 5 s, ten heartbeats.
-SILENT_LOOP = 'robot loop ended unexpectedly, or hangs'
+#: What a driver says, in a result or its log, when its robot loop sent nothing for 5 s, ten
+#: heartbeats.
+SILENT_LOOP = 'robot loop ended unexpectedly'
 
 
-class Standstill:
+class Standstill(logging.Handler):
     """A plugin for pytest that marks the tests which wait, and watches the time while they run."""
 
     def __init__(self) -> None:
-        self.longest = 0.0
+        super().__init__()
+        self.longest, self.loop_was_silent = 0.0, False
+        logging.getLogger('ur_cartesian_driver').addHandler(self)
         Thread(target=self._watch, name='standstill', daemon=True).start()
 
     def __call__(self, error: BaseException) -> bool:
@@ -35,8 +39,12 @@ class Standstill:
         return bool(self) or SILENT_LOOP in str(error).lower()
 
     def __bool__(self) -> bool:
-        """Tell whether this process stood still; older versions of the plugin ask so."""
-        return self.longest > LIMIT
+        """Tell the same of any error; older versions of the plugin ask so."""
+        return self.longest > LIMIT or self.loop_was_silent
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Hear what drivers log."""
+        self.loop_was_silent |= SILENT_LOOP in record.getMessage().lower()
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         again = pytest.mark.flaky(reruns=1, condition=self)
@@ -45,7 +53,7 @@ class Standstill:
                 item.add_marker(again)
 
     def pytest_runtest_logstart(self) -> None:
-        self.longest = 0.0
+        self.longest, self.loop_was_silent = 0.0, False
 
     def _watch(self) -> None:
         while True:
