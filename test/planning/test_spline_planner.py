@@ -35,6 +35,7 @@ from ur_cartesian_driver.motion.goal.goal_columns import goal_table
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.primitive import Spline
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
+from ur_cartesian_driver.motion.twin.twin import ArmIdentity, Twin
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline
@@ -694,6 +695,14 @@ def test_an_open_goal_may_be_planned_to_end_moving(cell):
         goal.waypoints[-1].twist, abs=1e-6
     )
     assert 'passes through' in part.segments[-1].report_line
+
+
+def test_an_open_goal_that_moves_on_may_follow_a_twin(cell):
+    goal = goal_of(cell, 15, keep_open=True, execution=SPLINE)
+    twin = Twin(arm=ArmIdentity(model='ur5e'), date='2026-11-27')
+    planned = plan(goal, cell.state, cell.arm, replace(OPTIONS, twin=twin))
+    bare = plan(goal, cell.state, cell.arm, OPTIONS)
+    assert planned.segments[-1].primitive == bare.segments[-1].primitive
 
 
 def test_what_is_planned_in_parts_is_not_slowed(cell):

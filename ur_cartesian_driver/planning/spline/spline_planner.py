@@ -212,7 +212,6 @@ def end_state(plan: Plan) -> SplineState:
     )
 
 
-@lru_cache(maxsize=8)  # it is checked, then sent
 def plan_stop(state: SplineState, arm: Arm, options: PlanningOptions, point: int) -> Spline:
     """
     Return the piece that brings a moving arm to rest, each joint in its direction of motion.
