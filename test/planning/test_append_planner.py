@@ -322,6 +322,14 @@ def test_pulses_that_end_before_the_last_point_of_an_open_goal_are_bounded():
     assert (law.count, law.goes_on) == (21, False)
 
 
+def test_the_way_to_the_first_pulse_may_be_fast():
+    goal = replace(moves(1), pulses=(replace(PHOTOS, distance=0.001),))
+    fast = replace(goal.segments[0], velocity=0.5, acceleration=4.0)
+    goal = replace(goal, segments=(fast, *goal.segments[1:]))
+    first = plan(replace(goal, **of(goal, 0, 3), keep_open=True), STATE, ARM, OPTIONS)
+    assert plan_first_part(first, ARM, OPTIONS).next_goal.pulses
+
+
 def test_what_pulses_that_go_on_exclude_is_refused():
     goal = replace(moves(1), pulses=(replace(PHOTOS, distance=0.001),))
     first = plan(replace(goal, **of(goal, 0, 3), keep_open=True), STATE, ARM, OPTIONS)

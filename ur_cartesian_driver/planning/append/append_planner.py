@@ -551,7 +551,9 @@ class _PartPlanner:
 
         :param ending: the number of motions of the ending.
         """
-        for field, train in self._before.pulses:
+        # The plan of the first part has checked them, from the point where they begin.
+        pulses = self._before.pulses if self._before.points else ()
+        for field, train in pulses:
             times = plan.reference.time
             check_speed(
                 train,
