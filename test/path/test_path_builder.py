@@ -19,6 +19,7 @@ from ur_cartesian_driver.motion.geometry.vectors import ZERO6
 from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     ContactEnd,
+    Goal,
     OutputKind,
     Press,
     PulseTrain,
@@ -26,6 +27,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     ScriptCall,
     Segment,
     SegmentType,
+    Waypoint,
 )
 from ur_cartesian_driver.path import (
     against,
@@ -620,6 +622,15 @@ def test_beside_a_spline_the_tool_has_the_speed_of_its_turn():
     np.testing.assert_allclose(twist[:3], np.array([0.1, 0, 0]) + np.cross([0, 2.0, 0], arm))
     free = Path(HERE).spline((-0.4, 0.0, 0.5), tilted(0.3), duration=1.0)
     assert np.isnan(free.offset(dz=0.1, of_tool=True)._table().waypoints.twists).all()
+
+
+@pytest.mark.parametrize('twist', [(nan,) * 6, (0.1, 0.0, 0.0, 0.0, 2.0, 0.0)])
+def test_beside_a_cubic_spline_is_a_cubic_spline(twist):
+    point = Waypoint(time=1.0, pose=Pose((-0.4, 0.0, 0.5), tilted(0.3)), twist=twist)
+    path = Path.from_goal(Goal(waypoints=(point,), execution=ExecutionMode.SPLINE))
+    beside = path.offset(dz=0.1, of_tool=True)._table().waypoints
+    assert not beside.accelerations.any()
+    np.testing.assert_array_equal(np.isnan(beside.twists), np.isnan([twist]))
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ raises an :exc:`~ur_cartesian_driver.motion.errors.InvalidGoal` at the program l
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from numbers import Integral
 import os
 from pathlib import Path as FilePath
@@ -324,15 +325,17 @@ class Path(PathWithEvents):
             return self
         T_tool_new = Pose(step)
         poses = (self.start, *self.poses, None)
+        start = self._start
+        known = self._points if start is None else (start, *self._points)
+        move = partial(seen_from, quintic=any(any(point.waypoint.acceleration) for point in known))
         points = (
-            seen_from(point, T_tool_new, poses[i], poses[i + 2], f'offset() at point {i}')
+            move(point, T_tool_new, poses[i], poses[i + 2], f'offset() at point {i}')
             for i, point in enumerate(self._points)
         )
-        start = self._start
         return self._with(
             _start=None
             if start is None
-            else seen_from(start, T_tool_new, poses[0], poses[1], 'offset() at the start'),
+            else move(start, T_tool_new, poses[0], poses[1], 'offset() at the start'),
             _points=tuple(points),
         )
 

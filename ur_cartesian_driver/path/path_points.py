@@ -149,11 +149,18 @@ def _rotated(q: Quaternion, v: Vector3, where: str, name: str) -> Vector3:
 
 
 def seen_from(
-    point: PathPoint, T_tool_new: Pose, before: Pose | None, after: Pose | None, where: str
+    point: PathPoint,
+    T_tool_new: Pose,
+    before: Pose | None,
+    after: Pose | None,
+    where: str,
+    *,
+    quintic: bool,
 ) -> PathPoint:
     """
     Return a point as passed by another frame on the tool, whose pose is ``T_tool_new``.
 
+    :param quintic: whether the path gives accelerations; without, they stay 0, which means none.
     :raises InvalidGoal: the tool turns on an arc; or it turns at a point of a spline in a way that
         the driver chooses, so that the other frame's speed is not known.
     """
@@ -171,9 +178,11 @@ def seen_from(
     twist, acceleration = waypoint.twist, waypoint.acceleration
     turn, turn_change = (_turn_of(rates, turns) for rates in (twist, acceleration))
     new_twist = twist_at((*twist[:3], *turn), offset)
-    new_acceleration = acceleration_at(
-        (*acceleration[:3], *turn_change), (*twist[:3], *turn), offset
-    )
+    new_acceleration = acceleration
+    if quintic:
+        new_acceleration = acceleration_at(
+            (*acceleration[:3], *turn_change), (*twist[:3], *turn), offset
+        )
     for name, old, new in (
         ('twist', twist, new_twist),
         ('acceleration', acceleration, new_acceleration),
