@@ -78,7 +78,7 @@ class PathWithEvents(PathOfMotions):
         """
         if not self._points:
             raise InvalidGoal('set()', 'comes before the first point', 'add a motion first')
-        index, offset = len(self) - 1, after
+        index = len(self) - 1
         where = f'set() at point {index}'
         distance = any_number(where, 'distance', distance)
         fraction = any_number(where, 'fraction', fraction)
@@ -104,6 +104,7 @@ class PathWithEvents(PathOfMotions):
             raise InvalidGoal(
                 where, 'combines lead with after or before', 'move the place by a distance'
             )
+        offset = after
         if before:
             index, offset = index - 1, self._points[-1].duration / NANOSECONDS - before
             if not self._points[-1].duration or offset < 0.0 or index < 0:
