@@ -193,7 +193,7 @@ class Terminal(StringIO):
 
 
 def test_the_printed_command_finds_the_same_times_later(monkeypatch, capsys, tmp_path):
-    """Beads at other speeds than the default ones, measured at once, and later."""
+    """Beads of another speed and length than the default ones, measured at once, and later."""
     monkeypatch.setattr(valve_command, 'ready_driver', lambda _: nullcontext())
     monkeypatch.setattr(valve_command, 'lay_beads', lambda *_: True)
     monkeypatch.chdir(tmp_path)
@@ -204,23 +204,25 @@ def test_the_printed_command_finds_the_same_times_later(monkeypatch, capsys, tmp
         'tool_digital',
         '1',
         '--fast',
-        '0.1',
+        '1.5',
+        '--length',
+        '200mm',
         '--ruler',
         '0.1mm',
     ]
     laid += ['--lead-file', 'my leads.yaml', '--ur-type', 'ur3']
-    monkeypatch.setattr('sys.stdin', Terminal('4.8\n2.8\n'))
+    monkeypatch.setattr('sys.stdin', Terminal('88.8\n51.8\n'))
     assert main(laid) == 0
     printed = capsys.readouterr().out
     (at_once,) = read_leads(tmp_path / 'my leads.yaml')
     assert at_once.open == pytest.approx(0.06)
-    monkeypatch.setattr('sys.stdin', Terminal('4.8'))  # then Ctrl-D
+    monkeypatch.setattr('sys.stdin', Terminal('88.8'))  # then Ctrl-D
     assert main(laid) == 1
     shown = capsys.readouterr()
     assert 'the input ended before the answer' in shown.err
     (tmp_path / 'my leads.yaml').unlink()
     (command,) = [line for line in shown.out.splitlines() if line.startswith('ur-cartesian ')]
-    words = shlex.split(command.replace('BEGINS ENDS', '4.8 2.8'))
+    words = shlex.split(command.replace('BEGINS ENDS', '88.8 51.8'))
     assert main(words[1:]) == 0
     assert read_leads(tmp_path / 'my leads.yaml') == (at_once,)
     report = printed.splitlines()[-2].partition('[mm]? ')[2].rpartition('[mm]? ')[2]

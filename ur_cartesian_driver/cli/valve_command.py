@@ -145,9 +145,10 @@ def _check_speeds(beads: Iterable[Sequence[float]]) -> None:
 def later_command(arguments: argparse.Namespace) -> str:
     """Return the command that takes the distances of the beads that these arguments laid."""
     speeds = [f'--slow={arguments.slow:g}', f'--fast={arguments.fast:g}']
-    options = [f'--ruler={1e3 * arguments.ruler:g}mm', f'--ur-type={arguments.ur_type}']
-    words = [arguments.name, '--output', *arguments.output, *speeds, *options]
-    command = shlex.join([*words, f'--lead-file={arguments.lead_file}'])
+    beads = [f'--length={1e3 * arguments.length:g}mm', f'--ruler={1e3 * arguments.ruler:g}mm']
+    words = [arguments.name, '--output', *arguments.output, *speeds, *beads]
+    files = [f'--ur-type={arguments.ur_type}', f'--lead-file={arguments.lead_file}']
+    command = shlex.join([*words, *files])
     return f'ur-cartesian valve {command} --measured BEGINS ENDS'
 
 
