@@ -68,6 +68,10 @@ def test_a_long_rest_before_the_first_motion_is_passed_over():
     assert found.lag.value == pytest.approx(LAG, rel=0.01)
 
 
+def test_a_recording_without_two_packets_in_a_row_shows_no_errors():
+    assert find_arm_errors(recording(0.2, np.random.default_rng(0), noise=0.0)) is None
+
+
 def test_the_interval_at_rest_contains_the_resolution_of_the_joints():
     """A joint at rest keeps the error of its place between two steps, however long it rests."""
     errors = []

@@ -167,7 +167,8 @@ def _grid(samples: ArmSamples) -> _Grid | None:
     longest = int(np.argmax(np.diff(bounds)))
     begin, end = int(bounds[longest]), int(bounds[longest + 1])
     steps = np.abs(np.diff(samples.target_q[begin:end], axis=0)).max(axis=1, initial=0.0)
-    first_motion = int(np.argmax(steps > REST_SPEED * cycle))
+    moving = np.flatnonzero(steps > REST_SPEED * cycle)
+    first_motion = int(moving[0]) if len(moving) else 0
     part = slice(begin + max(0, first_motion - _REST_BEFORE), end)
     time = time[part]
     rows = np.round((time - time[0]) / cycle).astype(np.intp)
