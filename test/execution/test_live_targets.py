@@ -148,3 +148,21 @@ def test_times_are_positive(field):
     zero: dict[str, Any] = {field: 0.0}
     with pytest.raises(ValueError, match=field):
         replace(SETTINGS, **zero)
+
+
+def test_a_stop_soon_after_another_is_warned_of_if_it_lasts(session):
+    def texts(after):
+        session.now += after
+        return [warning.text.rpartition(': ')[2] for warning in session.live.age(session.now)]
+
+    session.generator.blocked = 'a limit'
+    assert texts(0.0) == ['a limit']
+    session.generator.blocked = ''
+    assert texts(0.1) == []
+    session.generator.blocked = 'another limit'
+    assert texts(0.1) == []
+    assert texts(2.0) == ['another limit']
+    for reason in ('', 'a third limit', ''):
+        session.generator.blocked = reason
+        assert texts(0.1) == []
+    assert texts(2.0) == []

@@ -76,10 +76,10 @@ class LiveTargets(Steerable, Ageing, Reporting):
     def age(self, now: float) -> list[GoalCommand]:
         """Drop a target that is too old, end the session after its timeout, warn of a limit."""
         generator = self.generator
-        warnings: list[GoalCommand] = []
-        if generator.blocked and not self._was_blocked:
-            text = f'the arm does not go to the live target: {generator.blocked}'
-            warnings = self._warnings.due(text, now)
+        if not generator.blocked:
+            self._warnings.forget()
+        elif not self._was_blocked:
+            self._warnings.ask(f'the arm does not go to the live target: {generator.blocked}')
         self._was_blocked = bool(generator.blocked)
         if generator.target is not None and self.freshness.is_stale(now):
             # Dropping the target does not stop an arm that already rests at it.
@@ -87,7 +87,7 @@ class LiveTargets(Steerable, Ageing, Reporting):
             generator.clear_target()
         self._last_came = min(self._last_came, now)
         self._is_over = now - self._last_came > self.settings.timeout
-        return warnings
+        return self._warnings.due(now)
 
     def next(self, dt: float) -> Joints:
         """Return the set-point [rad] that follows ``dt`` [s] of nominal time after the last."""

@@ -40,7 +40,7 @@ class FeedRequests(Overridable, Ageing, Reporting):
         self._newest = bounds.minimum
         #: Whether no value has come yet, which is no loss.
         self._is_silent = True
-        self._is_valid = self._is_loss_unsaid = False
+        self._is_valid = False
         self._invalid = self._lost = 0
         self._lowest, self._delay = bounds.maximum, 0.0
 
@@ -51,7 +51,8 @@ class FeedRequests(Overridable, Ageing, Reporting):
             self._lose()
         elif self._freshness.accept(age, now):
             self._newest = min(max(fraction, self.bounds.minimum), self.bounds.maximum)
-            self._is_valid, self._is_silent, self._is_loss_unsaid = True, False, False
+            self._is_valid, self._is_silent = True, False
+            self._warnings.forget()
 
     def read_input(self, packet: RobotState, now: float) -> None:
         """Accept the value of the input, if an input gives the values."""
@@ -62,20 +63,15 @@ class FeedRequests(Overridable, Ageing, Reporting):
         """Check the age of the newest value; warn, not too often, that the signal is lost."""
         if self._is_valid and self._freshness.is_stale(now):
             self._lose()
-        if not self._is_loss_unsaid:
-            return []
-        warnings = self._warnings.due(
-            'the signal of feed_override is invalid or older than '
-            f'{self.bounds.timeout:g} s: the motion slows down to {self.bounds.minimum:.0%}',
-            now,
-        )
-        self._is_loss_unsaid = not warnings
-        return warnings
+        return self._warnings.due(now)
 
     def _lose(self) -> None:
         self._lost += self._is_valid
         if self._is_valid or self._is_silent:
-            self._is_loss_unsaid = True
+            self._warnings.ask(
+                'the signal of feed_override is invalid or older than '
+                f'{self.bounds.timeout:g} s: the motion slows down to {self.bounds.minimum:.0%}'
+            )
         self._is_valid = self._is_silent = False
 
     @property

@@ -48,15 +48,23 @@ class Freshness:
 
 
 class RareWarnings:
-    """Limits the rate of a warning."""
+    """Limits the rate of warnings; one that comes too soon waits, unless its reason is gone."""
 
     def __init__(self) -> None:
         """Begin before the first warning."""
-        self._next = -inf
+        self._waiting, self._next = '', -inf
 
-    def due(self, text: str, now: float) -> list[GoalCommand]:
-        """Return a warning, or nothing within :data:`WARNING_PERIOD` of the last warning."""
-        if now < self._next:
+    def ask(self, text: str) -> None:
+        """Ask for a warning."""
+        self._waiting = text
+
+    def forget(self) -> None:
+        """Drop a warning that waits: its reason is gone."""
+        self._waiting = ''
+
+    def due(self, now: float) -> list[GoalCommand]:
+        """Return the warning that waits, or nothing within :data:`WARNING_PERIOD` of the last."""
+        if not self._waiting or now < self._next:
             return []
-        self._next = now + WARNING_PERIOD
+        text, self._waiting, self._next = self._waiting, '', now + WARNING_PERIOD
         return [LogWarning(text=text)]

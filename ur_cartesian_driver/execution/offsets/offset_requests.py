@@ -40,7 +40,7 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
         self._fades = band.on_stale is StaleOffset.FADE
         self._freshness, self._warnings = Freshness(band.timeout), RareWarnings()
         self._newest: Vector3 = ZERO3
-        self._is_stale, self._is_unsaid = True, False
+        self._is_stale = True
         self._cut = self._stale_count = 0
         self._largest = list(ZERO3)
 
@@ -56,21 +56,18 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
         )
         self._cut += self._newest != offset
         self._is_stale = False
+        self._warnings.forget()
 
     def age(self, now: float) -> list[GoalCommand]:
         """Check the age of the newest offset; warn, not too often, when it becomes stale."""
         before, self._is_stale = self._is_stale, self._freshness.is_stale(now)
         if self._is_stale and not before:
             self._stale_count += 1
-            self._is_unsaid = True
-        if not (self._is_stale and self._is_unsaid):
-            return []
-        follows = 'goes back to its path' if self._fades else 'stays where it was'
-        warnings = self._warnings.due(
-            f'the path offset is older than {self._band.timeout:g} s: the tool {follows}', now
-        )
-        self._is_unsaid = not warnings
-        return warnings
+            follows = 'goes back to its path' if self._fades else 'stays where it was'
+            self._warnings.ask(
+                f'the path offset is older than {self._band.timeout:g} s: the tool {follows}'
+            )
+        return self._warnings.due(now)
 
     def target(self, time: float) -> Vector3:
         """Return the offset to which the tool should move, at a time of the motion [s]."""
