@@ -279,17 +279,18 @@ class Recorder:
 
     def _flush(self, folder: RecordingFolder) -> None:
         """Have the filled rows written, and go on in another buffer."""
-        buffer, used = self._buffer, self._used
+        # A writer that outlives close() must not return its buffer to the next recording.
+        buffer, used, free_buffers = self._buffer, self._used, self._free_buffers
         self._used, self._flush_due = 0, self._time + FLUSH_PERIOD
         try:
-            self._buffer = self._free_buffers.get_nowait()
+            self._buffer = free_buffers.get_nowait()
         except Empty:  # all buffers wait for the disk: these rows are lost
             folder.lost_rows += used // disk.EXECUTED_STRUCT.size
             return
 
         def write() -> None:
             folder.run_guarded(lambda: folder.write_rows(memoryview(buffer)[:used]))
-            self._free_buffers.put(buffer)
+            free_buffers.put(buffer)
 
         if self._writer is not None:
             self._writer.submit(write)  # at most as many such jobs wait as there are buffers
