@@ -62,8 +62,9 @@ class DelayLine:
 
     def put(self, data: bytes, due: float) -> None:
         """Hold a piece back until it is due; pieces arrive in the order of the calls."""
-        self._pieces.append((due, data))
-        self.size += len(data)
+        if data:
+            self._pieces.append((due, data))
+            self.size += len(data)
 
     def take(self, now: float, rate: float = inf) -> bytes:
         """
