@@ -125,7 +125,7 @@ def _add_demo(command: CommandParser) -> None:
     command.add_argument(
         '--picture',
         type=argument_types.picture_file,
-        default='demo.png',
+        default=Path('demo.png'),  # not checked as a text would be: matplotlib is optional
         help='picture of the planned and executed path',
     )
     command.add_argument(
