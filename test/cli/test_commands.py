@@ -305,6 +305,14 @@ def test_a_taken_port_is_one_sentence(ur_sim, capsys):
     assert error.count('\n') == 1
 
 
+def test_the_demo_begins_without_matplotlib(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, 'matplotlib', None)
+    assert parser().parse_args(['demo']).picture == Path('demo.png')
+    with pytest.raises(SystemExit):
+        parser().parse_args(['demo', '--picture', 'seam.png'])
+    assert 'no picture without matplotlib' in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_the_picture_shows_what_was_recorded(tmp_path):
     pytest.importorskip('matplotlib')
@@ -390,10 +398,14 @@ def test_no_command_writes_over_the_file_that_it_reads(tmp_path, capsys, monkeyp
     goal.write_text((share_path() / 'config' / 'examples' / 'square.yaml').read_text())
     table.write_text('x [mm],y [mm],z [mm]\n1,2,3\n4,5,6\n')
     texts = goal.read_text(), table.read_text()
-    assert main(['send', 'goal.yaml', '--record', str(goal), '--wait', '0']) == 1
-    assert '--record names the goal itself' in capsys.readouterr().err
-    assert main(['import', 'a.csv', '--orientation', 'down', '-o', str(table)]) == 1
-    assert '-o names the file itself' in capsys.readouterr().err
+    for words in (
+        ['send', 'goal.yaml', '--record', str(goal), '--wait', '0'],
+        ['import', 'a.csv', '--orientation', 'down', '-o', str(table)],
+        ['show', 'goal.yaml', '-o', str(goal)],
+        ['sweep', str(goal), '-o', 'goal.yaml'],
+    ):
+        assert main(words) == 1
+        assert ' would be written over the file that is read; name' in capsys.readouterr().err
     assert (goal.read_text(), table.read_text()) == texts
 
 

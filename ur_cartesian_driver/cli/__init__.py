@@ -9,9 +9,11 @@ ROS import it, so ``sim`` and ``where`` run without ROS.
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections.abc import Sequence
 import sys
 
+from ur_cartesian_driver.cli.argument_types import check_outputs
 from ur_cartesian_driver.cli.command_parser import parser
 from ur_cartesian_driver.sim.command_line.console import run_command
 
@@ -21,4 +23,9 @@ __all__ = ['main', 'parser']
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status; 0 means that the command succeeded."""
     arguments = parser().parse_args(sys.argv[1:] if argv is None else argv)
-    return run_command(f'ur-cartesian {arguments.command}', arguments.run, arguments)
+
+    def run(arguments: Namespace) -> int:
+        check_outputs(arguments)
+        return int(arguments.run(arguments))
+
+    return run_command(f'ur-cartesian {arguments.command}', run, arguments)

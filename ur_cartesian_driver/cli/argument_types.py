@@ -63,13 +63,31 @@ def code_output(text: str) -> tuple[str, CodeOutput]:
     return parsed(parse_code_output, text)
 
 
-def output_file(text: str) -> str:
+class OutputFile(str):
+    """The name of a file that a command writes."""
+
+
+def output_file(text: str) -> OutputFile:
     """Return the name of a file; refuse one that cannot be written before the work begins."""
     try:
         check_writable(text)
     except OSError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
-    return text
+    return OutputFile(text)
+
+
+def check_outputs(arguments: argparse.Namespace) -> None:
+    """
+    Refuse to write over the file that a command reads.
+
+    :raises ValueError: an output is that file, maybe by another name.
+    """
+    read = getattr(arguments, 'file', None)
+    for written in vars(arguments).values():
+        if isinstance(written, OutputFile) and _is_same_file(written, read):
+            raise ValueError(
+                f'{written} would be written over the file that is read; name another one'
+            )
 
 
 def check_writable(name: str) -> None:
@@ -91,7 +109,7 @@ def check_writable(name: str) -> None:
         raise OSError(f'{name} cannot be written: no permission to write {written}')
 
 
-def picture_file(text: str) -> str:
+def picture_file(text: str) -> OutputFile:
     """Return the name of a picture; refuse its format or place before the work begins."""
     from ur_cartesian_driver.preview.pictures import check_suffix
 
@@ -217,8 +235,8 @@ def seconds(text: str) -> float:
     return number
 
 
-def is_same_file(one: str | None, other: str | None) -> bool:
-    """Return whether two options name one file that exists."""
+def _is_same_file(written: str, read: str | None) -> bool:
+    """Return whether two arguments name one file that exists."""
     with suppress(OSError):
-        return bool(one and other) and samefile(str(one), str(other))
+        return bool(written and read) and samefile(written, str(read))
     return False

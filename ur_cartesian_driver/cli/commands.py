@@ -14,7 +14,6 @@ import sys
 from time import monotonic
 from typing import Any, BinaryIO
 
-from ur_cartesian_driver.cli.argument_types import is_same_file
 from ur_cartesian_driver.cli.stopped_place import digest, read_place, write_place
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal, suggestion
@@ -53,10 +52,6 @@ def send(arguments: argparse.Namespace) -> int:
 
     # Before the motion: the file may be edited while the arm moves. A pipe can be read only once.
     is_noted = arguments.file != '-' and goal_file(arguments.file).is_file()
-    if is_same_file(arguments.record, arguments.file):
-        raise ValueError(
-            f'--record names the goal itself, {arguments.record}; choose another file'
-        )
     sent_file = digest(goal_file(arguments.file)) if is_noted else ''
     goal = whole = read_goal(arguments)
     validate_only = goal.validate_only or arguments.validate_only

@@ -8,7 +8,6 @@ import argparse
 from pathlib import Path
 import sys
 
-from ur_cartesian_driver.cli.argument_types import is_same_file
 from ur_cartesian_driver.cli.progress import timed
 from ur_cartesian_driver.goal_files import fields_of_goal, goal_text
 from ur_cartesian_driver.importing import (
@@ -32,8 +31,6 @@ MANY_POINTS = 200
 
 def import_goal(arguments: argparse.Namespace) -> int:
     """Convert a file to a goal, and print the remarks."""
-    if is_same_file(arguments.output, arguments.file):
-        raise ValueError(f'-o names the file itself, {arguments.output}; choose another one')
     try:
         with timed('importing'):
             imported = import_file(arguments.file, options_of(arguments), arguments.format)
