@@ -192,14 +192,14 @@ FOLLOW_COLUMNS = ('GAIN', 'OFFSET', 'MINIMUM', 'MAXIMUM', 'FILTER_TIME', 'ACTIVE
 LEAD_COLUMNS = ('TIME', 'LEFT', 'LEFT_LATER', 'PIECE', 'RATE', 'ACTIVE', 'TURNS')
 #: The columns for the pulses of an output: the distance between them [m], the way left to the next
 #: one [m], their width [s], how many are left, the slot, kind and pin of the output, whether those
-#: that are left at the end are not given; how long the output stays on [s], whether pulses are
+#: that are left at the end are dropped; how long the output stays on [s], whether pulses are
 #: given (1: since this step), and their count.
 PULSE_COLUMNS = (
     *('DISTANCE', 'WAY', 'WIDTH', 'LEFT', 'SLOT', 'OUTPUT', 'PIN', 'GOES_ON'),
     *('TIME_ON', 'ACTIVE', 'GIVEN'),
 )
-#: A tool that moves by less than this in a cycle is at a pulse if its way to there is not longer
-#: than this [m].
+#: The slowest motion that counts as one [m per cycle]. A slower tool is at a pulse that is no
+#: farther away than this.
 PULSE_TOLERANCE = 1e-6
 #: Planned speed [m/s or rad/s] below which the speed does not tell how fast the time runs.
 LEAD_MIN_SPEED = 2e-4

@@ -123,7 +123,8 @@ class Recorder:
         #: Slowly makes one file from the folder after the motion; None = not started yet.
         self._finisher: _Worker | None = None
         self._is_closing = False
-        #: The folder of the running motion; only the writer uses it, apart from ``lost_rows``.
+        #: The folder of the running motion; only the writer uses it, but for
+        #: ``lost_rows`` and ``is_plan_whole``.
         self._folder: RecordingFolder | None = None
         # Buffers for rows: the buffer being filled, the bytes used in it, and the free buffers.
         self._buffer, self._used = bytearray(), 0

@@ -62,7 +62,7 @@ class RecordingFolder:
         self._last_times: Floats = np.empty(0)
         #: How many rows were lost because the disk was too slow.
         self.lost_rows = 0
-        #: Whether no piece of the plan was lost in this way.
+        #: False once a piece of the plan was lost because the disk was too slow.
         self.is_plan_whole = True
 
     def open(self) -> None:

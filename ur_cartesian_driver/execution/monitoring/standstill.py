@@ -37,6 +37,7 @@ class Standstill:
 
         :param output_delay: how long after the end of the motion the last output is switched [s].
         """
+        # Faster than all(axis=1) for the few columns of a pose.
         still = reduce(np.logical_and, (np.abs(np.diff(path.poses, axis=0)) < SAME_POSE).T)
         longest = output_delay
         if still.any():

@@ -203,7 +203,7 @@ class PulseLaw:
     :param distance: way of the tool from pulse to pulse [m].
     :param phase: way from the place of the next output to the first pulse [m].
     :param width: how long a pulse is [s].
-    :param goes_on: whether the pulses that are left at the end of the trajectory are not given.
+    :param goes_on: whether pulses that are left at the end of the trajectory are dropped.
     """
 
     slot: int

@@ -19,7 +19,7 @@ def type_table(types: Collection[SegmentType]) -> Flags:
     """
     Return an array by segment type, True for ``types``.
 
-    Indexing it is faster than np.isin, and than to compare an array with a member.
+    Indexing it is faster than np.isin, and faster than comparing an array with a member.
     """
     return np.array([kind in types for kind in SegmentType])
 
@@ -28,8 +28,8 @@ IS_LINEAR, IS_JOINT = type_table((SegmentType.LINEAR,)), type_table((SegmentType
 IS_ARC, IS_PROCESS = type_table((SegmentType.CIRCULAR,)), type_table((SegmentType.PROCESS,))
 IS_ARC_OR_PROCESS = IS_ARC | IS_PROCESS
 _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
-#: By segment type: whether it moves the tool on a straight line; whether it is a straight line in
-#: joint space; whether its speeds are fractions of the robot's limits; and whether it takes a
+#: By segment type: whether it is a straight line in joint space; whether it moves the tool on a
+#: straight line; whether its speeds are fractions of the robot's limits; and whether it takes a
 #: speed of the tool.
 IS_JOINT_MOVE = type_table((SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT))
 IS_STRAIGHT = ~(IS_JOINT_MOVE | IS_ARC)

@@ -53,7 +53,7 @@ def joint_derivatives(
     options: PlanningOptions,
 ) -> JointDerivatives:
     """
-    Return the joints along a path.
+    Return the derivatives of the joints along a path by s.
 
     :param s: (m,) the places.
     :param poses: (m, 7) the poses of the tool there.

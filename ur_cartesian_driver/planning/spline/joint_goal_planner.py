@@ -293,7 +293,7 @@ def _sampled(trajectory: _Trajectory, state: RobotState, arm: Arm) -> _Samples:
 
 def _check_ranges(trajectory: _Trajectory, samples: _Samples, arm: Arm) -> None:
     low, high = np.array(arm.model.position_limits).T
-    # A joint that turns back between two samples gets a little farther than at these.
+    # A joint that turns back between two samples gets a little beyond both.
     q = samples.q
     close = ((q < low + _NEAR) | (q > high - _NEAR)).any(axis=1)
     if not close.any():

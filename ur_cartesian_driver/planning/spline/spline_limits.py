@@ -31,13 +31,17 @@ from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 
 _ROUNDING = 1e-6
 #: A joint is near a limit if the bound of its rate exceeds this part of the limit: the inverse of
-#: the Jacobian differs a little from place to place. It is computed at every so many samples.
-_NEAR, _FEW = 0.5, 3
+#: the Jacobian differs a little from place to place.
+_NEAR = 0.5
+#: The inverse of the Jacobian is computed at one of this many samples.
+_FEW = 3
 # Fractions of a short piece at which its rates are computed, beside those at its samples.
 _QUARTERS = (0.25, 0.5, 0.75)
 # The rates of a piece are computed at this many steps if a quantity may exceed the known greatest
-# excess by this factor between samples. So many pieces or rows at a time, to stay in the cache.
-_DENSE, _HIGHER, _BLOCK = 64, 1.001, 1024
+# excess by this factor between samples.
+_DENSE, _HIGHER = 64, 1.001
+# Pieces or rows that are computed at a time, so that they stay in the cache.
+_BLOCK = 1024
 
 
 #: A quantity along a spline: name of the tool or joint to which it belongs, values (m,), limit,

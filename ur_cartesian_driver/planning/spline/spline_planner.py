@@ -278,7 +278,7 @@ def _stop_fault(
 
 @lru_cache(maxsize=8)
 def rows_along(piece: Spline, state: SplineState, samples: int) -> tuple[Floats, Floats, Floats]:
-    """Return joint positions and their rates at times evenly along a piece that begins so."""
+    """Return joints and their rates at evenly spaced times of a piece that begins in a state."""
     spline = JointSpline.of(state.q, [piece], velocities=state.qd, accelerations=state.qdd)
     return spline.rows(np.linspace(0.0, piece.duration, samples))
 
