@@ -8,13 +8,14 @@ import shutil
 import subprocess
 import sys
 
+from checkout import CHECKOUT, needs_checkout
 import pytest
+from tracked_files import tracked_files
 import yaml
 
-CHECKOUT = Path(__file__).resolve().parents[1]
 MISSPELT = 'te' + 'h'
 HOOKS = CHECKOUT / '.pre-commit-config.yaml'
-pytestmark = pytest.mark.skipif(not HOOKS.is_file(), reason='only a checkout has these files')
+pytestmark = needs_checkout
 
 
 @pytest.fixture(scope='module')
@@ -126,3 +127,19 @@ def test_the_public_ci_has_every_python_that_is_supported(jobs):
     classifiers = re.findall(r'Python :: (3\.\d+)', (CHECKOUT / 'setup.py').read_text())
     _, python, _ = jobs['ci']['steps']
     assert python['with']['python-version'].split() == classifiers
+
+
+def test_what_reads_the_checkout_is_marked():
+    """Else it fails where the package is installed, long after `make test` has passed."""
+    reads = re.compile(r"\bCHECKOUT\b|/ '(?:doc|scripts|benchmark)'|'doc/")
+    unmarked = [
+        str(module.relative_to(CHECKOUT))
+        for module in tracked_files(CHECKOUT, 'test/**/test_*.py')
+        if reads.search(text := module.read_text('utf-8')) and 'needs_checkout' not in text
+    ]
+    # The browser's job runs in the checkout alone; the others look whether there is one.
+    assert unmarked == [
+        'test/browser/test_pages.py',
+        'test/browser/test_site.py',
+        'test/test_words.py',
+    ]

@@ -2,14 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The commit-msg hook enforces the layout of CONTRIBUTING."""
 
-from pathlib import Path
 import runpy
 import sys
 
+from checkout import CHECKOUT, needs_checkout
 import pytest
 
-SCRIPT = Path(__file__).resolve().parents[1] / 'scripts' / 'check_commit_message.py'
-pytestmark = pytest.mark.skipif(not SCRIPT.is_file(), reason='only a checkout has this file')
+SCRIPT = CHECKOUT / 'scripts' / 'check_commit_message.py'
+pytestmark = needs_checkout
 
 SUBJECT = 'Bound the blend radius by the shorter segment'
 LONG = 'Bound '.ljust(73, 'x')

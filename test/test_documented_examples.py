@@ -10,7 +10,8 @@ run as one cell in virtual time, where only the end of the goal is compared.
 
 from time import monotonic, sleep
 
-from pages import assert_shows, CHECKOUT, console_examples
+from checkout import CHECKOUT, needs_checkout
+from pages import assert_shows, console_examples
 import pytest
 from robot_cell import run_cell
 from tracked_files import tracked_files
@@ -31,9 +32,7 @@ from ur_cartesian_driver.sim.command_line.simulate import simulator_config
 from ur_cartesian_driver.sim.faults.fault_values import AfterTime
 from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 
-pytestmark = pytest.mark.skipif(
-    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has the documents'
-)
+pytestmark = needs_checkout
 
 ERRORS = CHECKOUT / 'doc' / 'errors.md'
 #: Tutorials whose commands need each other: test_tutorials.py runs them.

@@ -7,7 +7,8 @@ import os
 import subprocess
 import sys
 
-from pages import CHECKOUT, save_files
+from checkout import CHECKOUT, needs_checkout
+from pages import save_files
 import pytest
 from synthetic_recording import only_file, packet, record
 import yaml
@@ -280,7 +281,7 @@ def test_an_export_that_fails_leaves_no_file(folder, recording):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has the page')
+@needs_checkout
 def test_the_package_of_the_page_is_installed_and_works(tmp_path, recording):
     if not (find_spec('pip') and find_spec('setuptools')):
         pytest.skip('needs pip and setuptools')

@@ -15,6 +15,7 @@ import tomllib
 from unittest.mock import MagicMock
 from xml.etree import ElementTree
 
+from checkout import CHECKOUT, needs_checkout
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 import pytest
@@ -23,12 +24,8 @@ import yaml
 
 from ur_cartesian_driver.resources import share_path
 
-CHECKOUT = Path(__file__).resolve().parents[1]
 NAME = 'ur_cartesian_driver'
 pytestmark = pytest.mark.installation
-needs_checkout = pytest.mark.skipif(
-    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has this file'
-)
 
 COMMANDS = ['demo', 'send', 'show', 'sim', 'validate', 'where']
 EXECUTABLES = ['driver', 'ur_driver_names', *COMMANDS]

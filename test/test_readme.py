@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import fields
 import importlib.util
 import os
-from pathlib import Path
 import re
 import shlex
 import subprocess
@@ -16,6 +15,7 @@ from textwrap import indent
 import threading
 from xml.etree import ElementTree
 
+from checkout import CHECKOUT, needs_checkout
 import pytest
 from tracked_files import tracked_files
 
@@ -24,10 +24,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.sim.command_line import parser as simulator_parser
 
-CHECKOUT = Path(__file__).resolve().parents[1]
-pytestmark = pytest.mark.skipif(
-    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has the documents'
-)
+pytestmark = needs_checkout
 
 README = CHECKOUT / 'README.md'
 DOCUMENTS = [

@@ -3,16 +3,15 @@
 """`make release-check` refuses what must not be released."""
 
 import importlib.util
-from pathlib import Path
 import shutil
 
+from checkout import CHECKOUT, needs_checkout
 import pytest
 from tracked_files import tracked_files
 import yaml
 
-CHECKOUT = Path(__file__).resolve().parents[1]
 SCRIPT = CHECKOUT / 'scripts' / 'check_release.py'
-pytestmark = pytest.mark.skipif(not SCRIPT.is_file(), reason='only a checkout has this file')
+pytestmark = needs_checkout
 
 URL = 'https://github.com/welding-cell/ur_cartesian_driver'
 FILES = {

@@ -11,10 +11,10 @@ import ast
 import asyncio
 import errno
 from itertools import product
-from pathlib import Path
 import re
 import socket
 
+from checkout import CHECKOUT, needs_checkout
 import pytest
 from tracked_files import tracked_files
 
@@ -35,10 +35,9 @@ from ur_cartesian_driver.robot.services.recovery_steps import (
 )
 from ur_cartesian_driver.robot.transport import dial, error_reason, TcpConnection, TcpListener
 
-CHECKOUT = Path(__file__).resolve().parents[1]
 PAGES = [CHECKOUT / 'doc' / name for name in ('robot_setup.md', 'recovery.md')]
 PACKAGE = CHECKOUT / 'ur_cartesian_driver'
-pytestmark = pytest.mark.skipif(not PAGES[0].is_file(), reason='only a checkout has the documents')
+pytestmark = needs_checkout
 
 #: Where the sentences come from; the simulator says what a robot says itself.
 SOURCES = [

@@ -7,7 +7,6 @@ What its wheel does where it is installed is tested in ``simulator_alone``.
 """
 
 import configparser
-from pathlib import Path
 import re
 import shutil
 import subprocess
@@ -15,14 +14,11 @@ import sys
 import tomllib
 import zipfile
 
+from checkout import CHECKOUT, needs_checkout
 import pytest
 from tracked_files import tracked_files
 
-CHECKOUT = Path(__file__).resolve().parents[1]
-pytestmark = pytest.mark.skipif(
-    not (CHECKOUT / 'simulator' / 'setup.py').is_file(),
-    reason='only a checkout can build it',
-)
+pytestmark = needs_checkout
 NAME, DRIVER = 'ur_controller_sim', 'ur_cartesian_driver'
 #: Beside the files that only this package has.
 ROOMS = {

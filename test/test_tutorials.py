@@ -8,7 +8,8 @@ from runpy import run_path
 import subprocess
 import sys
 
-from pages import assert_shows, CHECKOUT, console_examples, save_files, saved_files
+from checkout import CHECKOUT, needs_checkout
+from pages import assert_shows, console_examples, save_files, saved_files
 import pytest
 from robot_cell import run_cell
 
@@ -22,9 +23,7 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.sim.simulator_config import HOME
 
-pytestmark = pytest.mark.skipif(
-    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has the documents'
-)
+pytestmark = needs_checkout
 
 DOC = CHECKOUT / 'doc'
 SEAM, FILE, NODE = (

@@ -9,10 +9,10 @@ place has a time of the plan, and the feed is how fast that time passes.
 
 from dataclasses import dataclass, field, replace
 from math import nan
-from pathlib import Path
 from random import Random
 from runpy import run_path
 
+from checkout import CHECKOUT, needs_checkout
 import numpy as np
 import pytest
 from random_cases import cases, random_of, SEED
@@ -39,7 +39,7 @@ from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 
 pytestmark = [pytest.mark.acceptance]
 
-EXAMPLE = Path(__file__).resolve().parents[2] / 'examples' / 'fed_bead.py'
+EXAMPLE = CHECKOUT / 'examples' / 'fed_bead.py'
 #: Of the planned line [m], [s].
 LENGTH, TIME = 0.12, 3.0
 #: Time between two values of a signal [s].
@@ -273,7 +273,7 @@ def test_points_are_appended_to_a_goal_that_a_signal_slows(mode):
     assert way == pytest.approx(0.08, abs=5e-5)
 
 
-@pytest.mark.skipif(not EXAMPLE.is_file(), reason='only a checkout has the examples')
+@needs_checkout
 def test_the_example_is_slowed_to_80_percent():
     async def scenario(cell):
         path = run_path(str(EXAMPLE))['fed_bead'](cell.memory.read().actual_tcp_pose)

@@ -3,11 +3,11 @@
 """Live targets through ROS: simulator, node and a sender of poses, in one process."""
 
 from math import hypot
-from pathlib import Path
 import re
 from time import monotonic
 from typing import Any
 
+from checkout import CHECKOUT, needs_checkout
 from geometry_msgs.msg import PoseStamped
 import pytest
 from rclpy.action.client import ActionClient
@@ -28,7 +28,7 @@ pytestmark = [
     ),
 ]
 
-PAGE = Path(__file__).resolve().parents[2] / 'doc' / 'live_targets.md'
+PAGE = CHECKOUT / 'doc' / 'live_targets.md'
 NAME = '/ur_cartesian_driver'
 
 
@@ -111,7 +111,7 @@ class Sender(Node):
         self.targets.publish(message)
 
 
-@pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has the documents')
+@needs_checkout
 def test_the_example_of_the_page_moves_the_tool_on_its_circle(ur_sim, cell_with):
     code = next(
         body

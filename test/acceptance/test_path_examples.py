@@ -11,10 +11,10 @@ import contextlib
 from dataclasses import replace
 from functools import partial
 from importlib import import_module, util
-from pathlib import Path as FilePath
 import threading
 from typing import Any
 
+from checkout import CHECKOUT, needs_checkout
 from goal_geometry import Kinematics
 from goal_judge import judge, promise_of, Run
 from plain_clients import PlainRtde
@@ -38,7 +38,7 @@ from ur_cartesian_driver.ros import CartesianDriverNode
 from ur_cartesian_driver.ros.client import GoalClient
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
-FOLDER = FilePath(__file__).resolve().parents[2] / 'examples'
+FOLDER = CHECKOUT / 'examples'
 #: By set-points, which keep to the clock, or against a part. In virtual time they are carried out
 #: by test_path_offsets.py, test_presses.py, test_replaced_tails.py, test_stall.py and
 #: test_feed_override.py.
@@ -50,7 +50,7 @@ pytestmark = [
     pytest.mark.acceptance,
     pytest.mark.slow,
     pytest.mark.exhaustive,
-    pytest.mark.skipif(not NAMES, reason='only a checkout has the examples'),
+    needs_checkout,
 ]
 
 #: Simulated seconds per second, and cycles per simulated second: one that small computers can do.

@@ -5,9 +5,9 @@
 from dataclasses import replace
 from math import hypot, pi, sin
 import os
-from pathlib import Path as FilePath
 from runpy import run_path
 
+from checkout import CHECKOUT, needs_checkout
 import numpy as np
 import pytest
 from recorded_goal import RecordedGoal
@@ -34,7 +34,7 @@ TIME, LENGTH, BEND = 4.0, 0.16, 0.005
 PERIOD = 0.02
 #: How many seams get random offsets; 100 take two minutes.
 SEAMS = int(os.environ.get('OFFSET_SEAMS', '1'))
-EXAMPLE = FilePath(__file__).resolve().parents[2] / 'examples' / 'tracked_seam.py'
+EXAMPLE = CHECKOUT / 'examples' / 'tracked_seam.py'
 
 
 class TrackedSeam(RecordedGoal):
@@ -256,7 +256,7 @@ def test_the_controller_offsets_lines_arcs_and_rests_as_one_path():
     assert speeds.max() < hypot(0.05 * (radius + aside) / radius, 0.02) + 0.001
 
 
-@pytest.mark.skipif(not EXAMPLE.is_file(), reason='only a checkout has the examples')
+@needs_checkout
 def test_the_example_is_tracked_3_mm_to_the_side():
     async def scenario(cell):
         path = run_path(str(EXAMPLE))['tracked_seam'](cell.memory.read().actual_tcp_pose)

@@ -16,7 +16,7 @@ import subprocess
 from time import monotonic, sleep
 import urllib.request
 
-from pages import CHECKOUT
+from checkout import CHECKOUT, needs_checkout
 import pytest
 from random_cases import cases, random_of, SEED
 from waiting import wait_for
@@ -145,7 +145,7 @@ def test_a_driver_that_comes_later_needs_another_play(generation):
             run_goal(driver, 0.02)
 
 
-@pytest.mark.skipif(not EXAMPLE.is_file(), reason='only a checkout has the examples')
+@needs_checkout
 def test_the_arm_comes_round_to_the_example_of_a_tool_change():
     host = '127.9.0.41'
     tool_change = run_path(str(EXAMPLE.with_suffix('.py')))['tool_change']

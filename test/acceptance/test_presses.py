@@ -9,10 +9,10 @@ wiring, not the robot. All in virtual time.
 
 from dataclasses import replace
 from math import nan
-from pathlib import Path as FilePath
 import re
 from runpy import run_path
 
+from checkout import CHECKOUT, needs_checkout
 import numpy as np
 import pytest
 from robot_cell import run_cell
@@ -51,7 +51,7 @@ DOWN = Press(
 )
 TABLE = -0.003
 TIGHT = Tolerance(position=(0.0005,) * 3, orientation=(0.01,) * 3)
-EXAMPLE = FilePath(__file__).resolve().parents[2] / 'examples' / 'grind.py'
+EXAMPLE = CHECKOUT / 'examples' / 'grind.py'
 
 
 def put(cell, shape, offset, extent, **properties):
@@ -384,7 +384,7 @@ def test_the_frame_of_the_tool_turns_with_it():
     run_cell(scenario)
 
 
-@pytest.mark.skipif(not EXAMPLE.is_file(), reason='only a checkout has the examples')
+@needs_checkout
 def test_the_example_grinds_two_sides():
     async def scenario(cell):
         put(cell, 'plane', (0.0, 0.0, -0.032), (0.0, 0.0, 1.0))  # as its comment says

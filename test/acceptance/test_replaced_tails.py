@@ -11,11 +11,11 @@ from dataclasses import replace
 import gc
 from math import pi
 import os
-from pathlib import Path as FilePath
 from runpy import run_path
 import sys
 
 from append_goals import AppendMotion, moved, retained_sizes
+from checkout import CHECKOUT, needs_checkout
 from example_goals import example_goal
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ MAX_JUMP = 1.0
 #: Of the tool on the circle [m/s].
 SPEED = 2.0 * pi / PERIOD * RADIUS
 ARM = Arm(robot_model('ur5e'))
-EXAMPLE = FilePath(__file__).resolve().parents[2] / 'examples' / 'replanned.py'
+EXAMPLE = CHECKOUT / 'examples' / 'replanned.py'
 
 
 async def replanned(cell, mode, rate):
@@ -177,7 +177,7 @@ def test_a_goal_that_is_cancelled_while_it_waits_says_where_it_rests(mode):
     run_cell(scenario)
 
 
-@pytest.mark.skipif(not EXAMPLE.is_file(), reason='only a checkout has the examples')
+@needs_checkout
 def test_the_chunks_of_the_example_are_one_motion():
     replanned = run_path(str(EXAMPLE))['replanned']
 

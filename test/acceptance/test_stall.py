@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Goals that wait for an arm that is off its path, judged by what RTDE reports."""
 
-from pathlib import Path as FilePath
 from runpy import run_path
 
+from checkout import CHECKOUT, needs_checkout
 import numpy as np
 import pytest
 from recorded_goal import RecordedGoal
@@ -19,7 +19,7 @@ pytestmark = [pytest.mark.acceptance]
 #: Of the planned motion [s], [m].
 TIME, DISTANCE = 2.0, 0.2
 ALLOWED, PUSHED = 0.005, 0.02
-EXAMPLE = FilePath(__file__).resolve().parents[2] / 'examples' / 'stall.py'
+EXAMPLE = CHECKOUT / 'examples' / 'stall.py'
 
 
 def start(cell, **fields):
@@ -78,7 +78,7 @@ def test_the_motion_waits_on_its_path_and_goes_on():
     assert line.startswith('the motion waited once for an arm that was off its path, for 0.9')
 
 
-@pytest.mark.skipif(not EXAMPLE.is_file(), reason='only a checkout has the examples')
+@needs_checkout
 def test_the_example_waits():
     async def scenario(cell):
         path = run_path(str(EXAMPLE))['stall'](cell.memory.read().actual_tcp_pose)

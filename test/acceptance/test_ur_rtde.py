@@ -22,6 +22,7 @@ import threading
 import time
 from typing import Any
 
+from checkout import CHECKOUT, needs_checkout
 import numpy as np
 from numpy.typing import ArrayLike
 import pytest
@@ -506,7 +507,7 @@ def test_its_dashboard_unlocks_a_protective_stop_and_cycles_the_power():
     assert seen['ended']['ended']
 
 
-PAGE = Path(__file__).parents[2] / 'doc' / 'coming_from' / 'ur_rtde.md'
+PAGE = CHECKOUT / 'doc' / 'coming_from' / 'ur_rtde.md'
 
 
 def way_of(snippet: str) -> np.ndarray:
@@ -537,7 +538,7 @@ def way_of(snippet: str) -> np.ndarray:
 @pytest.mark.acceptance
 @pytest.mark.slow
 @pytest.mark.exhaustive
-@pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has the documents')
+@needs_checkout
 def test_the_page_for_those_who_come_from_it_does_one_job_on_both_sides():
     snippets = re.findall(r'^```python\n(.*?)^```', PAGE.read_text('utf-8'), re.DOTALL | re.M)
     theirs, ours = map(way_of, snippets)

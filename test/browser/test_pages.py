@@ -8,10 +8,10 @@ Only with ``--browser PATH``: the path of Chromium, which playwright drives.
 
 from io import BytesIO
 import os
-from pathlib import Path
 import subprocess
 import sys
 
+from checkout import CHECKOUT
 from example_goals import PRELUDE_ARGUMENTS
 from matplotlib.image import imread
 import numpy as np
@@ -24,7 +24,7 @@ from ur_cartesian_driver.path import Path as ArmPath
 
 pytest.importorskip('playwright.sync_api')
 
-EXAMPLES = tracked_files(Path(__file__).parents[2], 'config/examples/*.yaml')
+EXAMPLES = tracked_files(CHECKOUT, 'config/examples/*.yaml')
 #: Right of the text, above the time bar.
 SIZE = {'width': 640, 'height': 360}
 VIEW = {'x': 290, 'y': 0, 'width': 350, 'height': 310}

@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The search of the documentation site finds the right page first, without a network."""
 
-from pathlib import Path
-
+from checkout import CHECKOUT
 import pytest
 
-SITE = Path(__file__).parents[2] / 'build' / 'site'
+SITE = CHECKOUT / 'build' / 'site'
 #: What a newcomer types, and the pages of which one has to come first.
 FIRST = {
     'blend': ['blends'],

@@ -16,6 +16,7 @@ import threading
 import tracemalloc
 from typing import cast
 
+from checkout import CHECKOUT, needs_checkout
 import numpy as np
 import pytest
 from synthetic_recording import (
@@ -53,7 +54,6 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.resources import share_path
 
 # ---- contents of a file -------------------------------------------------------------------------
 
@@ -468,8 +468,9 @@ def test_the_metadata_have_what_only_the_planner_knew():
     json.dumps(metadata)
 
 
+@needs_checkout
 def test_the_documented_size_is_that_of_the_packets():
     """At 500 Hz, as the reader of a parameter sees it."""
     size = f'{recording_format.EXECUTED_DTYPE.itemsize * 500 / 1e6:.2f} MB a second'
     for page in ('doc/recordings.md', 'config/driver.yaml'):
-        assert size in (share_path() / page).read_text(encoding='utf-8'), page
+        assert size in (CHECKOUT / page).read_text(encoding='utf-8'), page

@@ -3,14 +3,12 @@
 """The page about faults is generated from the tested table."""
 
 import importlib.util
-from pathlib import Path
 
-import pytest
+from checkout import CHECKOUT, needs_checkout
 
-CHECKOUT = Path(__file__).resolve().parents[2]
 SCRIPT = CHECKOUT / 'scripts' / 'make_faults.py'
 
-pytestmark = pytest.mark.skipif(not SCRIPT.exists(), reason='tests of a package, not a checkout')
+pytestmark = needs_checkout
 
 
 def test_the_page_about_faults_is_that_of_the_table():

@@ -3,18 +3,16 @@
 """Tables as scanners, spreadsheets and offline programming write them."""
 
 from math import pi, sin
-from pathlib import Path
 import re
 
 from broken_files import broken, goal_or_sentence
+from checkout import CHECKOUT, needs_checkout
 import numpy as np
 import pytest
 from random_cases import cases, random_of
 from random_tables import random_table
 
 from ur_cartesian_driver.importing import BrokenFile, import_file, ImportOptions, ToolOrientation
-
-CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: As the export of a line scanner with normals: comments first, then units.
 SCANNER = """# scanner export, 2026-03-04
@@ -159,7 +157,7 @@ def test_a_long_header_is_shown_with_dots(tmp_path):
     assert str(caught.value) == f"line 1: the column 'y' is missing; the header is {shown}."
 
 
-@pytest.mark.skipif(not (CHECKOUT / 'doc').is_dir(), reason='only a checkout has this page')
+@needs_checkout
 def test_the_table_of_the_page_is_read(tmp_path):
     page = (CHECKOUT / 'doc' / 'importing.md').read_text(encoding='utf-8')
     table = page.split('### Tables')[1].split('```\n')[1]

@@ -2,18 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of the importers has the tables that they use."""
 
-from pathlib import Path
 import re
 
+from checkout import CHECKOUT, needs_checkout
 import pytest
 
 from ur_cartesian_driver.importing import FORMATS, Treatment
 
-CHECKOUT = Path(__file__).resolve().parents[2]
 OURS = [name for name in FORMATS.built_in if not name.startswith('.')]
 
 
-@pytest.mark.skipif(not (CHECKOUT / 'doc').is_dir(), reason='only a checkout has this page')
+@needs_checkout
 def test_the_page_has_the_tables_of_the_importers(monkeypatch):
     monkeypatch.syspath_prepend(CHECKOUT / 'scripts')
     from make_import_tables import PAGE, page_with_tables

@@ -3,9 +3,9 @@
 """Every error a goal can end with has its one code, and keeps its sentence on its way."""
 
 import copy
-from pathlib import Path
 import pickle
 
+from checkout import CHECKOUT, needs_checkout
 import pytest
 
 from ur_cartesian_driver.motion.errors import (
@@ -23,10 +23,6 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.events import Outcome
 
-CHECKOUT = Path(__file__).resolve().parents[2]
-needs_checkout = pytest.mark.skipif(
-    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has this file'
-)
 SENTENCE = 'points[2]: the wrist centre lies 1.2 m from the shoulder, and the reach is 0.85 m.'
 
 

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The snippets of the page on paths run, one after the other, and plan what they compose."""
 
-from pathlib import Path as FilePath
 import re
 
+from checkout import CHECKOUT, needs_checkout
 import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -18,9 +18,8 @@ from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.ros import client
 from ur_cartesian_driver.sim.simulator_config import HOME
 
-CHECKOUT = FilePath(__file__).resolve().parents[2]
 PAGE = CHECKOUT / 'doc' / 'paths.md'
-pytestmark = pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has the documents')
+pytestmark = needs_checkout
 
 ARM = Arm(robot_model('ur5e'))
 STATE = state_at_rest(ARM, HOME)

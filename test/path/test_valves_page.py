@@ -4,8 +4,8 @@
 
 import re
 
-from pages import assert_shows, CHECKOUT, console_examples
-import pytest
+from checkout import CHECKOUT, needs_checkout
+from pages import assert_shows, console_examples
 
 from ur_cartesian_driver.cli import main
 from ur_cartesian_driver.goal_files.goal_file import read_goal_file
@@ -13,7 +13,7 @@ from ur_cartesian_driver.goal_files.lead_file import read_leads
 from ur_cartesian_driver.path import Path
 
 PAGE = CHECKOUT / 'doc' / 'valves.md'
-pytestmark = pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has the documents')
+pytestmark = needs_checkout
 
 
 def block(language):

@@ -3,9 +3,9 @@
 """The experiments tell the laws apart by which a controller may move."""
 
 from dataclasses import replace
-from pathlib import Path
 import re
 
+from checkout import CHECKOUT, needs_checkout
 import numpy as np
 import pytest
 
@@ -177,8 +177,9 @@ def test_programs_are_indented_and_move_slowly():
     assert experiments.TOOL_SPEED <= 0.05
 
 
+@needs_checkout
 def test_programs_use_no_name_of_a_function_for_a_variable():
-    page = Path(__file__).parents[2] / 'doc' / 'script_functions.md'
+    page = CHECKOUT / 'doc' / 'script_functions.md'
     functions = set(re.findall(r'^\| `(\w+)\(', page.read_text('utf-8'), re.MULTILINE))
     assert {'size', 'norm', 'movej'} <= functions
     for experiment in EXPERIMENTS:

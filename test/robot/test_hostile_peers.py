@@ -4,10 +4,10 @@
 
 import asyncio
 import contextlib
-from pathlib import Path
 import re
 import struct
 
+from checkout import CHECKOUT, needs_checkout
 import pytest
 from virtual_network import HOST, VirtualLoop
 
@@ -18,7 +18,6 @@ from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.program.program_sockets import ProgramCallbacks, ProgramSockets
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 
-CHECKOUT = Path(__file__).resolve().parents[2]
 PROGRAM_PORTS = ('trajectory_port', 'script_command_port', 'reverse_port')
 RTDE_PORT = 30004
 ATTACKS = {
@@ -143,9 +142,7 @@ def test_who_answers_in_the_place_of_the_robot_is_left_within_seconds(answer):
         runner.run(scene())
 
 
-@pytest.mark.skipif(
-    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has the documents'
-)
+@needs_checkout
 def test_each_claim_of_the_security_page_has_the_tests_that_it_names():
     page = (CHECKOUT / 'doc' / 'security.md').read_text(encoding='utf-8')
     named = re.findall(r'`(test/[\w/]+\.py)::(test_\w+)`', page)

@@ -2,17 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of topics and services lists all interfaces of the node, and nothing else."""
 
-from pathlib import Path
 import re
 
+from checkout import CHECKOUT, needs_checkout
 import pytest
 
 from ur_cartesian_driver.ros.message_fields import class_of
 
-PAGE = Path(__file__).resolve().parents[2] / 'doc' / 'ros_interface.md'
+PAGE = CHECKOUT / 'doc' / 'ros_interface.md'
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has the documents'),
+    needs_checkout,
 ]
 
 #: What every node has, and what belongs to the action.

@@ -3,8 +3,8 @@
 """The page of script functions has what the controller registers, and nothing else."""
 
 import inspect
-from pathlib import Path
 
+from checkout import CHECKOUT, needs_checkout
 import pytest
 from script_calls import call
 
@@ -100,7 +100,6 @@ SIGNATURES = """
     socket_set_var name value socket_name?
     """.strip().splitlines()
 
-CHECKOUT = Path(__file__).resolve().parents[2]
 
 SCRIPT = CHECKOUT / 'scripts' / 'make_script_functions.py'
 WITHOUT_EFFECT = sorted(
@@ -116,19 +115,19 @@ CLOCKS = ('timestamp', 'control_step', 'actual_execution_time')
 
 @pytest.fixture
 def script(monkeypatch):
-    if not SCRIPT.is_file():
-        pytest.skip('only a checkout has this file')
     monkeypatch.syspath_prepend(SCRIPT.parent)
     import make_script_functions
 
     return make_script_functions
 
 
+@needs_checkout
 def test_the_page_is_that_of_the_registered_functions(script):
     page = script.PAGE.read_text(encoding='utf-8')
     assert page == script.page(), 'run python scripts/make_script_functions.py'
 
 
+@needs_checkout
 def test_each_function_of_the_manual_is_simulated_or_refused(script):
     names = {row[0].strip('`').split('(')[0] for row in script.rows()}
     assert set(script.MANUAL_5_21) - names == set()
@@ -148,6 +147,7 @@ def test_arguments_are_those_of_the_manual(bench, line):
     assert all(other.endswith('?') for other in found[len(wanted) :])
 
 
+@needs_checkout
 def test_what_the_page_calls_refused_is_refused(script, bench):
     for name in script.NOT_SIMULATED:
         bench.programs.submit(f'def f():\n  {name}()\nend\n')

@@ -7,8 +7,6 @@ from pathlib import Path
 import re
 import shlex
 
-CHECKOUT = Path(__file__).resolve().parents[2]
-
 #: A block that a paragraph like "Save it as `first.py`:" introduces.
 _SAVED = re.compile(
     r'[Ss]ave (?:it|this)\s(?:there\s)?as `([\w.]+)`(?:(?!\n\n).)*?:\n\n```\w+\n(.*?)^```$',

@@ -21,7 +21,8 @@ import subprocess
 import sys
 from types import ModuleType
 
-CHECKOUT = Path(__file__).resolve().parents[2]
+from checkout import CHECKOUT
+
 DEFINITIONS = CHECKOUT / 'test' / 'interfaces'
 ROS_WHEELS = CHECKOUT / 'cmake' / 'ros_wheels.cmake'
 BUILD = CHECKOUT / 'build' / f'test-interfaces-{sys.implementation.cache_tag}'

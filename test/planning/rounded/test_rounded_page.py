@@ -8,9 +8,9 @@ speeds.
 """
 
 from math import cbrt, cos, radians, sin, sqrt, tan
-from pathlib import Path as FilePath
 import re
 
+from checkout import CHECKOUT, needs_checkout
 from curve_distance import distances
 import numpy as np
 import pytest
@@ -30,8 +30,7 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.sim import HOME
 
-PAGE = FilePath(__file__).resolve().parents[3] / 'doc' / 'rounded_corners.md'
-needs_page = pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has the documents')
+PAGE = CHECKOUT / 'doc' / 'rounded_corners.md'
 
 ARM = Arm(robot_model('ur5e'))
 STATE = state_at_rest(ARM, HOME)
@@ -63,7 +62,7 @@ def table():
     ]
 
 
-@needs_page
+@needs_checkout
 @pytest.mark.slow
 def test_the_table_has_the_speeds_of_the_planner():
     _, _, after = PAGE.read_text(encoding='utf-8').partition('<!-- speeds: ')
@@ -85,7 +84,7 @@ def test_the_formula_is_near_the_planned_speed(angle, deviation, acceleration, j
     assert slowest(deviation, acceleration, jerk, angle, 0.25) == pytest.approx(shown, rel=0.15)
 
 
-@needs_page
+@needs_checkout
 def test_the_examples_are_the_same_goal():
     from ur_cartesian_driver.motion.goal.known_frames import Frames
     from ur_cartesian_driver.ros.client import load_goal

@@ -3,9 +3,9 @@
 """The table of names: complete, and what the node offers."""
 
 import importlib.util
-from pathlib import Path
 import re
 
+from checkout import CHECKOUT, needs_checkout
 import pytest
 
 from ur_cartesian_driver.ros.ur_driver_names.name_table import NAMES
@@ -13,7 +13,7 @@ from ur_cartesian_driver.ros.ur_driver_names.offered_name import Absent
 
 pytestmark = pytest.mark.slow
 
-SCRIPT = Path(__file__).resolve().parents[3] / 'scripts' / 'make_ur_driver_names.py'
+SCRIPT = CHECKOUT / 'scripts' / 'make_ur_driver_names.py'
 #: What launch files, scripts and integration tests of the UR driver name, by its nodes.
 EXPECTED = {
     'dashboard_client': """
@@ -56,7 +56,7 @@ def test_the_table_has_each_name_once():
     assert expected | {'joint_states'} <= set(names)
 
 
-@pytest.mark.skipif(not SCRIPT.is_file(), reason='only a checkout has the documents')
+@needs_checkout
 def test_the_page_has_the_tables():
     spec = importlib.util.spec_from_file_location('make_ur_driver_names', SCRIPT)
     script = importlib.util.module_from_spec(spec)

@@ -1,0 +1,14 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The checkout that these tests are part of; tests of an installed package have none."""
+
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+
+#: Marks what reads documents, examples or scripts: a package installs none of them.
+needs_checkout = pytest.mark.skipif(
+    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has this'
+)
