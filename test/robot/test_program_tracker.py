@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 from ur_cartesian_driver.protocol.program.registers import PROGRAM_VERSION
-from ur_cartesian_driver.robot.program.program_tracker import ProgramTracker
+from ur_cartesian_driver.robot.program.program_tracker import IDENTITY_TIMEOUT, ProgramTracker
 
 NUMBER = 7
 
@@ -55,6 +55,21 @@ def test_a_connected_program_proves_itself_again_after_the_robot_was_lost():
         tracker.observe(report(9.0, run=4))
         assert tracker.is_own
         assert await tracker.wait_for_identity()
+
+    asyncio.run(scenario())
+
+
+def test_a_program_that_is_gone_is_not_waited_for():
+    async def scenario():
+        sockets = Sockets()
+        tracker = ProgramTracker(cast(Any, sockets))
+        tracker.program_connected()
+        waiting = asyncio.ensure_future(tracker.wait_for_identity())
+        await asyncio.sleep(0)
+        sockets.connected = False
+        tracker.program_lost()
+        async with asyncio.timeout(0.5 * IDENTITY_TIMEOUT):
+            assert not await waiting
 
     asyncio.run(scenario())
 

@@ -74,7 +74,7 @@ def test_a_watch_is_cancelled_and_refuses_another_one(single_cell, client):
         False,
         'Another goal watches for contact; cancel it first.',
     )
-    cell.await_(watching.cancel_goal_async())
+    assert cell.await_(watching.cancel_goal_async()).goals_canceling
     assert end(cell, watching) == (
         GoalStatus.STATUS_CANCELED,
         False,
@@ -86,8 +86,9 @@ def test_a_watch_without_a_robot_program_is_aborted(single_cell, client):
     cell = single_cell
     watching = send(cell, client)
     cell.spin_until(lambda: not cell.node.contact_action.idle)
-    # Calls are carried out in their order, so the watch has begun when this one is answered.
-    assert cell.node.driver.zero_ftsensor().ok
+    # Both wait until the program is known to be ours, and begin in their order.
+    refused = cell.node.driver.watch_contact().result()
+    assert 'watches for contact already' in refused.text
     cell.sim.stop_program()
     status, success, message = end(cell, watching)
     assert (status, success) == (GoalStatus.STATUS_ABORTED, False)

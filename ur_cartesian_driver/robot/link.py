@@ -381,6 +381,7 @@ class RobotLink:
             self._explain_timer = asyncio.get_running_loop().call_later(
                 CAUSE_TIMEOUT, self.explain, 'The robot program is gone.'
             )
+        self.control.tracker.program_lost()
         self.control.tcp_setter.program_lost()
         self.contact_watch.program_lost(reason)
         self._status.apply(

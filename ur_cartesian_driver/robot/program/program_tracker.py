@@ -43,7 +43,8 @@ class ProgramTracker:
         self._has_shown_itself = False
         #: The last reported count of the robot program's connections, now and when it connected.
         self._run = self._run_at_connection = 0
-        self._identity = asyncio.Event()
+        #: Set when it is known whether the program is ours: it has shown itself, or is gone.
+        self._identified = asyncio.Event()
         self._connected_at = -inf
 
     @property
@@ -58,6 +59,10 @@ class ProgramTracker:
         self._connected_at = asyncio.get_running_loop().time()
         self._forget_identity()
 
+    def program_lost(self) -> None:
+        """End the wait for a proof, which a program that is gone does not give."""
+        self._identified.set()
+
     def robot_lost(self) -> None:
         """
         Forget what the robot has reported of its program, because another one can start unseen.
@@ -71,13 +76,13 @@ class ProgramTracker:
 
     def _forget_identity(self) -> None:
         self._has_shown_itself = False
-        self._identity.clear()
+        self._identified.clear()
 
     async def wait_for_identity(self) -> bool:
         """Return whether the connected program is ours, as soon as that is known."""
         try:
             async with asyncio.timeout_at(self._connected_at + IDENTITY_TIMEOUT):
-                await self._identity.wait()
+                await self._identified.wait()
         except TimeoutError:
             pass
         return self.is_own
@@ -105,7 +110,7 @@ class ProgramTracker:
             and robot.program_number == sockets.program_number
         ):
             self._has_shown_itself = True
-            self._identity.set()
+            self._identified.set()
 
     def foreign_program_runs(self, robot: RobotState | None) -> bool:
         """Return whether the robot runs a program that has not connected to us."""

@@ -250,9 +250,10 @@ class ServiceDispatcher:
             )
         if refusal := self._paused():
             return refusal
+        is_own = await link.control.tracker.wait_for_identity()
         if not link.program.connected:
             return failed(f'Only the robot program can watch for contact. {link.status.message}')
-        if not await link.control.tracker.wait_for_identity():
+        if not is_own:
             # Others leave the goal that contact stops without a result.
             return failed(f'This is a watch for contact, {NEEDS_OWN_PROGRAM}')
         try:
