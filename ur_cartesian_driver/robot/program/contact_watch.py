@@ -11,7 +11,7 @@ come long after anyone needs it.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 
 from ur_cartesian_driver.motion.errors import RobotNotReady
 from ur_cartesian_driver.protocol.program import script_command
@@ -42,11 +42,12 @@ class ContactWatch:
         """Return whether the program watches for contact, as far as it has answered."""
         return self._answer is not None
 
-    async def run(self) -> bool:
+    def begin(self) -> Awaitable[bool]:
         """
-        Watch for contact; return whether the tool has touched, or False after :meth:`end`.
+        Begin to watch; what is returned gives True at contact, and False after :meth:`end`.
 
-        :raises RobotNotReady: the program watches already, or its watch ended with the program.
+        :raises RobotNotReady: the program watches already or does not run; if awaited, the watch
+            ended with the program.
         """
         if self.is_active:
             raise RobotNotReady(
@@ -57,9 +58,12 @@ class ContactWatch:
             script_command.encode(script_command.StartToolContactCommand())
         ):
             raise RobotNotReady('The robot program, which watches for contact, does not run.')
-        answer = self._answer = asyncio.get_running_loop().create_future()
+        self._answer = asyncio.get_running_loop().create_future()
         self._ends.clear()
         self._changed(True)
+        return self._outcome(self._answer)
+
+    async def _outcome(self, answer: asyncio.Future[ToolContactResult | str]) -> bool:
         ending = asyncio.ensure_future(self._ends.wait())
         try:
             await asyncio.wait((answer, ending), return_when=asyncio.FIRST_COMPLETED)

@@ -112,6 +112,8 @@ class ServiceDispatcher:
 
             self._run_script = ScriptRunner(settings, link, self._send_program).run
         self._pending_settings = 0
+        #: Lets no call end a watch before one made earlier has begun it.
+        self._order_of_watches = asyncio.Lock()
 
     @property
     def is_changing_settings(self) -> bool:
@@ -168,9 +170,8 @@ class ServiceDispatcher:
             case calls.WatchContactCall():
                 return await self._watch_contact()
             case calls.EndContactWatchCall():
-                # A call that was made before this one may still wait for it, too.
-                await self._link.control.tracker.wait_for_identity()
-                self._link.contact_watch.end()
+                async with self._order_of_watches:
+                    self._link.contact_watch.end()
                 return succeeded('The watch for contact is being ended.')
             case calls.SendProgramCall():
                 return await self._send_program()
@@ -250,14 +251,18 @@ class ServiceDispatcher:
             )
         if refusal := self._paused():
             return refusal
-        is_own = await link.control.tracker.wait_for_identity()
-        if not link.program.connected:
-            return failed(f'Only the robot program can watch for contact. {link.status.message}')
-        if not is_own:
-            # Others leave the goal that contact stops without a result.
-            return failed(f'This is a watch for contact, {NEEDS_OWN_PROGRAM}')
         try:
-            touched = await link.contact_watch.run()
+            async with self._order_of_watches:
+                is_own = await link.control.tracker.wait_for_identity()
+                if not link.program.connected:
+                    return failed(
+                        f'Only the robot program can watch for contact. {link.status.message}'
+                    )
+                if not is_own:
+                    # Others leave the goal that contact stops without a result.
+                    return failed(f'This is a watch for contact, {NEEDS_OWN_PROGRAM}')
+                outcome = link.contact_watch.begin()
+            touched = await outcome
         except DriverError as error:
             return failed(str(error))
         if not touched:
