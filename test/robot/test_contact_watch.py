@@ -15,11 +15,9 @@ from ur_cartesian_driver.protocol.program.script_command import ToolContactResul
 from ur_cartesian_driver.robot.connection_status import ConnectionStatus
 from ur_cartesian_driver.robot.program.contact_watch import ContactWatch
 from ur_cartesian_driver.robot.program.program_tracker import ProgramTracker
+from ur_cartesian_driver.robot.services.dashboard_service import DashboardPorts
 from ur_cartesian_driver.robot.services.service_calls import EndContactWatchCall, WatchContactCall
-from ur_cartesian_driver.robot.services.service_dispatcher import (
-    DashboardPorts,
-    ServiceDispatcher,
-)
+from ur_cartesian_driver.robot.services.service_dispatcher import ServiceDispatcher
 
 NUMBER = 7
 PORTS = DashboardPorts(dashboard=29999, robot_api=80)
