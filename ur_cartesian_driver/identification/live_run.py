@@ -23,7 +23,11 @@ from ur_cartesian_driver.identification.law_experiments import (
     LawExperiment,
     MotionBounds,
 )
-from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import (
+    MOVABLE_SAFETY_MODES,
+    RobotState,
+    RuntimeState,
+)
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     encode_command,
     PrimaryCommand,
@@ -35,7 +39,6 @@ from ur_cartesian_driver.robot.check.program_run import (
     motion_refusal,
     ProgramRun,
     REST_TIMEOUT,
-    SAFE,
     START_TIMEOUT,
     Surprise,
 )
@@ -219,7 +222,7 @@ class _Run:
     async def _stop(self) -> bool:
         """Stop the program; return whether the arm rests, as far as the connections tell."""
         row = self._recorder.newest
-        if row and row['safety_mode'] not in SAFE:
+        if row and row['safety_mode'] not in MOVABLE_SAFETY_MODES:
             with contextlib.suppress(OSError):
                 await self._rests()  # its ramp belongs to the recording
         was_sent = await self._run.stop()

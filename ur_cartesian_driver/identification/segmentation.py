@@ -17,7 +17,11 @@ import numpy as np
 
 from ur_cartesian_driver.identification.arm_samples import ArmSamples
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
-from ur_cartesian_driver.motion.state.rtde_state import RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import (
+    MOVABLE_SAFETY_MODES,
+    RuntimeState,
+    SafetyMode,
+)
 
 #: Slower targets rest [rad/s].
 REST_SPEED = 1e-3
@@ -41,7 +45,6 @@ class Ending(Enum):
 
 
 #: Safety modes in which programs may move the arm.
-_MOVING_MODES = (SafetyMode.NORMAL, SafetyMode.REDUCED)
 #: Endings after which the rest of the move may follow.
 _RESUMABLE = (Ending.PAUSE, Ending.PROTECTIVE_STOP, Ending.OTHER_SAFETY_STOP)
 
@@ -197,7 +200,7 @@ def _ending(samples: ArmSamples, begin: int, end: int) -> Ending | None:
     inside = slice(begin + 1, max(end - 2, begin + 1))
     safety, states = samples.safety_mode, samples.runtime_state
     if safety is not None:
-        stops = safety[inside][~np.isin(safety[inside], _MOVING_MODES)]
+        stops = safety[inside][~np.isin(safety[inside], MOVABLE_SAFETY_MODES)]
         if (stops != SafetyMode.PROTECTIVE_STOP).any():
             return Ending.OTHER_SAFETY_STOP
         if len(stops):

@@ -10,6 +10,7 @@ from datetime import datetime, UTC
 from math import nan
 
 from ur_cartesian_driver.motion.state.rtde_state import (
+    MOVABLE_SAFETY_MODES,
     RobotMode,
     RobotState,
     RuntimeState,
@@ -100,7 +101,7 @@ UNPOWERED_MODES = frozenset({RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.
 
 def is_stopped(robot: RobotState) -> bool:
     """Return whether the safety system keeps the arm from moving."""
-    return robot.safety_mode not in (SafetyMode.NORMAL, SafetyMode.REDUCED)
+    return robot.safety_mode not in MOVABLE_SAFETY_MODES
 
 
 def is_paused(robot: RobotState) -> bool:

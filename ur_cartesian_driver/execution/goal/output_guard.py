@@ -19,11 +19,14 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
 )
 from ur_cartesian_driver.motion.events import OutputsSecured
 from ur_cartesian_driver.motion.goal.goal import OutputKind, SafeOutput
-from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import (
+    MOVABLE_SAFETY_MODES,
+    RobotState,
+    RuntimeState,
+)
 from ur_cartesian_driver.protocol.program.script_command import SafeOutputsAction
 
 _PAUSED = frozenset({RuntimeState.PAUSING, RuntimeState.PAUSED})
-_MOVABLE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
 
 
 class OutputGuard:
@@ -102,7 +105,7 @@ class OutputGuard:
         """
         if not self._outputs:
             return []
-        is_held = packet.runtime_state in _PAUSED or packet.safety_mode not in _MOVABLE
+        is_held = packet.runtime_state in _PAUSED or packet.safety_mode not in MOVABLE_SAFETY_MODES
         was_held, self._is_held = self._is_held, is_held
         if is_held:
             return self.secure()

@@ -25,7 +25,7 @@ from ur_cartesian_driver.importing.gcode.coordinates import AXES, Coordinates
 from ur_cartesian_driver.importing.gcode.subprograms import LineSequence
 from ur_cartesian_driver.importing.gcode.switching import CodeOutputs
 from ur_cartesian_driver.importing.gcode.toolpath import Toolpath
-from ur_cartesian_driver.importing.gcode.words import Block, read_line
+from ur_cartesian_driver.importing.gcode.words import Block, COMMENT, read_line
 from ur_cartesian_driver.importing.import_format import Treatment
 from ur_cartesian_driver.importing.import_options import ImportOptions, LENGTH_UNITS
 from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
@@ -36,7 +36,6 @@ _OF_MOTION = frozenset('XYZIJKRP')
 _AXIS_WORDS = frozenset('XYZABCE')
 #: Codes that move to a machine position: along the named axes, or along all if none is named.
 _WITH_AXES = ('G28', 'G30', 'G53')
-_COMMENT = re.compile(r'\([^()]*\)|;.*')
 #: The codes by which a lathe is known, and those that end a feed per turn.
 _LATHE_CODE = re.compile(r'G\s*0*(50|92|94|96|98|99)(?![.\d])', re.I)
 _S_WORD, _F_WORD = (re.compile(rf'{letter}\s*[-+.\d]', re.I) for letter in 'SF')
@@ -439,7 +438,7 @@ class GcodeMachine:
         """Return whether the program has a surface speed, or limits it, or feeds per turn."""
         per_turn = False
         for line in self._lines:
-            text = _COMMENT.sub('', line)
+            text = COMMENT.sub('', line)
             for match in _LATHE_CODE.finditer(text):
                 per_turn = match[1] == '99' or (per_turn and match[1] not in ('94', '98'))
                 if match[1] == '96' or (match[1] in ('50', '92') and _S_WORD.search(text)):

@@ -18,7 +18,8 @@ from ur_cartesian_driver.importing.gcode.codes import code_named, CODES, OTHER_F
 from ur_cartesian_driver.importing.imported_path import BrokenFile
 from ur_cartesian_driver.importing.text_file import quoted
 
-_COMMENT = re.compile(r'\([^()]*\)|;.*')
+#: What a line says to people.
+COMMENT = re.compile(r'\([^()]*\)|;.*')
 _MESSAGE = re.compile(r'\(\s*(MSG|DEBUG|PRINT|LOG)\s*,', re.I)
 # Replaces each comment until the check that no comment divides a word. No text file has this
 # character.
@@ -61,7 +62,7 @@ def read_line(number: int, line: str) -> Block | None:
     """
     text = line
     if ';' in line or '(' in line:
-        text = _COMMENT.sub(_MARK, line)
+        text = COMMENT.sub(_MARK, line)
     text = text.replace(' ', '').replace('\t', '')
     # Only ASCII: upper() would turn some other letters, such as the long s, into ASCII capitals.
     text = text.upper() if text.isascii() else text
@@ -87,7 +88,7 @@ def _block(number: int, line: str, text: str) -> Block:
     if _BLOCK.fullmatch(text) is None or text[0] == 'O':
         return _odd_block(number, line, text)
     # Without a blank before it, the E of an extruder could also be an exponent.
-    if 'E' in text and _EXPONENT.search(line) and _EXPONENT.search(_COMMENT.sub('', line)):
+    if 'E' in text and _EXPONENT.search(line) and _EXPONENT.search(COMMENT.sub('', line)):
         raise BrokenFile(
             number,
             f'{_shown(line)} has an exponent, which G-code has not; the word of an extruder '

@@ -56,6 +56,10 @@ class SafetyMode(IntEnum):
     SAFETY_API_SAFEGUARD_STOP = 22
 
 
+#: Those in which the safety system lets the arm move.
+MOVABLE_SAFETY_MODES = (SafetyMode.NORMAL, SafetyMode.REDUCED)
+
+
 class RuntimeState(IntEnum):
     """State of the robot program, as the controller numbers it."""
 

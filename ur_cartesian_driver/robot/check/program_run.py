@@ -8,7 +8,12 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import (
+    MOVABLE_SAFETY_MODES,
+    RobotMode,
+    RuntimeState,
+    SafetyMode,
+)
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     encode_command,
     PrimaryCommand,
@@ -22,7 +27,6 @@ from ur_cartesian_driver.robot.rtde.probe import read_state
 START_TIMEOUT, END_TIMEOUT, REST_TIMEOUT = 3.0, 30.0, 3.0
 #: Time in which the loss of a connection is noticed [s].
 LOSS_TIME = 0.1
-SAFE = (SafetyMode.NORMAL, SafetyMode.REDUCED)
 
 
 class Surprise(Exception):
@@ -36,7 +40,7 @@ async def motion_refusal(address: RobotAddress) -> str:
     :raises OSError: the robot does not answer.
     """
     state = await read_state(address.host, address.rtde_port)
-    if state.safety_mode not in SAFE:
+    if state.safety_mode not in MOVABLE_SAFETY_MODES:
         return f'the safety mode is {state.safety_mode.name}'
     if state.robot_mode is not RobotMode.RUNNING:
         return f'the arm is in mode {state.robot_mode.name}; switch it on and release the brakes'
@@ -167,7 +171,7 @@ class ProgramRun:
             raise Surprise(f'{otherwise} within {time:g} s')
 
     def _wrong(self, row: Mapping[str, Any]) -> str:
-        if row['safety_mode'] not in SAFE:
+        if row['safety_mode'] not in MOVABLE_SAFETY_MODES:
             mode = name_in(SafetyMode, row['safety_mode'])
             return f'the robot stopped, with safety mode {mode}'
         return self._watch(row)

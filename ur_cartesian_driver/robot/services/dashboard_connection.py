@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping
 
 from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.motion.state.rtde_state import (
+    MOVABLE_SAFETY_MODES,
     RobotMode,
     RobotState,
     RuntimeState,
@@ -206,7 +207,7 @@ def _reason(
         return 'The name is relative to the folder of programs on the robot.'
     if robot is None:
         return 'Its state is unknown: there is no RTDE connection.'
-    if robot.safety_mode not in (SafetyMode.NORMAL, SafetyMode.REDUCED):
+    if robot.safety_mode not in MOVABLE_SAFETY_MODES:
         return f'The safety system is in mode {robot.safety_mode.name}: clear that first.'
     if command == 'play' and robot.robot_mode is not RobotMode.RUNNING:
         return f'The arm is in mode {robot.robot_mode.name}: release the brakes first.'

@@ -19,7 +19,7 @@ from rclpy.action.server import CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from std_srvs.srv import Trigger
 
-from ur_cartesian_driver.motion.state.rtde_state import RobotMode, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import MOVABLE_SAFETY_MODES, RobotMode, SafetyMode
 from ur_cartesian_driver.msg import DriverStatus
 from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer, end_goal
 from ur_cartesian_driver.ros.message_fields import Message
@@ -40,7 +40,6 @@ COMMANDS: dict[tuple[RobotMode, RobotMode], tuple[str, ...]] = {
     (RobotMode.RUNNING, RobotMode.POWER_OFF): ('power_off',),
     (RobotMode.RUNNING, RobotMode.IDLE): ('power_off', 'power_on'),
 }
-_SAFE = (SafetyMode.NORMAL, SafetyMode.REDUCED)
 
 
 class _Ended(Exception):
@@ -165,7 +164,7 @@ class ModeRun:
         if goal.stop_program and self._status.program_running:
             self._do('dashboard/stop')
             self._wait(lambda: not self._status.program_running, 'The program has not ended')
-        if self._mode is not target or self._safety not in _SAFE:
+        if self._mode is not target or self._safety not in MOVABLE_SAFETY_MODES:
             self._recover()
             self._change_mode(target)
         if target is RobotMode.RUNNING and goal.play_program:
@@ -190,7 +189,7 @@ class ModeRun:
     def _recover(self) -> None:
         """Leave a stop of the safety system, as far as software may."""
         safety = self._safety
-        if safety in _SAFE:
+        if safety in MOVABLE_SAFETY_MODES:
             return
         if safety in (SafetyMode.VIOLATION, SafetyMode.FAULT):
             self._do('dashboard/restart_safety')
@@ -206,7 +205,9 @@ class ModeRun:
             )
         else:
             self._do('dashboard/unlock_protective_stop')
-        self._wait(lambda: self._safety in _SAFE, 'The safety system is not released')
+        self._wait(
+            lambda: self._safety in MOVABLE_SAFETY_MODES, 'The safety system is not released'
+        )
 
     def _change_mode(self, target: RobotMode) -> None:
         mode = self._mode
