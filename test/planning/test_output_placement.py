@@ -20,8 +20,10 @@ from ur_cartesian_driver.motion.goal.goal import (
     Segment,
     SegmentType,
 )
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import SwitchOutput
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.request.point_events.path_clock import PathClock
 from ur_cartesian_driver.protocol.program.trajectory_points import (
     encode_points,
     MAX_PENDING_OUTPUTS,
@@ -362,3 +364,16 @@ def test_a_lead_that_reaches_into_another_stretch_of_the_output_is_refused(cell)
     ):
         planned(cell, replace(goal, proportional_outputs=(FLOW, later)))
     planned(cell, replace(goal, proportional_outputs=(replace(later, begin_lead=0.0), FLOW)))
+
+
+def test_a_spline_that_begins_in_motion_has_the_speeds_of_its_law():
+    """Its samples are 60 ms apart, as those of slow splines are; the law is a sine."""
+    times = np.linspace(0.0, 1.2, 21)
+    poses = np.zeros((21, 7))
+    poses[:, 0], poses[:, 6] = 0.001 * times + 0.0001 * np.sin(4.0 * times), 1.0
+    reference = ReferencePath(poses=poses, point=np.zeros(21, dtype=np.int32), time=times)
+    way, speeds, turns = PathClock(reference, is_spline=True).motion_back(1.0, 0.6, 12)
+    assert way == pytest.approx(0.0006 + 0.0001 * (np.sin(4.0) - np.sin(1.6)), rel=1e-3)
+    law = 0.001 + 0.0004 * np.cos(4.0 * np.linspace(1.0, 0.4, 13))
+    assert speeds == pytest.approx(law, rel=0.02)
+    assert not turns

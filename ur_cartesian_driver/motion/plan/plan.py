@@ -227,6 +227,12 @@ class PlannedRows(Rows[PlannedSegment]):
             outputs={i: segment.outputs for i, segment in enumerate(every) if segment.outputs},
         )
 
+    @property
+    def are_spline(self) -> bool:
+        """Whether the arm moves along splines, not by motions of the controller's own."""
+        moves = (each for each in self.primitives if not isinstance(each, Stop))
+        return isinstance(next(moves, None), Spline)
+
     @classmethod
     def of_pieces(
         cls,

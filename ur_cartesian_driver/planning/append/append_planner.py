@@ -551,6 +551,7 @@ class _PartPlanner:
 
         :param ending: the number of motions of the ending.
         """
+        last, rows = self._appended.last, plan.rows
         # The plan of the first part has checked them, from the point where they begin.
         pulses = self._before.pulses if self._before.points else ()
         for field, train in pulses:
@@ -558,11 +559,10 @@ class _PartPlanner:
             check_speed(
                 train,
                 field,
-                PathClock(plan.reference),
+                PathClock(plan.reference, is_spline=rows.are_spline),
                 self._arm.model.control_cycle,
                 (float(times[0]), float(times[-1])),
             )
-        last, rows = self._appended.last, plan.rows
         records = records_before + int(rows.records.sum())
         ending_records = int(rows.records[len(rows) - ending :].sum())
         # After the last motion, the robot program waits until its outputs are switched.

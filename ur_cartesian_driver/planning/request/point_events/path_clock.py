@@ -5,14 +5,14 @@ The way and the pose of the tool at each time of a planned path, and the time at
 
 Lines are sampled only where the acceleration changes, so the tool does not move evenly between
 samples: it moves at constant acceleration. The speeds at the samples follow from that, one after
-the other: the mean of the speeds at both ends of a piece is its length over its time. Where
-samples are dense, as on splines, the mean speeds of the pieces on both sides are the better
-source, because an error in one speed does not go on to the next.
+the other: the mean of the speeds at both ends of a piece is its length over its time. On splines,
+and where samples are dense, the mean speeds of the pieces on both sides are the better source,
+because an error in one speed does not go on to the next.
 """
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from ur_cartesian_driver.motion.plan.plan import ReferencePath
 _ARM_LENGTH = 0.1
 # A tool with less way than this per turn [m/rad] only turns.
 _MIN_LENGTH_PER_TURN = 1e-3
-# Samples that are not farther apart than this are dense [s]; those of splines are 15 to 25 ms.
+# Samples that are not farther apart than this are dense [s].
 _DENSE = 0.03
 # A piece of the path that is not longer than this [m] is a rest.
 _NO_LENGTH = 1e-9
@@ -35,8 +35,12 @@ _NO_LENGTH = 1e-9
 class PathClock:
     """The samples of a path, with the speed at each."""
 
-    def __init__(self, reference: ReferencePath) -> None:
-        """Measure the way between the samples."""
+    def __init__(self, reference: ReferencePath, *, is_spline: bool) -> None:
+        """
+        Measure the way between the samples.
+
+        :param is_spline: whether the acceleration changes all the time, not only at samples.
+        """
         self._poses, self._times = reference.poses, reference.time
         a, b = self._poses[:-1], self._poses[1:]
         lengths, angles = distance_rows(a, b), angle_rows(a[:, 3:], b[:, 3:])
@@ -44,7 +48,7 @@ class PathClock:
         self._arc_lengths = np.append(0.0, np.cumsum(lengths))
         self._turns = np.append(0.0, np.cumsum(angles))
         self._steps = np.hypot(lengths, _ARM_LENGTH * angles)
-        self._speeds = _speeds(self._steps, np.diff(self._times))
+        self._speeds = _speeds(self._steps, np.diff(self._times), inf if is_spline else _DENSE)
 
     def pose(self, time: float) -> Pose:
         """Return the pose of the TCP at a time [s]."""
@@ -146,7 +150,7 @@ class PathClock:
         return float(values[k] + part * (values[k + 1] - values[k]))
 
 
-def _speeds(steps: Floats, spans: Floats) -> Floats:
+def _speeds(steps: Floats, spans: Floats, dense: float) -> Floats:
     """
     Return the speed at each sample (m,) of a path that begins at rest, or with dense samples.
 
@@ -154,6 +158,7 @@ def _speeds(steps: Floats, spans: Floats) -> Floats:
 
     :param steps: length of each piece (m - 1,).
     :param spans: its duration (m - 1,) [s].
+    :param dense: duration of the longest piece with dense samples [s].
     """
     speeds = [0.0]
     pieces = list(zip(steps.tolist(), spans.tolist(), strict=True))
@@ -163,11 +168,11 @@ def _speeds(steps: Floats, spans: Floats) -> Floats:
             speeds.append(speeds[-1])
         elif step <= _NO_LENGTH:
             speeds.append(0.0)
-        elif after > _NO_LENGTH and 0.0 < after_span <= _DENSE and span <= _DENSE:
+        elif after > _NO_LENGTH and 0.0 < after_span <= dense and span <= dense:
             mean, mean_after = step / span, after / after_span
             speeds.append((mean * after_span + mean_after * span) / (span + after_span))
         else:
             speeds.append(max(2.0 * step / span - speeds[-1], 0.0))
-    if pieces and 0.0 < pieces[0][1] <= _DENSE:  # appended points begin in motion
+    if pieces and 0.0 < pieces[0][1] <= dense:  # appended points begin in motion
         speeds[0] = max(2.0 * pieces[0][0] / pieces[0][1] - speeds[1], 0.0)
     return np.array(speeds)

@@ -127,7 +127,7 @@ class TimedPath:
         self.control_cycle = control_cycle
         self._point_times = point_times
         self._primitives, self._reference = segments.primitives, reference
-        self.clock = PathClock(reference)
+        self.clock = PathClock(reference, is_spline=segments.are_spline)
         self.ends: Floats = start_time + np.cumsum(segments.durations)
         self._blend_halves = np.zeros(len(segments)) if blend_halves is None else blend_halves
         self._returns: Floats = self.ends - self._blend_halves
