@@ -27,13 +27,10 @@ SLOW = 0.4
 REST_CYCLES, REST_BOUND = 10, 1e-4
 #: How far beside its place an output may always switch [m]: a cycle of a tool with 10 mm/s.
 RESOLUTION = 2e-5
-#: The same with a lead over a stop or a corner, or while the slider moves [m].
+#: The same with a lead while the speed of the tool changes [m].
 WIDE_BOUND = 1e-4
 #: Change of the slider in some cycles that does not count.
 SLIDER_RESTS = 0.005
-#: By how much the tool's way may be longer or shorter than the plan knows [m]: a pulse that is
-#: nearer to the last point may come or not.
-ROUNDING = 1e-5
 #: For so long after it goes on [cycles] the program waits until the arm moves.
 GOING_ON = 8
 
@@ -48,6 +45,12 @@ SLIDERS = {
 class JudgedRun(TracedRun):
     """One run of a goal, and the places of its outputs and pulses on the tool's way."""
 
+    #: How fast the time of the path passes at most: no slider makes the tool faster.
+    max_rate = 1.0
+    #: By how much the tool's way may be longer or shorter than the plan knows [m]: a pulse that is
+    #: nearer to the last point may come or not.
+    rounding = 1e-5
+
     def place(self, wanted):
         """Return the way to the place of a command."""
         here = self.way_of(wanted.waypoint)
@@ -56,11 +59,19 @@ class JudgedRun(TracedRun):
             return here + abs(wanted.fraction) * (self.way_of(other) - here)
         return here + wanted.distance
 
-    def places(self, train):
-        """Return the ways to the pulses of a train (count,)."""
-        begin, end = self.way_of(train.first_waypoint), self.way_of(train.last_waypoint)
-        room = floor((end - begin - train.phase - ROUNDING) / train.distance) + 1
-        return begin + train.phase + train.distance * np.arange(train.count or room)
+    def places(self, train, given=0):
+        """
+        Return the ways to the pulses of a train (count,).
+
+        :param given: how many were given: of those next to the last point, some may not come.
+        """
+        first = self.way_of(train.first_waypoint) + train.phase
+        length = self.way_of(train.last_waypoint) - first
+        fewest, most = (
+            floor((length + sign * self.rounding) / train.distance) + 1 for sign in (-1, 1)
+        )
+        count = train.count or min(max(given, fewest), most)
+        return np.minimum(first + train.distance * np.arange(count), self.ways[-1])
 
     def cycles(self, pin, rises):
         """Return the cycles in which an output rises, or falls (n,)."""
@@ -84,11 +95,11 @@ class PathTime:
         k, speeds = int(np.searchsorted(self._ways, way)), np.diff(self._ways)
         return speeds[max(k - 3, 0) : k + 2].min() < 0.2 * np.median(speeds)
 
-    def slows_between(self, begin, end):
-        """Return whether the tool is much slower somewhere on a part of its way."""
+    def changes_between(self, begin, end):
+        """Return whether the speed of the tool changes on a part of its way."""
         first, last = (int(np.searchsorted(self._ways, way)) for way in (begin, end))
-        speeds = np.diff(self._ways)
-        return bool(speeds[first:last].min(initial=np.inf) < 0.6 * np.median(speeds))
+        speeds = np.diff(self._ways)[first:last]
+        return bool(speeds.min(initial=np.inf) < 0.95 * speeds.max(initial=0.0))
 
 
 @dataclass
@@ -119,8 +130,8 @@ def judge_commands(run, path_time, bound, pauses=()):
     assert Counter(pin for pin, *_ in run.edges if pin in wanted_pins) == wanted_pins
     at = {pin: cycle for pin, _, cycle in run.edges}
     times = path_time(run.ways)
-    # Where the tool nearly rests, its way tells little of the time; no slider makes it faster.
-    rate = np.minimum(np.diff(times, prepend=0.0) / STEP, 1.0)
+    # Where the tool nearly rests, its way tells little of the time.
+    rate = np.minimum(np.diff(times, prepend=0.0) / STEP, run.max_rate)
     for wanted in run.goal.io_commands:
         place, edge = run.place(wanted), at[wanted.pin]
         left = path_time(place) - times
@@ -128,8 +139,9 @@ def judge_commands(run, path_time, bound, pauses=()):
         # or ceases to.
         before = np.roll(rate, 2)
         seen = rate, np.roll(rate, 1), before, 3.0 * before - 2.0 * np.roll(rate, 3)
-        dues = [_due(left, rate, each, max(-wanted.offset, 0.0)) for each in seen]
-        due = min(dues, key=lambda each: abs(edge - each))
+        lead = max(-wanted.offset, 0.0)
+        dues = [_due(left, rate, lead * each, edge) for each in seen]
+        due = min((each for pair in dues for each in pair), key=lambda each: abs(edge - each))
         late = edge - due
         paused = [end for begin, end in pauses if begin - 1 <= due <= end + GOING_ON]
         if paused:
@@ -146,7 +158,7 @@ def judge_commands(run, path_time, bound, pauses=()):
             verdict.off.append(off)
         near = slow and (abs(late) < REST_CYCLES or abs(off) < REST_BOUND)
         is_wide = wanted.offset < 0.0 and (
-            path_time.slows_between(run.ways[edge], place)
+            path_time.changes_between(run.ways[edge], place)
             or np.ptp(rate[max(edge - 6, 0) : edge + 1]) > SLIDER_RESTS
         )
         within = WIDE_BOUND if is_wide else RESOLUTION
@@ -155,17 +167,25 @@ def judge_commands(run, path_time, bound, pauses=()):
     return verdict
 
 
-def _due(left, rate, seen, lead):
+def _due(left, rate, lead, edge):
     """
-    Return the time at which an output is due [cycles].
+    Return when an output was due [cycles]: when it was so first, and by how much it was overdue.
+
+    While the slider is lowered, the time that is left may become a little less than the lead, and
+    then more again. So the second one is as far before the edge as the output was overdue.
 
     :param left: time of the path to its place by cycle [s].
     :param rate: how fast this time passes.
-    :param seen: the same as the program has seen it.
+    :param lead: the lead in time of the path by cycle [s].
+    :param edge: the cycle in which the output switched.
     """
-    ahead = left - lead * seen
-    k = int(np.flatnonzero((ahead <= 0.0) & ((rate > 0.0) | (left <= 0.0)))[0])
-    return k - ahead[k] / min(ahead[k] - ahead[k - 1], -1e-12)
+    overdue = lead - left
+    passes = (rate > 0.0) | (left <= 0.0)
+    k = int(np.flatnonzero((overdue >= 0.0) & passes)[0])
+    first = k - overdue[k] / max(overdue[k] - overdue[k - 1], 1e-12)
+    before = np.flatnonzero(passes[: edge + 1])
+    most = (overdue[before] / np.where(rate[before] > 0.0, rate[before], 1.0)).max() / STEP
+    return first, edge - float(most)
 
 
 def _lost(run, pauses):
@@ -186,13 +206,10 @@ def judge_pulses(run, train, bound, pauses=()):
     way that the tool coasts in a pause come behind it, as fast as their width allows; of that way
     the program knows the chord only.
     """
-    verdict, places = Verdict(), run.places(train)
+    verdict = Verdict()
     counted = run.ways - _lost(run, pauses)
     rises, width = run.cycles(train.pin, rises=True), max(round(train.width / STEP), 1)
-    following = places[-1] + train.distance
-    if not train.count and following < run.way_of(train.last_waypoint) + ROUNDING:
-        if len(rises) > len(places):
-            places = np.append(places, following)
+    places = run.places(train, len(rises))
     assert len(rises) == len(places), (len(rises), len(places))
     assert set(run.cycles(train.pin, rises=False) - rises) <= {width} or pauses
     ways, first = np.unique(counted, return_index=True)
@@ -208,7 +225,8 @@ def judge_pulses(run, train, bound, pauses=()):
         if paused or begin < waits - 0.5:
             verdict.delayed.append(late)
             latest = max(begin, waits, *(play + GOING_ON for play in paused))
-            if not begin - bound < rise < latest + bound:
+            is_timely = begin - bound < rise < latest + bound
+            if not is_timely and abs(counted[rise] - place) > RESOLUTION:
                 verdict.misses[round(float(place), 5)] = round(float(late), 2)
             waits = rise + width + 1
             continue

@@ -2,11 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random goals with outputs by place, leads that overtake one another, and pulses, in one run."""
 
+from dataclasses import replace
 from math import log10
 
+import numpy as np
 from output_judge import judge_commands, judge_pulses, JudgedRun, PathTime, SLIDERS, SLOW
 from random_cases import random_of
-from traced_run import HOME, instructions_of, TOOL, ZIGZAG
+from recorded_goal import SETUP
+from robot_cell import RTDE, run_cell
+from traced_run import ARM, HOME, instructions_of, OPTIONS, STEP, TOOL, ZIGZAG
+from virtual_network import HOST
 
 from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.geometry.pose import Pose
@@ -20,12 +25,18 @@ from ur_cartesian_driver.motion.goal.goal import (
     Waypoint,
 )
 from ur_cartesian_driver.path import PathPlace, resume
+from ur_cartesian_driver.planning import plan
+from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
+from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 
-KINDS = ('stops', 'dwells', 'rounded', 'spline', 'appended', 'resumed')
+KINDS = ('stops', 'dwells', 'rounded', 'spline', 'appended', 'resumed', 'servo')
+#: As many points on a line [m]: servoj cuts corners, where no place is exact.
+LINE = tuple((0.05 * (k + 1), 0.0) for k in range(len(ZIGZAG)))
 LAST = len(ZIGZAG) - 1
-#: How late or early an output may be [cycles]; where points are appended, the speed at the begin
-#: of a lead is known less well: one more.
-BOUND = 1.0
+#: How late or early an output or a pulse may be [cycles]: one, and what the judge may be off.
+#: Where points are appended, the speed at the begin of a lead is known less well; by set-points,
+#: the speed is not steady.
+BOUND, APPENDED_BOUND, SERVO_BOUND = 1.1, 2.0, 3.0
 
 
 class Case:
@@ -34,7 +45,9 @@ class Case:
     def __init__(self, number, attempt):
         self.random = draw = random_of('outputs', number, attempt)
         self.kind = KINDS[number % len(KINDS)]
-        self.shape = draw.choice(KINDS[:4]) if self.kind == 'resumed' else self.kind
+        self.shape = self.kind
+        if self.kind in ('resumed', 'servo'):
+            self.shape = draw.choice(KINDS[:4])
         #: From 1 to 250 mm/s; a slow tool makes a smaller zigzag.
         self.speed = 10.0 ** draw.uniform(-3.0, log10(0.25))
         self.size = min(1.0, 8.0 * self.speed)
@@ -49,7 +62,8 @@ class Case:
         x, y, z = home.position
         timed = self.shape in ('spline', 'appended')
         period = 0.06 * self.size / self.speed
-        places = [(self.size * dx, self.size * dy) for dx, dy in ((0.0, 0.0), *ZIGZAG)]
+        points = LINE if self.kind == 'servo' else ZIGZAG
+        places = [(self.size * dx, self.size * dy) for dx, dy in ((0.0, 0.0), *points)]
         goal = Goal(
             waypoints=tuple(
                 Waypoint(
@@ -74,6 +88,9 @@ class Case:
             io_commands=self.commands,
             pulses=self.pulses,
         )
+        if self.kind == 'servo':
+            # Pauses and the slider take their time.
+            return replace(goal, execution=ExecutionMode.SERVO, goal_time_tolerance=600.0)
         if self.kind != 'resumed':
             return goal
         return resume(goal, self.stopped, overlap=0.01 * self.size, approach=0.01).goal
@@ -170,11 +187,50 @@ def accepted(number, robot):
     raise AssertionError('no case of this number is accepted')
 
 
+class SetPointRun(JudgedRun):
+    """The same by set-points: driver and robot in virtual time, seen by another client of RTDE."""
+
+    #: After a pause, servoj catches up with its set-points.
+    max_rate = 2.0
+    #: It creeps up to the last one, and the goal ends before it is there.
+    rounding = 1e-4
+
+    def _trace(self, robot, goal, slider, act, sizes):
+        positions, outputs = [], []
+
+        async def scenario(cell):
+            controller = cell.robot.controller
+
+            def take(names, values):
+                position, bits = dict(zip(names, values, strict=True)).values()
+                positions.append(position[:3])
+                outputs.append([bits >> pin & 1 for pin in range(8)])
+                controller.set_slider(slider(len(positions)))
+                act(controller, len(positions))
+
+            state = cell.memory.read()
+            self.goal = goal(state.actual_tcp_pose)
+            fields = ('target_TCP_pose', 'actual_digital_output_bits')
+            connection = RtdeConnection(RtdeClientCodec(fields), take)
+            await connection.open(HOST, RTDE)
+            motion = cell.owner.start(plan(self.goal, state, ARM, OPTIONS), arm=SETUP)
+            await cell.until(lambda: motion.outcome, 600.0)
+            await cell.sleep(5.0 * STEP)  # what RTDE has yet to report
+            connection.close()
+            assert motion.outcome.succeeded, motion.outcome
+
+        run_cell(scenario, robot={'frequency': 1.0 / STEP, 'q': HOME})
+        return self.goal, np.array(positions), outputs
+
+
 def verdicts(case, robot):
     """Run a case; return the verdict on its commands, and one on each train."""
-    slow = JudgedRun(robot, case.goal, lambda cycle: SLOW, sizes=case.sizes)
-    run = JudgedRun(robot, case.goal, case.slider, case.act, sizes=case.sizes)
+    run_of = SetPointRun if case.kind == 'servo' else JudgedRun
+    slow = run_of(robot, case.goal, lambda cycle: SLOW, sizes=case.sizes)
+    run = run_of(robot, case.goal, case.slider, case.act, sizes=case.sizes)
+    pulse_bound = SERVO_BOUND if case.kind == 'servo' else BOUND
+    bound = APPENDED_BOUND if case.kind == 'appended' else pulse_bound
     return (
-        judge_commands(run, PathTime(slow), BOUND + (case.kind == 'appended'), case.pauses),
-        *(judge_pulses(run, train, BOUND, case.pauses) for train in run.goal.pulses),
+        judge_commands(run, PathTime(slow), bound, case.pauses),
+        *(judge_pulses(run, train, pulse_bound, case.pauses) for train in run.goal.pulses),
     )

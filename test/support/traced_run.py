@@ -73,32 +73,35 @@ class TracedRun:
         act=lambda controller, cycle: None,
         sizes=(),
     ):
-        state = robot.place(HOME, TOOL)
-        self.goal = goal(state.actual_tcp_pose) if callable(goal) else goal
-        instructions = instructions_of(self.goal, state, sizes)
-        outputs = robot.controller.io.digital_out.standard
-        outputs[:] = [False] * 8
-        before = list(outputs)
+        #: The goal that was run, and the position of the tool by cycle (n, 3) [m].
+        self.goal, self.positions, outputs = self._trace(robot, goal, slider, act, sizes)
+        changes = np.diff(np.array(outputs, dtype=int), axis=0)
         #: Pin, whether the output rises, cycle.
-        self.edges = []
-        positions = [robot.controller.motion.T_base_tcp.position]
+        self.edges = [
+            (int(pin), bool(changes[k, pin] > 0), int(k) + 1) for k, pin in np.argwhere(changes)
+        ]
+        self.ways = np.append(
+            0.0, np.cumsum(np.linalg.norm(np.diff(self.positions, axis=0), axis=1))
+        )
+
+    def _trace(self, robot, goal, slider, act, sizes):
+        state = robot.place(HOME, TOOL)
+        goal = goal(state.actual_tcp_pose) if callable(goal) else goal
+        instructions = instructions_of(goal, state, sizes)
+        bits = robot.controller.io.digital_out.standard
+        bits[:] = [False] * 8
+        positions, outputs = [robot.controller.motion.T_base_tcp.position], [list(bits)]
 
         def watch(controller):
             positions.append(controller.motion.T_base_tcp.position)
-            for pin, (a, b) in enumerate(zip(before, outputs, strict=True)):
-                if a != b:
-                    self.edges.append((pin, b, len(positions) - 1))
-            before[:] = outputs
+            outputs.append(list(bits))
             controller.set_slider(slider(len(positions)))
             act(controller, len(positions))
 
         robot.controller.set_slider(slider(0))
         run = robot.run(instructions, on_cycle=watch)
         assert not run.failure, run.failure
-        self.positions = np.array(positions)
-        self.ways = np.append(
-            0.0, np.cumsum(np.linalg.norm(np.diff(self.positions, axis=0), axis=1))
-        )
+        return goal, np.array(positions), outputs
 
     def way_of(self, point):
         """Return the way to where the tool is nearest to a point of the goal."""
