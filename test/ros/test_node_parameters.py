@@ -25,9 +25,11 @@ from ur_cartesian_driver.ros.parameters.node_parameters import (
 )
 from ur_cartesian_driver.ros.parameters.node_settings import NodeSettings
 from ur_cartesian_driver.ros.parameters.parameter_table import DECLARATIONS, ParameterError
+from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 
 FILE = share_path() / 'config' / 'driver.yaml'
 OWNERS = (DriverConfig, PlanningOptions, NodeSettings)
+NAMES_PARAMETERS = {field.name for field in fields(NamesSettings)}
 
 
 @pytest.fixture(scope='module')
@@ -45,7 +47,8 @@ def declared():
             automatically_declare_parameters_from_overrides=True,
         )
         try:
-            return declare_parameters(node), {
+            # As the driver's node does.
+            return declare_parameters(node, NAMES_PARAMETERS), {
                 name: node.describe_parameter(name) for name in defaults()
             }
         finally:
@@ -53,6 +56,11 @@ def declared():
 
     yield declared
     rclpy.shutdown(context=context)
+
+
+def test_no_parameter_is_both_the_drivers_and_that_of_the_node_with_the_ur_drivers_names():
+    """Files give all parameters to both nodes."""
+    assert not NAMES_PARAMETERS & set(defaults())
 
 
 def in_the_file():

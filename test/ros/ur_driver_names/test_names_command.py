@@ -68,8 +68,8 @@ def test_the_names_come_and_go_with_the_driver(
             "Parameter release is 'foxy', but must be one of jazzy, lyrical.",
         ),
         (
-            'io_publish_rat:=1.0',
-            'There is no parameter io_publish_rat; did you mean io_publish_rate?',
+            'io_states_rat:=1.0',
+            'There is no parameter io_states_rat; did you mean io_states_rate?',
         ),
         ('x:=1', 'There is no parameter x; doc/coming_from/ur_driver.md lists all.'),
     ],

@@ -22,7 +22,7 @@ class NamesSettings:
     #: scaled_joint_trajectory_controller.
     release: Literal['jazzy', 'lyrical'] = 'jazzy'
     #: Rate of io_states and tool_data [Hz], which also come with each change.
-    io_publish_rate: Annotated[float, Range(0.1, 100.0)] = 10.0
+    io_states_rate: Annotated[float, Range(0.1, 100.0)] = 10.0
     #: true: set_mode unlocks a protective stop. Whoever sets this sees to it that somebody has
     #: looked for the cause of each stop: the manufacturer forbids resetting them automatically.
     unlock_protective_stop: bool = False

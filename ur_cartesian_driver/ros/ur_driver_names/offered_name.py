@@ -127,7 +127,7 @@ class _Relay:
         else:
             driver.on_status(lambda _: self._listen_if_heard())
         if row.repeated:
-            steady_timer(driver.node, 1.0 / settings.io_publish_rate, self._repeat)
+            steady_timer(driver.node, 1.0 / settings.io_states_rate, self._repeat)
 
     def _listen(self, qos: QoSProfile) -> None:
         self._subscription = self._driver.subscribe(
