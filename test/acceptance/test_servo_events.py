@@ -387,6 +387,32 @@ def test_the_arm_waits_in_the_middle_of_the_path_and_at_its_end(displaced):
     run_cell(scenario)
 
 
+@pytest.mark.parametrize(
+    'settings',
+    [
+        {},
+        # It passes its last set-point before it rests there.
+        {'servoj_gain': 1250.0, 'servoj_lookahead_time': 0.04},
+        # It has lost the set-points that the arm passes.
+        {'servo_buffer_depth': 60},
+    ],
+)
+def test_an_output_before_a_wait_comes_when_the_arm_rests(settings):
+    async def scenario(cell):
+        wait = InputWait(
+            waypoint=1, input=InputKind.STANDARD_DIGITAL, pin=1, value=1.0, timeout=5.0
+        )
+        commands = (command(1, VALVE),)
+        run = await Recorded(cell, input_waits=(wait,), io_commands=commands).start()
+        await cell.until(lambda: run.is_on(VALVE), 5.0)
+        cell.robot.controller.io.digital_in.standard[1] = True
+        outcome = await run.end()
+        assert outcome.code is ErrorCode.SUCCESSFUL, outcome
+        return run.table[run.row(VALVE), 4]
+
+    assert run_cell(scenario, robot={'frequency': 500.0}, **settings) < 1e-3
+
+
 def test_the_node_that_is_silent_leaves_the_valve_closed():
     async def scenario(cell):
         run = await Recorded(cell, safe_outputs=(VALVE_CLOSES,)).start()
