@@ -54,6 +54,19 @@ def one(cell, options=OPTIONS, segment=None, **point):
     return made.segments[0], made.remarks
 
 
+def test_a_time_that_ramps_make_too_short_names_their_limit(cell):
+    """Half a millimetre in 10 ms is slow enough for each speed limit, but not to begin and end."""
+    slow = replace(OPTIONS, on_too_fast='slow')
+    _, remarks = one(cell, slow, y=0.0005, time=0.01)
+    assert any('because of max_linear_acceleration = ' in remark for remark in remarks), remarks
+    _, remarks = one(cell, slow, y=0.0005, time=0.01, segment=Segment(type=TYPE.JOINT))
+    assert any('because of max_joint_acceleration = 40 rad/s^2' in remark for remark in remarks), (
+        remarks
+    )
+    _, remarks = one(cell, slow, y=0.2, time=0.3)
+    assert any('because of max_tool_speed = ' in remark for remark in remarks), remarks
+
+
 def test_the_lines_of_a_report_compute_no_column(cell, monkeypatch):
     """Else the report of a long path takes the square of its time."""
     goal = Goal(waypoints=tuple(cell.point(y=0.01 * k) for k in range(1, 9)))

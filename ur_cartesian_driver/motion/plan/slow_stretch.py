@@ -36,8 +36,7 @@ class SlowCause(Enum):
     )
     TOOL_LIMIT = 'raise max_tool_speed, or ask for less speed'
     ACCELERATION_LIMIT = (
-        'raise max_linear_acceleration or max_angular_acceleration, widen the curve, or ask for '
-        'less speed'
+        'raise that limit of the acceleration, widen the curve, or ask for less speed'
     )
     TURN = 'turn the tool less, or over more of the path, or leave its axis free (free_axis)'
     TIMES = 'space points and times evenly, with twists of .nan (chosen by the driver)'

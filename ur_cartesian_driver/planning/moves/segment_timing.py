@@ -25,7 +25,11 @@ from ur_cartesian_driver.planning.moves.move_chain import MoveChain, Moves, ramp
 from ur_cartesian_driver.planning.moves.path_samples import BlendSamples
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.speed_limits import arc_limit
-from ur_cartesian_driver.planning.moves.speed_requests import RAMP_SHARE, SpeedRequests
+from ur_cartesian_driver.planning.moves.speed_requests import (
+    min_duration,
+    RAMP_SHARE,
+    SpeedRequests,
+)
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     IS_ARC_OR_PROCESS,
@@ -268,7 +272,8 @@ class SegmentTimings:
         """Return the limit that slows a segment."""
         sample, samples = int(self._slowed_at[row]), self._samples
         if sample < 0:
-            return self.requests.limits.limit(row)
+            limits = self.requests.limits
+            return limits.acceleration_limit(row) if self._is_ramp(row) else limits.limit(row)
         if self._arc_leads[sample]:
             point = samples.index[sample]
             radius = self._geometries.path.arc_radius[point - self._geometries.begin]
@@ -282,6 +287,16 @@ class SegmentTimings:
             f'the joint speed limits ({JOINT_NAMES[joint]} in the blend at point '
             f'{samples.index[sample]}{self._model.speed_source(joint)})',
         )
+
+    def _is_ramp(self, row: int) -> bool:
+        """Return whether the ramps from rest to rest need more time than the speed limit."""
+        if not self._timed[row]:
+            return False
+        requests, limits = self.requests, self.requests.limits
+        at = slice(row, row + 1)
+        length, speed, peak = requests.length[at], limits.speed[at], requests.peak[at]
+        ramps = min_duration(length, speed, limits.acceleration[at], peak)
+        return bool(ramps > min_duration(length, speed, np.array([inf]), peak))
 
     def bounds(self) -> tuple[Floats, Floats]:
         """

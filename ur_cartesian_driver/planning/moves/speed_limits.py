@@ -101,6 +101,17 @@ class SpeedLimits:
             text = f'the joint speed limits ({place}{source})'
         return SpeedLimit(SlowCause.JOINT_LIMIT, text)
 
+    def acceleration_limit(self, row: int) -> SpeedLimit:
+        """Return the limit on the acceleration of a segment."""
+        options = self._options
+        if self._is_joint_move[row]:
+            text = f'max_joint_acceleration = {options.max_joint_acceleration:g} rad/s^2'
+        elif self._is_turn_limit[row]:
+            text = f'max_angular_acceleration = {options.max_angular_acceleration:g} rad/s^2'
+        else:
+            text = f'max_linear_acceleration = {options.max_linear_acceleration:g} m/s^2'
+        return SpeedLimit(SlowCause.ACCELERATION_LIMIT, text)
+
     def _joint_moves(self, rows: Indices, curves: CurveRows) -> tuple[Floats, Indices]:
         """Return the greatest speeds (m,) of joint moves, and the joints (m,) that limit them."""
         travel = np.array([curves.joint_lines[row].travel for row in rows.tolist()])
@@ -137,10 +148,10 @@ class SpeedLimits:
         # Translation and turn of the tool per unit of the leading quantity.
         linear = np.where(self.translates, curves.length, 0.0) / length
         angular = curves.angle / length
-        bound = np.minimum(
-            options.max_linear_acceleration / np.maximum(linear, 1e-300),
-            options.max_angular_acceleration / np.maximum(angular, 1e-300),
-        )
+        by_line = options.max_linear_acceleration / np.maximum(linear, 1e-300)
+        by_turn = options.max_angular_acceleration / np.maximum(angular, 1e-300)
+        self._is_turn_limit = by_turn < by_line
+        bound = np.minimum(by_line, by_turn)
         return np.where(self._is_joint_move, options.max_joint_acceleration, bound)
 
 
