@@ -518,6 +518,19 @@ def test_a_stop_that_a_lost_robot_does_not_confirm_is_a_lost_connection():
     assert 'did not confirm the stop' in ended.text
 
 
+def test_a_stop_that_is_not_confirmed_says_why_the_arm_had_to_stop():
+    machine = started(path_tolerance=Tolerance(position=(0.0, 0.001, 0.0)))
+    off = robot(0.5)
+    x, _, z = off.state.actual_tcp_pose.position
+    left = replace(off.state, actual_tcp_pose=Pose((x, -0.0015, z)))
+    machine.step(StateReceived(state=left), 1.0)
+    ended = outcome(machine.step(Tick(), 1.0 + STOP_TIMEOUT))
+    assert ended.code is ErrorCode.EXECUTION_FAILED
+    cause, confirmed, _ = ended.text.partition('did not confirm the stop')
+    assert confirmed
+    assert 'the tolerance is' in cause
+
+
 #: Where the outcome is not decided yet.
 RUNNING = [s for s in GoalState if s not in (GoalState.RESTORING, GoalState.ENDED)]
 

@@ -151,9 +151,11 @@ class MotionRunner:
             self._config,
         )
         job = request.job
-        if reason := (
-            self._refusal(job) or await self._foreign_program(job) or self._refusal(job)
-        ):
+        reason = self._refusal(job)
+        if not reason:
+            foreign = await self._foreign_program(job)
+            reason = self._refusal(job) or foreign  # the program may be gone meanwhile
+        if reason:
             refusal = Outcome(code=ErrorCode.ROBOT_NOT_READY, text=reason)
             self._pipe.send(MotionEnded(motion=request.motion, outcome=refusal))
             return

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The outcome of one goal: its code and its text, from the first cause to the report."""
+"""The outcome of one goal: keeps its code and cause, and phrases them for the client."""
 
 from __future__ import annotations
 
@@ -38,13 +38,16 @@ class GoalOutcome:
 
         :param before: the state before the transition.
         """
+        cause = cause.rstrip('.')  # robots and libraries write whole sentences
         if before is GoalState.PROGRAM_LOST:  # the new text says why the program ended
             cause = f'{cause}; before that, {self.cause}'
-        if self._code is ErrorCode.CONNECTION_LOST and signal is GoalSignal.UNCONFIRMED:
-            self.cause = f'{self.cause}; {cause}'  # the lost connection is the cause
-        else:
-            self._code, self.cause = code, cause
+        if signal is not GoalSignal.UNCONFIRMED:
             self.touched = signal is GoalSignal.CONTACT
+        elif self.cause:  # why the arm had to stop
+            cause = f'{self.cause}; {cause}'
+            if self._code is ErrorCode.CONNECTION_LOST:
+                code = self._code
+        self._code, self.cause = code, cause
 
     def late_arrival(self, tolerance: float) -> str:
         """
