@@ -87,7 +87,7 @@ def test_a_watch_without_a_robot_program_is_aborted(single_cell, client):
     watching = send(cell, client)
     cell.spin_until(lambda: not cell.node.contact_action.idle)
     # Both wait until the program is known to be ours, and begin in their order.
-    refused = cell.node.driver.watch_contact().result()
+    refused = cell.node.driver.watch_contact().result(5.0)
     assert 'watches for contact already' in refused.text
     cell.sim.stop_program()
     status, success, message = end(cell, watching)

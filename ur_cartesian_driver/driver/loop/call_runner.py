@@ -9,10 +9,10 @@ import logging
 
 from ur_cartesian_driver.driver.ipc.channel import CallAnswered, CallRobot
 from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
-from ur_cartesian_driver.robot.services.service_calls import failed
+from ur_cartesian_driver.robot.services.service_calls import EndContactWatchCall, failed
 from ur_cartesian_driver.robot.services.service_dispatcher import ServiceDispatcher
 
-#: At most this many calls are carried out at a time.
+#: At most this many calls are carried out at a time, without those that end a watch.
 MAX_CALLS = 32
 
 
@@ -35,7 +35,8 @@ class CallRunner:
 
     def start(self, request: CallRobot) -> None:
         """Carry out a call, or refuse it if too many are being carried out."""
-        if self._running < MAX_CALLS:
+        # Nothing else would end a watch for contact.
+        if self._running < MAX_CALLS or isinstance(request.call, EndContactWatchCall):
             self._running += 1
             self._spawn(self._answer(request))
         else:

@@ -40,6 +40,8 @@ MOTION_VERSION_PROGRAM = (
 ).encode()
 #: Error code of a request that the robot refuses because it is in local control.
 LOCAL_CONTROL = 'C210'
+#: RTDE outputs of the pose that is compared with the calibrated kinematics.
+_POSE_FIELDS = ('actual_q', 'actual_TCP_pose', 'tcp_offset')
 #: How long the robot may take to report its configuration, then its kinematics, and to run
 #: RIGHTS_PROGRAM [s].
 CONFIGURATION_TIMEOUT, GEOMETRY_TIMEOUT, RIGHTS_TIMEOUT = 6.0, 2.0, 3.0
@@ -190,8 +192,10 @@ def _limits(configuration: ConfigurationData) -> Finding:
 
 def _calibration(model: str, geometry: DhTable | None, state: Mapping[str, Any]) -> Finding:
     """Compare the reported pose with the computed one, as the driver does before goals."""
-    if geometry is None or 'actual_q' not in state:
+    if geometry is None:
         return skipped('calibration', 'The robot did not report its calibration')
+    if missing := [name for name in _POSE_FIELDS if name not in state]:
+        return skipped('calibration', f'RTDE does not report {", ".join(missing)}')
     arm = Arm(robot_model(model), geometry)
     T_flange_tcp = Pose.from_rotation_vector(state['tcp_offset'])
     reported = Pose.from_rotation_vector(state['actual_TCP_pose'])

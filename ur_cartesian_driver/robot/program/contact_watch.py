@@ -44,10 +44,10 @@ class ContactWatch:
 
     def begin(self) -> Awaitable[bool]:
         """
-        Begin to watch; what is returned gives True at contact, and False after :meth:`end`.
+        Begin to watch; the result, awaited, is True at contact and False after :meth:`end`.
 
-        :raises RobotNotReady: the program watches already or does not run; if awaited, the watch
-            ended with the program.
+        :raises RobotNotReady: at once if the program watches already or does not run; when
+            awaited if the watch ended with the program.
         """
         if self.is_active:
             raise RobotNotReady(

@@ -112,7 +112,7 @@ class ServiceDispatcher:
 
             self._run_script = ScriptRunner(settings, link, self._send_program).run
         self._pending_settings = 0
-        #: Lets no call end a watch before one made earlier has begun it.
+        #: Keeps the order: the end of a watch waits for an earlier call that is to begin one.
         self._order_of_watches = asyncio.Lock()
 
     @property
