@@ -155,8 +155,18 @@ def test_blends_fit_between_short_lines(tmp_path):
 
 
 @pytest.mark.parametrize(
-    'text', ['M3', 'M3=2:1', 'M3=relay:1:1', 'M3=standard:9:1', 'S=analog:0:0']
+    ('text', 'sentence'),
+    [
+        ('M3', 'not of the form'),
+        ('M3=2:1', 'not of the form'),
+        ('M3=relay:1:1', 'not of the form'),
+        ('M3=standard:9:1', 'the pin is 9, but there are standard digital outputs 0 to 7'),
+        ('M3=standard:1:0.5', r'the value is 0.5; a standard digital output takes 0 \(off\) or 1'),
+        ('S=analog:0:0', '0 is no S number above 0'),
+        ('S=analog:0:inf', 'inf is no S number above 0'),
+        ('S=standard:0:1000', 'S is a level, which only an analog output has'),
+    ],
 )
-def test_an_output_that_is_none_is_refused(text):
-    with pytest.raises(ValueError, match='not of the form'):
+def test_an_output_that_is_none_is_refused(text, sentence):
+    with pytest.raises(ValueError, match=sentence):
         parse_code_output(text)

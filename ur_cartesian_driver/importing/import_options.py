@@ -7,13 +7,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from math import inf
 import re
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.goal.goal import CORNER_DEVIATION, IOCommand, OutputKind
-from ur_cartesian_driver.motion.goal.output_names import output_fault, output_name
+from ur_cartesian_driver.motion.goal.output_names import output_fault
 
 #: Length units [m].
 LENGTH_UNITS: Mapping[str, float] = {
@@ -64,7 +65,7 @@ class CodeOutput:
         :raises ValueError: the output cannot have the value.
         """
         if (fault := output_fault(self.kind, self.pin, value)) is not None:
-            raise ValueError(f'{output_name(self.kind, self.pin)} {fault[1]}')
+            raise ValueError(f'the {fault[0]} {fault[1]}')
         return IOCommand(waypoint=0, offset=0.0, output=self.kind, pin=self.pin, value=value)
 
 
@@ -72,7 +73,8 @@ def parse_code_output(text: str) -> tuple[str, CodeOutput]:
     """
     Return code and output of ``M3=standard:2:1``, ``M280 S40=tool:0:1`` or ``S=analog:0:10000``.
 
-    :raises ValueError: the text has none of these forms.
+    :raises ValueError: the text has none of these forms, there is no such output, it cannot have
+        the value, or S drives a digital output.
     """
     try:
         code, rest = text.upper().split('=')
@@ -83,15 +85,20 @@ def parse_code_output(text: str) -> tuple[str, CodeOutput]:
         # M03 and M3 are one code, S40 and S40.0 one value.
         words = [f'{word[1]}{float(word[2]):g}' for word in _CODE_WORD.finditer(code)]
         code = ' '.join(words) or 'S'
-        output.command(1.0 if code == 'S' else output.value)
-        if code == 'S' and not output.value > 0.0:
-            raise ValueError
     except (KeyError, ValueError):
         raise ValueError(
             f'{text!r} is not of the form CODE=KIND:PIN:VALUE, such as M3=standard:2:1, '
             "'M280 S40=standard:0:1' or S=analog:0:10000; kinds are standard, configurable, tool "
             'and analog'
         ) from None
+    if code == 'S' and kind != 'analog':
+        raise ValueError(f'{text!r}: S is a level, which only an analog output has')
+    if code == 'S' and not 0.0 < output.value < inf:
+        raise ValueError(f'{text!r}: {output.value:g} is no S number above 0')
+    try:
+        output.command(1.0 if code == 'S' else output.value)
+    except ValueError as error:
+        raise ValueError(f'{text!r}: {error}') from None
     return code, output
 
 
