@@ -201,6 +201,18 @@ def test_an_emergency_stop_brakes_pauses_and_cuts_the_power(bench):
     assert bench.log[-1] == 'arrived'
 
 
+def test_an_emergency_stop_that_is_released_at_once_cuts_the_power_all_the_same(bench):
+    bench.start(LONG_LINE)
+    bench.wait(0.5)
+    bench.controller.safety_event(SafetyEvent.EMERGENCY_STOP)
+    bench.step(2)
+    assert not bench.controller.at_rest
+    assert bench.controller.safety_event(SafetyEvent.RELEASE) == ''
+    bench.until(lambda: bench.controller.at_rest)
+    bench.step(2)
+    assert bench.controller.power.mode is RobotMode.POWER_OFF
+
+
 @pytest.mark.parametrize('event', [SafetyEvent.VIOLATION, SafetyEvent.FAULT])
 def test_a_violation_or_fault_cuts_the_power_and_ends_the_program(bench, event):
     bench.start(LONG_LINE)

@@ -44,7 +44,6 @@ class Ending(Enum):
     OTHER_SAFETY_STOP = ''
 
 
-#: Safety modes in which programs may move the arm.
 #: Endings after which the rest of the move may follow.
 _RESUMABLE = (Ending.PAUSE, Ending.PROTECTIVE_STOP, Ending.OTHER_SAFETY_STOP)
 

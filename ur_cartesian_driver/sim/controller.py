@@ -157,7 +157,7 @@ class Controller:
         #: The rate at which motions run now, 0..1; determined by slider, pauses and stops.
         self.scale = 1.0
         #: Whether the arm slows down on its path because the program ended during the motion.
-        self._stopping_on_path = False
+        self._stopping_on_path = self._cuts_power = False
         self._joint_history: deque[Vector6] = deque([config.q] * MAX_HISTORY, maxlen=MAX_HISTORY)
         self.programs: ProgramRunner = ProgramRunner(
             make_builtins(self),
@@ -301,7 +301,10 @@ class Controller:
         self.actual.step()
         self._joint_history.append(self.actual.q)
         self._report_motion_events()
-        if self.safety.mode in POWERLESS and self.at_rest:
+        # Also if the emergency stop is released while the arm still moves.
+        self._cuts_power |= self.safety.mode in POWERLESS
+        if self._cuts_power and self.at_rest:
+            self._cuts_power = False
             self.power.off()
 
     def _change_scale(self, was_at_rest: bool) -> None:

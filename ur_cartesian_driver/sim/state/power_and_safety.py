@@ -83,7 +83,7 @@ STATUS_BITS: Mapping[SafetyMode, SafetyStatus] = {
 
 #: Modes in which the arm can be powered and can move.
 OPERATIONAL = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
-#: Modes in which the brakes hold and the motors are off.
+#: Modes that cut the power of the motors, as soon as the arm rests.
 POWERLESS = frozenset(
     {
         SafetyMode.ROBOT_EMERGENCY_STOP,
