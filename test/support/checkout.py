@@ -10,5 +10,5 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: Marks what reads documents, examples or scripts: a package installs none of them.
 needs_checkout = pytest.mark.skipif(
-    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has this'
+    not (CHECKOUT / 'doc').is_dir(), reason='only a checkout has this'
 )

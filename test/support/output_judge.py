@@ -31,6 +31,8 @@ RESOLUTION = 2e-5
 WIDE_BOUND = 1e-4
 #: Change of the slider in some cycles that does not count.
 SLIDER_RESTS = 0.005
+#: So long before its effect the program decides on an output [cycles].
+DECIDED = 2.0
 #: For so long after it goes on [cycles] the program waits until the arm moves.
 GOING_ON = 8
 
@@ -120,9 +122,9 @@ def judge_commands(run, path_time, bound, pauses=()):
     Judge the edges of the commands of a run.
 
     Near a rest the speed tells little of the slider, and the tool makes little way: there the
-    bound is wider. So it is with a lead over a stop or a corner, which may be shorter than the
-    pieces in which the lead comes to the robot, and while the slider moves. What is due in a
-    pause, in which the tool coasts on, comes when it has ended.
+    bound is wider. So it is with a lead while the speed of the tool changes, which may take less
+    time than the pieces in which the lead comes to the robot, and while the slider moves. What is
+    due in a pause, in which the tool coasts on, comes when it has ended.
 
     :param pauses: cycles in which the program is paused, and goes on.
     """
@@ -162,17 +164,19 @@ def judge_commands(run, path_time, bound, pauses=()):
             or np.ptp(rate[max(edge - 6, 0) : edge + 1]) > SLIDER_RESTS
         )
         within = WIDE_BOUND if is_wide else RESOLUTION
-        if abs(late) > bound + 2.0 * is_wide and not near and abs(off) > within:
+        is_far = abs(off) > within or (is_wide and abs(late) > REST_CYCLES)
+        if abs(late) > bound + 2.0 * is_wide and not near and is_far and abs(off) > RESOLUTION:
             verdict.misses[wanted.pin] = round(float(late), 2)
     return verdict
 
 
 def _due(left, rate, lead, edge):
     """
-    Return when an output was due [cycles]: when it was so first, and by how much it was overdue.
+    Return two times at which an output may have been due [cycles].
 
-    While the slider is lowered, the time that is left may become a little less than the lead, and
-    then more again. So the second one is as far before the edge as the output was overdue.
+    The first is when it was due first. While the slider is lowered, the time that is left may
+    fall a little below the lead and then exceed it again, so the second one is as far before the
+    edge as the output was ever overdue, or behind it as far as it was not due there.
 
     :param left: time of the path to its place by cycle [s].
     :param rate: how fast this time passes.
@@ -183,9 +187,9 @@ def _due(left, rate, lead, edge):
     passes = (rate > 0.0) | (left <= 0.0)
     k = int(np.flatnonzero((overdue >= 0.0) & passes)[0])
     first = k - overdue[k] / max(overdue[k] - overdue[k - 1], 1e-12)
-    before = np.flatnonzero(passes[: edge + 1])
-    most = (overdue[before] / np.where(rate[before] > 0.0, rate[before], 1.0)).max() / STEP
-    return first, edge - float(most)
+    late = overdue[: edge + 1] / np.where(rate[: edge + 1] > 0.0, rate[: edge + 1], 1.0) / STEP
+    most = late[passes[: edge + 1]].max()
+    return first, edge - float(most if late[-1] > -DECIDED else late[-1])
 
 
 def _lost(run, pauses):

@@ -157,6 +157,8 @@ class Case:
 
     def _pulses(self):
         draw, trains = self.random, []
+        # Else it is not known how many fit before the last point.
+        least = 3.0 * (SetPointRun if self.kind == 'servo' else JudgedRun).rounding
         for pin in (4, 5):
             first = draw.randint(0, 2 if not self.sizes else self.sizes[0] - 2)
             width = draw.choice([0.0, 0.004, 0.01])
@@ -167,7 +169,7 @@ class Case:
                     last_waypoint=LAST if self.sizes else draw.randint(first + 1, LAST),
                     output=OutputKind.STANDARD_DIGITAL,
                     pin=pin,
-                    distance=max(draw.uniform(0.0005, 0.006) * self.size, room),
+                    distance=max(draw.uniform(0.0005, 0.006) * self.size, room, least),
                     phase=draw.uniform(0.0, 0.01) * self.size,
                     width=width,
                 )
@@ -208,19 +210,20 @@ class SetPointRun(JudgedRun):
                 controller.set_slider(slider(len(positions)))
                 act(controller, len(positions))
 
+            nonlocal goal
             state = cell.memory.read()
-            self.goal = goal(state.actual_tcp_pose)
+            goal = goal(state.actual_tcp_pose)
             fields = ('target_TCP_pose', 'actual_digital_output_bits')
             connection = RtdeConnection(RtdeClientCodec(fields), take)
             await connection.open(HOST, RTDE)
-            motion = cell.owner.start(plan(self.goal, state, ARM, OPTIONS), arm=SETUP)
+            motion = cell.owner.start(plan(goal, state, ARM, OPTIONS), arm=SETUP)
             await cell.until(lambda: motion.outcome, 600.0)
             await cell.sleep(5.0 * STEP)  # what RTDE has yet to report
             connection.close()
             assert motion.outcome.succeeded, motion.outcome
 
         run_cell(scenario, robot={'frequency': 1.0 / STEP, 'q': HOME})
-        return self.goal, np.array(positions), outputs
+        return goal, np.array(positions), outputs
 
 
 def verdicts(case, robot):
