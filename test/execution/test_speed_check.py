@@ -11,8 +11,8 @@ from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.monitoring.speed_check import (
     MAX_SLOWDOWN,
     MAX_START_DELAY,
-    MIN_SPEED_LIMITS,
     PEAK_TO_MEAN,
+    SPEED_MARGINS,
     SpeedCheck,
 )
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -34,7 +34,7 @@ POSES = np.array(
 PATH = ReferencePath(
     poses=POSES, point=np.array([0, 0, 1], dtype=np.int32), time=np.array([0.0, 1.0, 3.0])
 )
-FASTEST = PEAK_TO_MEAN * 0.1 + MIN_SPEED_LIMITS[0], PEAK_TO_MEAN * 0.5 + MIN_SPEED_LIMITS[1]
+FASTEST = PEAK_TO_MEAN * 0.1 + SPEED_MARGINS[0], PEAK_TO_MEAN * 0.5 + SPEED_MARGINS[1]
 
 
 def twist(v=0.0, w=0.0):
@@ -53,7 +53,7 @@ def twist(v=0.0, w=0.0):
             ZERO6,
             MAX_START_DELAY + MAX_SLOWDOWN * 0.5 + 0.01,
             0.5,
-            'controller is where the plan is after 0.50 s',
+            'controller has come only as far as the plan after 0.50 s',
         ),
     ],
 )
@@ -72,7 +72,7 @@ def test_a_path_at_rest_permits_harmless_speeds():
         point=np.zeros(2, dtype=np.int32),
         time=np.array([0.0, 1.0]),
     )
-    assert SpeedCheck(still).violation(twist(0.9 * MIN_SPEED_LIMITS[0]), 0.1, 0.0) is None
+    assert SpeedCheck(still).violation(twist(0.9 * SPEED_MARGINS[0]), 0.1, 0.0) is None
 
 
 def robot(time, x=0.4, v=0.0, begun=0, qd=0.0):

@@ -310,7 +310,7 @@ def test_a_gap_in_the_times_is_said(tmp_path):
     rows = [f'{0.1 * i + 30 * (i > 20):.1f},{i},0,0' for i in range(40)]
     (tmp_path / 'a.csv').write_text('t,x [mm],y [mm],z [mm]\n' + '\n'.join(rows))
     found = import_file(tmp_path / 'a.csv')
-    assert 'line 23: a gap of 30.1 s: the motion there takes as long' in said(found)
+    assert 'line 23: a gap of 30.1 s: the motion to this point takes that long' in said(found)
 
 
 @pytest.mark.parametrize('speed', [None, 0.05])

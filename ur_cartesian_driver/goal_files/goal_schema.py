@@ -33,7 +33,7 @@ class Whole:
 
     low: int
     high: int
-    #: What the numbers mean; None = they count.
+    #: The named values; None = a plain number.
     choices: type[IntEnum] | None = field(default=None, compare=False)
 
 
@@ -88,7 +88,7 @@ def _packed_schema() -> dict[str, Any]:
 
 
 PACKED = _packed_schema()
-#: The fields of the message that a :class:`Goal` lacks, by the field that they follow.
+#: Message fields without a counterpart in :class:`Goal`, keyed by the field before them.
 _BESIDE: Mapping[str, Any] = {
     'execution': {'validate_only': False},
     'safe_outputs': {'packed': PACKED},
@@ -167,7 +167,7 @@ def default(schema: Any) -> Any:
 
 def message_of(plain: Message, kind: type[Any]) -> Any:
     """
-    Return a generated message with the values of an object that has all fields of the message.
+    Copy an object with all fields of a message into a new generated message.
 
     :param kind: the class of the message.
     """

@@ -78,16 +78,16 @@ def read_leads(path: str | os.PathLike[str]) -> tuple[Lead, ...]:
 
 def write_lead(path: str | os.PathLike[str], lead: Lead) -> None:
     """
-    Add a lead to a file, which may be new, in place of one of the same name.
+    Add a lead to a file, or replace the one of the same name; make the file if need be.
 
     :raises LeadFileError: the file exists, but is no file of leads; it stays as it is.
     :raises OSError: the file cannot be written.
     """
     file = Path(path)
     kept = [each for each in read_leads(file) if each.name != lead.name] if file.exists() else []
-    written = file.with_name(f'{file.name}.new')  # so that a full disk spoils no figures
-    written.write_text(_HEADER + _text((*kept, lead)), encoding='utf-8')
-    written.replace(file)
+    new = file.with_name(f'{file.name}.new')  # a full disk must not destroy the old file
+    new.write_text(_HEADER + _text((*kept, lead)), encoding='utf-8')
+    new.replace(file)
 
 
 def _text(leads: Iterable[Lead]) -> str:

@@ -43,7 +43,7 @@ class Identification:
     results: dict[str, Result]
 
     def summary(self) -> str:
-        """Return a sentence about the moves that were found."""
+        """Return a line that counts the moves, and one for each move that fits no trapezoid."""
         kinds = Counter(move.kind for move in self.moves)
         names = {Kind.LINE: 'lines', Kind.JOINT: 'joint moves', Kind.EITHER: 'turns of one joint'}
         parts = [f'{kinds[kind]} {name}' for kind, name in names.items() if kinds[kind]]

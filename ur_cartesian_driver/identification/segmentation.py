@@ -3,8 +3,8 @@
 """
 Divides a recording into pieces: single moves, from a speed of zero to a speed of zero.
 
-Moves in a row often leave no packet at rest between them. There the speed falls to what a ramp
-changes in one cycle, and rises again; a blend stays faster.
+Between moves in a row, often no packet shows rest: the speed only falls to what a ramp changes in
+one cycle. In a blend it stays higher.
 """
 
 from __future__ import annotations
@@ -23,10 +23,9 @@ from ur_cartesian_driver.motion.state.rtde_state import (
     SafetyMode,
 )
 
-#: Slower targets rest [rad/s].
+#: Targets slower than this count as at rest [rad/s].
 REST_SPEED = 1e-3
-#: Moves that are as close together are a chain [s]; packets that are missing for longer leave the
-#: motion between them unknown [s].
+#: Longest rest inside a chain of moves, and longest gap in the packets of a usable piece [s].
 CHAIN_TIME, LONGEST_GAP = 0.1, 0.1
 #: How much of the rest on both sides belongs to a piece [s].
 MARGIN = 0.2
@@ -35,7 +34,7 @@ _FEWEST_ROWS = 12
 
 
 class Ending(Enum):
-    """The event that ended a piece before its target; the value is the law of its ramp."""
+    """The event that ended a piece before its target; the value names the law of its ramp."""
 
     PROGRAM_STOP = 'stop_time'
     PAUSE = 'pause_time'
@@ -56,10 +55,10 @@ class Piece:
     :param begin: first row; rest before it, if any, is included.
     :param end: row after the last one; rest behind it, if any, is included.
     :param moving: first and last row in which the target moves.
-    :param number: place among all pieces of the recording, also those that are left out.
+    :param number: index among all pieces of the recording, including those that are left out.
     :param chained: whether another piece precedes it within :data:`CHAIN_TIME`.
     :param ending: None = it came to its end, or the recording does not tell.
-    :param resumed: whether it is the rest of a move that was paused or stopped.
+    :param resumed: whether it is the remainder of a move that was paused or stopped.
     :param slowed: whether the speed slider was below 100 %.
     """
 
@@ -159,7 +158,7 @@ def _piece(
     cut: tuple[bool, bool],
 ) -> Piece:
     """
-    Make a piece of the steps that move, as if it were no rest of another.
+    Make the piece of some moving steps; the caller sets ``resumed``.
 
     :param moving: row at which it begins to move, and the row at which it has ended.
     :param beside: row at which the piece before has ended, and at which the next one begins.
@@ -195,7 +194,7 @@ def _is_resuming(samples: ArmSamples, begin: int) -> bool:
 
 
 def _ending(samples: ArmSamples, begin: int, end: int) -> Ending | None:
-    """Return the event during a motion, other than in its last cycles."""
+    """Return the event that interrupted a motion; events in its last cycles do not count."""
     inside = slice(begin + 1, max(end - 2, begin + 1))
     safety, states = samples.safety_mode, samples.runtime_state
     if safety is not None:

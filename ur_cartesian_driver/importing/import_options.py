@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The options of an import, the same for all formats; the notation of the outputs in them."""
+"""Import options, the same for all formats, and the notation of their outputs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _KINDS = {
 }
 _LENGTH = re.compile(r'\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*([a-z]*)\s*', re.IGNORECASE)
 _CODE_WORD = re.compile(r'([A-Z])(-?[0-9]+(?:\.[0-9]+)?)')
-#: S, or an M-code with the values that a program has to give with it.
+#: S, or an M-code with the words that must stand beside it, such as ``M280 S40``.
 _CODE = re.compile(rf'S|M[0-9]+(\.[0-9]+)?(\s*{_CODE_WORD.pattern})*')
 
 
@@ -45,7 +45,7 @@ class ToolOrientation(Enum):
     FILE = 'file'
     #: The tool's axis z against the normals of the file.
     NORMALS = 'normals'
-    #: The tool's axis z against z of the frame, and its x along y of the frame.
+    #: The tool's z opposite to z of the frame, and its x along y of the frame.
     DOWN = 'down'
 
 
@@ -55,7 +55,7 @@ class CodeOutput:
 
     kind: OutputKind
     pin: int
-    #: The value that the output gets, 0 to 1; for S, the S number at which the output gets 1.
+    #: The value that the output gets, 0 to 1; for S, the S number that means 1.
     value: float
 
     def command(self, value: float) -> IOCommand:
@@ -125,8 +125,8 @@ class ImportOptions:
     frame: str = ''
     #: The pose of the file's origin in the frame.
     origin: Pose = IDENTITY
-    #: Unit of lengths that have none in the file, and of any DXF drawing; empty = a file that
-    #: lacks a unit is refused, except G-code, which is then in mm.
+    #: Unit of lengths that have none; overrides that of a DXF drawing. Empty: a file that lacks a
+    #: unit is refused, but G-code is in mm.
     unit: str = ''
     #: Factor on all lengths, about the origin of the file.
     scale: float = 1.0
@@ -137,12 +137,12 @@ class ImportOptions:
     travel_speed: float | None = None
     #: Acceleration [m/s^2] of lines and arcs; None = the file's, else the driver's parameter.
     acceleration: float | None = None
-    #: Duration [s] of the motion to the first point, if the file has times; None = the first time.
+    #: Duration [s] of the motion to the first point, if the file has times; None = the first one.
     approach_time: float | None = None
     #: Blend radius [m] at inner points for which the file has none; smaller where lines are short.
     blend: float = 0.0
-    #: Largest distance [m] of the path from the corners of lines and arcs for which the file has
-    #: none; 0 = the arm stops at these corners, or passes them with a blend.
+    #: Corner deviation [m] where the file has none for lines and arcs; 0 = the arm stops at these
+    #: corners, or passes them with a blend.
     corner: float = 0.0
     #: Largest distance of the simplified path from the file's [m]; 0 = all points are kept.
     simplify: float = 0.0
@@ -162,7 +162,7 @@ class ImportOptions:
 
     @property
     def moves_path(self) -> bool:
-        """Whether the path gets another frame, origin or scale than the file's."""
+        """Whether an option moves or scales the path, which joint positions cannot follow."""
         return self.frame not in ('', 'base') or self.origin != IDENTITY or self.scale != 1.0
 
     def __post_init__(self) -> None:

@@ -3,9 +3,8 @@
 """
 Times of the points of a file.
 
-The times of a file can come from any clock: seconds since the robot was switched on, or Unix
-times. The first time of a goal is the duration of the motion to the first point; it is 0 only if
-the arm is already there.
+Whatever the clock of a file, its readers count from the first point. The first time of a goal is
+the duration of the motion to the first point; it is 0 only if the arm is already there.
 """
 
 from __future__ import annotations
@@ -23,8 +22,8 @@ from ur_cartesian_driver.importing.imported_path import (
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.goal.goal_columns import rows_where
 
-#: Shortest standstill [s] that becomes a dwell; in a shorter one the tool may be moving slowly, by
-#: less than 5 um.
+#: Shortest standstill [s] that becomes a dwell. In a shorter one a slow tool may just not have
+#: moved by 5 um yet, so its time stays part of the motion.
 _MIN_REST = 0.5
 #: A step in time is a gap if it is longer than the first number [s], and longer than the second
 #: number times the median step.
@@ -76,6 +75,6 @@ def with_times(
             0, 'the first point is at time 0', 'the arm has to be there; else give approach_time'
         )
     for row in rows_where(steps > np.maximum(_MIN_GAP, _GAP * np.median([*steps, 0.0]))):
-        why = 'the motion there takes as long'
+        why = 'the motion to this point takes that long'
         remarks.add(int(path.lines[row + 1]), f'a gap of {steps[row]:.3g} s', why)
     return replace(path, times=times, dwells=np.where(rests > 0.0, rests, path.dwells))

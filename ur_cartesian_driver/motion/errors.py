@@ -41,7 +41,7 @@ _Error = TypeVar('_Error', bound='DriverError')
 
 
 class ErrorCode(IntEnum):
-    """The ``error_code`` of the action's result: FZI's numbers down to -6, ours below."""
+    """The ``error_code`` of the action's result: 0 to -6 are FZI's, the others ours."""
 
     SUCCESSFUL = 0
     INVALID_GOAL = -1
@@ -64,17 +64,17 @@ class ErrorCode(IntEnum):
     ROBOT_NOT_READY = -18
 
 
-#: Longest text of a user that is repeated in an error.
+#: Longest text of a user that an error quotes in full.
 _MAX_ECHO = 80
 
 
 def shortened(text: str) -> str:
-    """Return a text of the user as an error repeats it: at most 80 characters."""
+    """Shorten a user's text to 80 characters, so that an error can quote it."""
     return text if len(text) <= _MAX_ECHO else f'{text[: _MAX_ECHO - 3]}...'
 
 
 def suggestion(name: str, known: Iterable[str], otherwise: str) -> str:
-    """Return what to do about a name that is none of the known ones, for the end of an error."""
+    """Return the advice on an unknown name: the nearest known one, else ``otherwise``."""
     near = get_close_matches(name, list(known), n=1)
     return f'did you mean {near[0]}?' if near else otherwise
 
@@ -88,7 +88,7 @@ class DriverError(Exception):
     report: tuple[str, ...] = ()
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Rebuild pickles and copies from the text, because some constructors take its parts."""
+        """Copy and pickle by the finished text: some constructors take only parts of it."""
         return _restore, (type(self), str(self)), self.__dict__
 
 

@@ -160,7 +160,7 @@ def _table(axes: _Axes, model: RobotModel) -> DhTable:
 def _common_normal(
     origin: Floats, z: Floats, point: Floats, following: Floats
 ) -> tuple[Floats, float, float]:
-    """Return the common normal's direction, its distance from ``origin`` along z, its length."""
+    """Return the common normal: direction, distance of its foot from ``origin``, and length."""
     normal = np.cross(z, following)
     size = float(np.linalg.norm(normal))
     if size > _PARALLEL:

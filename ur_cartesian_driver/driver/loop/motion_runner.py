@@ -263,7 +263,7 @@ class MotionRunner:
             reason = f'{type(error).__name__}: {error}'.rstrip('.')
             text = f'The motion cannot go on ({reason}).'
             self._pipe.log(logging.ERROR, f'{text} {traceback.format_exc()}')
-            # First: once no motion runs, the next goal could be given to the program.
+            # Stop first: after _finish() the next goal could start in the program that is to end.
             self._link.control.stop(text)
             self._finish(Outcome(code=ErrorCode.EXECUTION_FAILED, text=text))
 

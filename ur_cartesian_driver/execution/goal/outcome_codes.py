@@ -26,14 +26,14 @@ class GoalSignal(Enum):
     SUCCESS = 'the last point is reached', None
     CANCELED = 'the trajectory was cancelled', ErrorCode.EXECUTION_FAILED
     FAILURE = 'the robot program failed', ErrorCode.EXECUTION_FAILED
-    CONTACT = 'the tool touched, where that ends the goal', ErrorCode.SUCCESSFUL
-    TOUCHED = 'a watch beside the goal noticed contact', ErrorCode.EXECUTION_FAILED
+    CONTACT = 'the tool made contact in a goal that ends at contact', ErrorCode.SUCCESSFUL
+    TOUCHED = 'a contact watch outside of the goal stopped the arm', ErrorCode.EXECUTION_FAILED
     # Requests of users.
     CANCEL = 'the client cancels', ErrorCode.CANCELLED
     PREEMPT = 'a newer goal takes over', ErrorCode.PREEMPTED
     # Faults of a motion.
     VIOLATION = 'the arm is outside the path tolerance', ErrorCode.PATH_TOLERANCE_VIOLATED
-    DEVIATION = 'the robot does something else than planned', ErrorCode.EXECUTION_FAILED
+    DEVIATION = 'the robot does something other than planned', ErrorCode.EXECUTION_FAILED
     STANDSTILL = 'the arm stands although nothing holds it', ErrorCode.EXECUTION_FAILED
     STALE = 'the newest state of the robot is too old', ErrorCode.CONNECTION_LOST
     # The arm stops by itself.
@@ -55,7 +55,7 @@ class GoalSignal(Enum):
     UNANSWERED = 'no answer to CANCEL, but the arm rests', None
     UNCONFIRMED = 'no answer to CANCEL, and the arm may move', ErrorCode.EXECUTION_FAILED
     RESTORED = 'TCP and outputs are as they should be', None
-    TIMEOUT = 'the time of a state without a code is up', None
+    TIMEOUT = 'a wait that decides no outcome timed out', None
 
 
 #: The signal of an event (None = the event has no effect), and a clause for the outcome's text.

@@ -22,8 +22,8 @@ from ur_cartesian_driver.motion.plan.plan import ReferencePath
 
 #: The peak speed of a motion from rest to rest is at most twice its average speed.
 PEAK_TO_MEAN = 2.0
-#: Speeds that are always harmless [m/s], [rad/s].
-MIN_SPEED_LIMITS = (0.02, 0.1)
+#: Margins on the limits [m/s], [rad/s], so that a plan that hardly moves has limits, too.
+SPEED_MARGINS = (0.02, 0.1)
 #: The longest duration is this multiple of the planned one, plus this time to begin [s].
 MAX_SLOWDOWN, MAX_START_DELAY = 20.0, 3.0
 #: The remedy for a robot program that reads the points in another wire dialect.
@@ -43,8 +43,8 @@ class SpeedCheck:
         chords = np.minimum(length_rows(b - a), length_rows(b + a))
         turns = 4.0 * np.arcsin(np.minimum(0.5 * chords, 1.0))
         self._limits = tuple(
-            PEAK_TO_MEAN * _max_speed(lengths, passed) + min_limit
-            for lengths, min_limit in zip((distances, turns), MIN_SPEED_LIMITS, strict=True)
+            PEAK_TO_MEAN * _max_speed(lengths, passed) + margin
+            for lengths, margin in zip((distances, turns), SPEED_MARGINS, strict=True)
         )
 
     def violation(self, twist: Vector6, elapsed: float, planned: float) -> str | None:
@@ -59,12 +59,12 @@ class SpeedCheck:
         for speed, limit, unit in zip(speeds, self._limits, ('m/s', 'rad/s'), strict=True):
             if speed > limit:
                 return (
-                    f'the controller moves the tool at {speed:.3f} {unit}, the plan at '
-                    f'no more than {limit:.3f} {unit}: {_CAUSE}'
+                    f'the controller moves the tool at {speed:.3f} {unit}, and the plan explains '
+                    f'at most {limit:.3f} {unit}: {_CAUSE}'
                 )
         if elapsed > MAX_START_DELAY + MAX_SLOWDOWN * planned:
             return (
-                f'after {elapsed:.1f} s the controller is where the plan is after '
+                f'after {elapsed:.1f} s the controller has come only as far as the plan after '
                 f'{planned:.2f} s: {_CAUSE}'
             )
         return None

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The offsets that a client requests for a path: the newest one, its age, and a report of all.
+The path offsets that a client sends: which one applies now, whether it is stale, a report.
 
 An offset may come at any time, jump, be too old or too large. The newest one is used, cut to the
 limits of the goal. Where the path is not open to offsets, zero is used instead. When the newest
@@ -63,16 +63,16 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
         before, self._is_stale = self._is_stale, self._freshness.is_stale(now)
         if self._is_stale and not before:
             self._stale_count += 1
-            follows = 'goes back to its path' if self._fades else 'stays where it was'
+            does = 'goes back to its path' if self._fades else 'stays at the newest offset'
             self._warnings.ask(
-                f'the path offset is older than {self._band.timeout:g} s: the tool {follows}'
+                f'the path offset is older than {self._band.timeout:g} s: the tool {does}'
             )
         return self._warnings.due(now)
 
     def target(self, time: float) -> Vector3:
         """Return the offset to which the tool should move, at a time of the motion [s]."""
         if not self._band.opens(time):
-            if self._is_stale:  # after a turn of the path, it would point another way
+            if self._is_stale:  # the path may have turned by the time it opens again
                 self._newest = ZERO3
             return ZERO3
         return ZERO3 if self._is_stale and self._fades else self._newest

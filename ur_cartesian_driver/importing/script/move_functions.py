@@ -41,7 +41,7 @@ TOOL_A, TOOL_V, FRACTION = 1.2, 0.25, 0.3
 JOINT_A, JOINT_V = ASSUMED_LAWS.timed_joint_acceleration, ASSUMED_LAWS.timed_joint_speed
 #: The assumed turn ratio of movel.
 TURN_RATIO = ASSUMED_LAWS.turn_ratio
-#: A larger length [m] must be meant in millimetres, and a larger angle [rad] in degrees.
+#: Larger lengths [m] are taken for millimetres, larger angles [rad] for degrees.
 FAR, MAX_ANGLE = 3.0, 12.6
 #: Joints that turn by less than this angle [rad] do not move.
 SAME_ANGLE = 1e-6
@@ -187,7 +187,7 @@ class MoveFunctions:
                 here = self._place.pose
                 length = max(here.distance_to(target), here.angle_to(target) / TURN_RATIO)
                 if kind is SegmentType.LINEAR and here.distance_to(target) < SAME_POINT:
-                    # The tool only turns: a goal then has rates in rad; 4 rad last as long as 1 m.
+                    # The rates of a pure turn are in rad; movel turns 4 rad in the time of 1 m.
                     unit = TURN_RATIO
             a, v = self._rates(name, rates, length, time, blend, (TOOL_A, TOOL_V))
             self._events.add(

@@ -61,7 +61,7 @@ class MoveL(_MoveNear):
     """
     Straight line of the tool, with the tool's velocity [m/s] and acceleration [m/s^2].
 
-    A joint target means the TCP pose in which these joint positions result. ``q_near`` is sent
+    A joint target stands for the TCP pose at these joint positions. ``q_near`` is sent
     too, but the robot ignores it.
     """
 
@@ -142,8 +142,8 @@ class SwitchOutput:
     #: Unit direction of the motion at the trigger pose, linear or angular, in the axes of this
     #: pose. The output switches when the tool crosses, in this direction, the plane through it.
     trigger_direction: Vector6 = ZERO6
-    #: Whether the tool is already past this plane when the program reads the record; the output
-    #: then switches only once the tool has been in front of the plane and crosses it.
+    #: Whether the tool is already past the plane when the record is read; the output then waits
+    #: until the tool has gone back in front of the plane and crosses it.
     starts_beyond: bool = False
     #: Delay after the end of the motion before [s].
     delay: float = 0.0
@@ -179,16 +179,16 @@ class LeadLaw:
     """
     Not a motion: the lead of the next output, and the planned motion to the place of that output.
 
-    The trigger pose of that output is where the tool is a lead before the place at full speed. A
-    slower tool switches it later on the way from there to the place.
+    At full speed, the tool passes the trigger pose one lead before the place. A slower tool
+    switches nearer to the place.
     """
 
     #: How much ahead of its place the output switches, in real time [s].
     lead: float
     #: Way of the tool from the trigger pose to the place [m]; its turn [rad] if it only turns.
     distance: float
-    #: Speeds of the tool [m/s or rad/s] at full speed, from the place back to the trigger pose, at
-    #: equal distances in time. The acceleration between them is constant.
+    #: Speeds of the tool [m/s or rad/s] at full speed, from the place back to the trigger pose,
+    #: evenly spaced in time. The acceleration between them is constant.
     speeds: tuple[float, ...]
     #: Whether way and speeds are angular.
     turns: bool = False
@@ -199,11 +199,12 @@ class PulseLaw:
     """
     Not a motion: the law of the pulses that begin with the next output.
 
-    :param slot: which of the robot program's counts is that of the output.
+    :param slot: index of the output's pulse counter in the robot program.
     :param distance: way of the tool from pulse to pulse [m].
     :param phase: way from the place of the next output to the first pulse [m].
     :param width: how long a pulse is [s].
-    :param goes_on: whether pulses that are left at the end of the trajectory are dropped.
+    :param goes_on: whether the train continues on appended points; what is left at the end of the
+        trajectory is then dropped.
     """
 
     slot: int
@@ -315,7 +316,7 @@ class PressLaw:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BeginPress:
     """
-    Force mode begins; if no axis is compliant, only the watch for contact begins.
+    Force mode begins; without compliant axes, the program only watches for contact.
 
     :param T_base_task: the frame of the compliant axes.
     :param follows_tool: whether the frame is the TCP's, updated in each cycle.

@@ -48,7 +48,7 @@ class SpeedLimits:
         )
         travel = np.where(curves.is_joint_line, curves.joint_travel, curves.angle)
         length = np.where(self.is_turn, travel, curves.length)
-        # An OPTIMIZED move has as leading quantity its time with some joint always at its limit.
+        # What leads an OPTIMIZED move is the time it takes with some joint always at its limit.
         length = np.where(self.is_optimized, self._bounds.times_at_limits, length)
         #: Length of the leading quantity: [m], [rad], or for an OPTIMIZED move [s].
         self.length: Floats = np.maximum(length, _MIN_LENGTH)
@@ -66,15 +66,15 @@ class SpeedLimits:
         self.speed: Floats = np.minimum.reduce([joint_speed, tool_speed, arc_speed])
         #: Maximum acceleration of the leading quantity.
         self.acceleration = self._acceleration(curves)
-        # Lower the limits, so that they hold even if the robot turns the tool at up to
-        # ``turn_ratio`` rad/s for each m/s, or faster if that was measured.
+        # For a speed of 1 m/s a robot may turn the tool at up to ``ratio`` rad/s: lower the limits
+        # so that they hold even then.
         turn = np.minimum(curves.angle, self.length)  # a FIXED arc turns the tool by the arc angle
         ratio = max(options.turn_ratio, options.laws.turn_ratio)
         counted = np.maximum(curves.length, turn / ratio) / self.length
-        ahead = IS_ARC_OR_PROCESS[kinds]
-        faster = np.where(ahead, np.minimum(1.0, counted), 1.0)
-        self.speed *= faster
-        self.acceleration *= faster
+        by_ratio = IS_ARC_OR_PROCESS[kinds]
+        reduction = np.where(by_ratio, np.minimum(1.0, counted), 1.0)
+        self.speed *= reduction
+        self.acceleration *= reduction
 
     def length_unit(self, row: int) -> str:
         """Return the unit of the length of a segment."""
@@ -123,7 +123,7 @@ class SpeedLimits:
         """Return the greatest speeds of the leading quantities that max_tool_speed allows."""
         if self._options.max_tool_speed <= 0.0:
             return np.full(len(self.length), inf)
-        # The tool of an OPTIMIZED move is fastest where the joints turn least.
+        # Some joint is always at its limit, so the tool is fastest where joints turn least.
         shortest = np.maximum(self._bounds.shortest_times, _MIN_LENGTH)
         travel = curves.length * 1.0
         for row in rows_where(curves.is_joint_line):
@@ -156,7 +156,7 @@ class SpeedLimits:
 
 
 def arc_limit(options: PlanningOptions, where: str, radius: float) -> SpeedLimit:
-    """Return the limit on the speed on an arc; ``where``: its place, before 'an arc'."""
+    """Return the speed limit on an arc; ``where`` precedes 'an arc' in the text, such as 'on'."""
     return SpeedLimit(
         SlowCause.ACCELERATION_LIMIT,
         f'max_linear_acceleration = {options.max_linear_acceleration:g} m/s^2 ({where} an arc '

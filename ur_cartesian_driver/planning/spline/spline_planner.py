@@ -55,13 +55,13 @@ from ur_cartesian_driver.planning.spline.spline_points import point_remarks, too
 _SAMPLES = 17
 # Factor on the time of a stopping piece for the next try.
 _SHORTENING = 0.8
-# Rounding of a joint position [rad], and of a speed as a fraction of it.
+# Tolerance for rounding: absolute for joint positions [rad], relative for speeds.
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SplineState:
-    """State of the joints at the end of a spline piece, where the robot program continues."""
+    """State of the joints at a time from which a spline can be continued."""
 
     #: Time since the start of the motion [s].
     time: float = 0.0
@@ -69,7 +69,7 @@ class SplineState:
     q: Joints
     #: Joint velocities [rad/s].
     qd: Vector6 = ZERO6
-    #: Joint accelerations [rad/s^2]; after a cubic piece, these are taken as 0.
+    #: Joint accelerations [rad/s^2]; 0 after a cubic piece, which fixes none.
     qdd: Vector6 = ZERO6
 
     @property
@@ -192,8 +192,8 @@ def _max_piece_time(goal: GoalTable) -> float:
     """
     Return the longest duration of a piece [s].
 
-    The robot gets whole pieces only, so the pieces of a goal with a replaceable tail take at most
-    a third of ``replace_horizon``. Goals that are sent as set-points have no such limit.
+    Pieces are sent whole, so those of a replaceable tail must be short: a third of
+    ``replace_horizon``. Goals that are sent as set-points have no such limit.
     """
     if not goal.replace_horizon or resolve_execution_mode(goal).traits.streams_setpoints:
         return inf
@@ -216,13 +216,13 @@ def plan_stop(state: SplineState, arm: Arm, options: PlanningOptions, point: int
     """
     Return the piece that brings a moving arm to rest, each joint in its direction of motion.
 
-    The joint velocities are cubics of time that end at 0 with acceleration 0. With the speed v and
-    the acceleration a at the start, a joint needs up to 1.5 v / T + a / 3 in the time T. The
+    The joint velocities are cubics of time that end at 0 with acceleration 0. From the speed v
+    and the acceleration a, a stop in the time T decelerates by at most 1.5 v / T + a / 3. The
     fastest joint brakes with ``keep_open_deceleration``. The arm brakes harder, with up to
     ``max_joint_acceleration``, if a joint would otherwise leave its range or, while still
     accelerating, exceed its speed limit.
 
-    :param point: the last point, at which the arm has the state.
+    :param point: index of the point at which the arm has the state, for refusals.
     :raises JointLimitExceeded: a joint is too close to the end of its range.
     :raises TooFast: a joint that still accelerates is too close to its speed limit.
     """

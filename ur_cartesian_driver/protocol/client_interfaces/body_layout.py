@@ -3,9 +3,9 @@
 """
 Bodies of messages on the primary interface: big-endian values, one after the other.
 
-A layout is a list of items, one for each value: the ``struct`` code of a number (``d``), the
-counted code of a vector (``6d``), ``text`` for a text that extends to the end of the body, or
-``B:text`` for a text after its length, which has the code ``B`` here.
+A layout is a string of items separated by blanks, one for each value: the ``struct`` code of a
+number (``d``), the counted code of a vector (``6d``), ``text`` for a text that extends to the end
+of the body, or ``B:text`` for a text preceded by its length in bytes, whose code is ``B``.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ class BodyLayout:
 
 
 class Body:
-    """A message; the slots of its own class are the values of its body, in order."""
+    """A message whose body has one value per slot of its own class, without inherited slots."""
 
     __slots__: tuple[str, ...] = ()
     layout: ClassVar[BodyLayout]

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The values of all parameters: declared on a node, or given without one.
+Collect and check all parameters, from a ROS node or from plain values.
 
 All parameters are read-only: robot and limits must not change while a goal runs.
 """
@@ -59,7 +59,7 @@ def defaults() -> dict[str, ParameterValue]:
 @contextlib.contextmanager
 def explained_overrides() -> Iterator[None]:
     """
-    Explain a fault of the given parameters while a node is made.
+    Replace rclpy's error about a parameter without a value by a sentence for the user.
 
     :raises ParameterError: a parameter has no value.
     """
@@ -110,7 +110,7 @@ def declared_values(
             parameter = node.declare_parameter(
                 declaration.name, declaration.default, declaration.descriptor()
             )
-        # Faults that check() does not cover.
+        # For example (), which rclpy takes for bytes and check() for an empty list.
         except (InvalidParameterException, InvalidParameterTypeException) as error:
             raise ParameterError(f'Parameter {declaration.name}: {error}.') from None
         values[declaration.name] = plain_value(parameter.value)

@@ -17,7 +17,7 @@ from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionS
 
 
 class ContactAction:
-    """Each goal is one watch; a goal beside another one is aborted."""
+    """Each goal is one watch; a goal sent while another one watches is aborted."""
 
     def __init__(self, node: Node, driver: Driver) -> None:
         """Start to serve."""
@@ -43,7 +43,7 @@ class ContactAction:
             self._driver.call(EndContactWatchCall())
 
     def close(self) -> None:
-        """Stop serving; the driver ends the watch."""
+        """Stop serving; a running watch ends when the driver is closed."""
         self._server.destroy()
 
     def _begin(self, handle: Any) -> None:

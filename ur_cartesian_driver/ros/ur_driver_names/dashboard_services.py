@@ -150,7 +150,7 @@ _COMMANDS = (
     'close_popup',
     'close_safety_popup',
 )
-#: Queries that the driver has too: type, command of the dashboard, and the fields of the response.
+#: Queries that the driver serves, too: type, dashboard command, function that fills the response.
 _QUERIES: dict[str, tuple[str, str, Fill]] = {
     'get_loaded_program': ('GetLoadedProgram', 'get loaded program', _loaded),
     'program_state': ('GetProgramState', 'programState', _state),
@@ -166,7 +166,7 @@ _QUERIES: dict[str, tuple[str, str, Fill]] = {
     'get_robot_model': ('GetRobotModel', 'get robot model', _model),
     'get_serial_number': ('GetSerialNumber', 'get serial number', _serial_number),
 }
-#: Commands that the driver has no service for, and their argument for a request.
+#: Commands without a service of the driver: type, command, function that gets the argument.
 _LINES: dict[str, tuple[str, str, Argument]] = {
     'quit': (_NO_FIELDS, 'quit', lambda request: ''),
     'shutdown': (_NO_FIELDS, 'shutdown', lambda request: ''),
@@ -198,7 +198,7 @@ def _row(
     :param command: dashboard command whose reply becomes the response text; empty = use the
         driver's text.
     :param kind: the type, without its package; empty = same name as the driver's type.
-    :param fields: further ones of the row.
+    :param fields: further fields of :class:`Service`, such as call, timeout and fill.
     """
     same_kind = _NO_FIELDS if source_type is Trigger else source_type.__name__
     return Service(
@@ -212,7 +212,7 @@ def _row(
 
 
 def _inner_text(field: str, part: str) -> Call:
-    """Return the call for a request with a text in a part of a field, the driver's whole field."""
+    """Return a call that flattens a nested text: request.field.part becomes our request.field."""
 
     def call(row: Service, driver: DriverNode, request: Message) -> Future[ServiceAnswer]:
         text = getattr(getattr(request, field), part)

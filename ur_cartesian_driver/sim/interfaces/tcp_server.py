@@ -66,7 +66,7 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
         self._server = server
         self.session = server.make_session()
         self._transport: asyncio.Transport | None = None
-        #: The state of this connection under a fault; None = no fault impairs the connection.
+        #: Bytes that a fault holds back, or has held back; None = the connection is sound.
         self._impaired: ImpairedConnection | None = None
         self._closing_after_send = False
 
@@ -220,7 +220,7 @@ class TcpServer(Generic[S]):
         """
         Start to listen.
 
-        :raises OSError: the port is taken; the text names interface and port.
+        :raises OSError: the port is taken, or the host is not ours; the text names both.
         """
         loop = asyncio.get_running_loop()
         self.closing = False
@@ -248,7 +248,7 @@ class TcpServer(Generic[S]):
         for connection in tuple(self.connections):
             connection.write_state(data)
 
-    # The interface for faults: an Impairable
+    # Called by the fault injector (the protocol Impairable)
 
     def impair(self, impairment: Impairment | None, now: float) -> None:
         """Impair all connections from now on; None = end the impairment."""

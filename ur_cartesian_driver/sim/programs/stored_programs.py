@@ -50,8 +50,8 @@ class StoredPrograms:
         """
         Return the content of a program's `.urpx` file.
 
-        A program that was not uploaded gets one without a tree, and with nothing at its nodes of
-        External Control; one that cannot be read gets an empty script.
+        If the program was not uploaded, the content is made up: no tree, nothing at the nodes of
+        External Control, and an empty script if the program cannot be read.
         """
         if (content := self._uploaded.get(name)) is not None:
             return content
@@ -102,7 +102,7 @@ def _text_in(content: object, *keys: str) -> str:
 
 
 def urpx_script(name: str, content: Mapping[str, Any]) -> str:
-    """Return the URScript of a program, as one function, behind the application's script."""
+    """Return a program's URScript as one function that begins with the application's script."""
     script = _text_in(content, *_SCRIPT)
     if script.lstrip().startswith('def '):
         return script

@@ -4,7 +4,7 @@
 Power and safety of the simulated arm, as two state machines.
 
 Power goes up step by step, POWER_OFF -> POWER_ON -> IDLE -> RUNNING, and each step takes time; a
-command only sets the mode that has to be reached. Power goes off at once.
+command only sets the target mode. Power goes off at once.
 
 The controller carries out the demands of the safety system: a protective stop brakes the arm on
 its path and pauses the program, an emergency stop does the same and then cuts the power (a
@@ -81,7 +81,7 @@ STATUS_BITS: Mapping[SafetyMode, SafetyStatus] = {
     SafetyMode.FAULT: SafetyStatus.FAULT | SafetyStatus.STOPPED_DUE_TO_SAFETY,
 }
 
-#: Modes in which the arm can be powered and can move.
+#: Modes in which the arm may move.
 OPERATIONAL = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
 #: Modes that cut the power of the motors, as soon as the arm rests.
 POWERLESS = frozenset(
