@@ -75,6 +75,11 @@ def test_options_have_the_leads_of_the_file_that_they_name(file, tmp_path):
         ('- {date: 2026-02-31}', 'is not YAML: '),
         ('- valve_1', "lead 1: 'valve_1' is no lead; give name, output, open, close"),
         (f'- {{{ONE}}}', 'lead 1: close is missing'),
+        ('- {name: no, output: tool_digital 0, open: 0, close: 0}', 'name is False, which is no'),
+        (
+            '- {name: , output: tool_digital 0, open: 0, close: 0}',
+            'name is None, which is no text',
+        ),
         (f'- {{{ONE}, close: 0.03,\n   close: 0.04}}', 'line 2: close occurs twice; remove one'),
         (f'- {{{ONE}, close: 1:30}}', 'line 1: 1:30 is octal or sexagesimal in YAML; write it'),
         (f'- {{{ONE}, close: 0.03, shut: 0.03}}', 'lead 1: shut is not a field'),

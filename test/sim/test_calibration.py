@@ -134,6 +134,10 @@ def test_the_primary_interface_reports_the_table():
             "'much' as kinematics.shoulder.yaw",
         ),
         (yaml.safe_dump(content(((0.01, *MEASURED[0][1:]), *MEASURED[1:]))), 'off the axis'),
+        (  # upside down
+            yaml.safe_dump(content(((*MEASURED[0][:3], pi, *MEASURED[0][4:]), *MEASURED[1:]))),
+            'off the axis',
+        ),
     ],
 )
 def test_what_is_wrong_with_a_file_is_named(tmp_path, text, words):

@@ -110,6 +110,11 @@ def test_too_deep_a_program_is_a_syntax_error(body: str) -> None:
         parse(program(body))
 
 
+@pytest.mark.parametrize('link', ['[0]', ' + 1'])
+def test_a_chain_up_to_the_bound_is_fine(link: str) -> None:
+    parse(program('a = b' + link * MAX_CHAIN))
+
+
 def test_nesting_up_to_the_bound_is_fine() -> None:
     depth = MAX_NESTING - 1
     assert isinstance(first_value('(' * depth + '1' + ')' * depth), tree.ConstantExpression)

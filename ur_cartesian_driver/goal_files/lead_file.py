@@ -117,13 +117,20 @@ def _lead(entry: Any) -> Lead:
             raise ValueError(f'{key} is missing; a lead has {", ".join(_NEEDED)}')
     output, pin = parse_output(str(entry['output']))
     return Lead(
-        name=str(entry['name']),
+        name=_name(entry['name']),
         output=output,
         pin=pin,
         open=_seconds('open', entry['open']),
         close=_seconds('close', entry['close']),
         date=str(entry.get('date', '')),
     )
+
+
+def _name(value: Any) -> str:
+    # YAML takes no and yes for booleans, and nothing for a null.
+    if isinstance(value, bool) or not isinstance(value, str | int):
+        raise ValueError(f'name is {value!r}, which is no text; put it in quotes')
+    return str(value)
 
 
 def _seconds(key: str, value: Any) -> float:

@@ -45,8 +45,15 @@ class Identification:
     def summary(self) -> str:
         """Return a line that counts the moves, and one for each move that fits no trapezoid."""
         kinds = Counter(move.kind for move in self.moves)
-        names = {Kind.LINE: 'lines', Kind.JOINT: 'joint moves', Kind.EITHER: 'turns of one joint'}
-        parts = [f'{kinds[kind]} {name}' for kind, name in names.items() if kinds[kind]]
+        parts = [
+            f'{kinds[kind]} {name}{"s" * (kinds[kind] != 1)}{what}'
+            for kind, name, what in (
+                (Kind.LINE, 'line', ''),
+                (Kind.JOINT, 'joint move', ''),
+                (Kind.EITHER, 'turn', ' of one joint'),
+            )
+            if kinds[kind]
+        ]
         if kinds[Kind.OTHER]:
             parts.append(f'{kinds[Kind.OTHER]} of another shape (not used)')
         count = len(self.moves)

@@ -106,14 +106,14 @@ def parse_length(text: str) -> float:
     """
     Return the length [m] in a text with a unit, such as ``0.1mm``.
 
-    :raises ValueError: the text is no length, has no unit, or is not within 0 and 100 m.
+    :raises ValueError: the text is no length, has no unit, or is not at least 0 and below 100 m.
     """
     match = _LENGTH.fullmatch(text)
     if match is None or match[2].lower() not in LENGTH_UNITS:
         raise ValueError(f'{text!r} is no length; give number and unit, such as 0.1mm')
     length = float(match[1]) * LENGTH_UNITS[match[2].lower()]
     if not 0.0 <= length < 100.0:
-        raise ValueError(f'{text!r} is not within 0 and 100 m')
+        raise ValueError(f'{text!r} is not at least 0 and below 100 m')
     return length
 
 

@@ -115,7 +115,8 @@ def _axes_of_links(links: list[Floats], path: Path) -> _Axes:
         T = T @ link
         points.append(T[:3, 3])
         directions.append(T[:3, 2])
-    if np.abs([*points[0][:2], *directions[0][:2]]).max() > _OFF_AXIS:
+    off_axis = np.abs([*points[0][:2], *directions[0][:2]]).max() > _OFF_AXIS
+    if off_axis or directions[0][2] < 0.0:
         raise ValueError(
             f'The calibration {path} moves the shoulder off the axis of the base: '
             'its x, y, roll and pitch must be 0.'

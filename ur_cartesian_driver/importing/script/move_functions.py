@@ -39,6 +39,8 @@ from ur_cartesian_driver.urscript.script_values import Value
 TOOL_A, TOOL_V, FRACTION = 1.2, 0.25, 0.3
 #: The same of joints [rad/s^2, rad/s].
 JOINT_A, JOINT_V = ASSUMED_LAWS.timed_joint_acceleration, ASSUMED_LAWS.timed_joint_speed
+#: A shorter line [m] only turns the tool, and its rates are those of the turn, in a goal, too.
+PURE_TURN = 1e-6
 #: The assumed turn ratio of movel.
 TURN_RATIO = ASSUMED_LAWS.turn_ratio
 #: Larger lengths [m] are taken for millimetres, larger angles [rad] for degrees.
@@ -186,7 +188,7 @@ class MoveFunctions:
             if self._place.is_known:
                 here = self._place.pose
                 length = max(here.distance_to(target), here.angle_to(target) / TURN_RATIO)
-                if kind is SegmentType.LINEAR and here.distance_to(target) < SAME_POINT:
+                if kind is SegmentType.LINEAR and here.distance_to(target) < PURE_TURN:
                     # The rates of a pure turn are in rad; movel turns 4 rad in the time of 1 m.
                     unit = TURN_RATIO
             a, v = self._rates(name, rates, length, time, blend, (TOOL_A, TOOL_V))

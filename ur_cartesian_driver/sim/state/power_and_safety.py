@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import Enum
+from math import ceil
 
 from ur_cartesian_driver.motion.state.rtde_state import RobotMode, SafetyMode, SafetyStatus
 
@@ -122,7 +123,7 @@ class SafetySystem:
         if event is SafetyEvent.UNLOCK and wait > 1e-9:
             return (
                 f'a protective stop cannot be unlocked for {self._unlock_delay:g} s after it '
-                f'happened; wait another {wait:.1f} s'
+                f'happened; wait another {ceil(10.0 * wait - 1e-6) / 10.0:g} s'
             )
         self.mode, self._since = target, now
         return ''

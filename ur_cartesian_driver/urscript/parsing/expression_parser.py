@@ -87,9 +87,11 @@ class ExpressionParser(TokenReader):
     def _postfix(self) -> tree.Expression:
         """Read primary { "(" arguments ")" | "[" indices "]" | "." NAME }."""
         value = self._primary()
-        for _ in range(MAX_CHAIN):
+        for count in range(MAX_CHAIN + 1):
             if self._token.text not in _POSTFIXES:  # the usual case
                 return value
+            if count == MAX_CHAIN:
+                break
             if self._at('.'):
                 value = self._field(value)
             elif self._at('(') and isinstance(value, tree.NameExpression | tree.FieldExpression):
