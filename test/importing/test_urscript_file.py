@@ -708,8 +708,14 @@ def test_joint_positions_of_a_program_cannot_be_moved(tmp_path, option):
     assert line == 2
     assert 'joint positions have no frame; give no frame, origin or scale' in sentence
     assert len(places(imported(tmp_path, f'movel({A})\nmovel({B})\n', **option))) == 2
-    solved = imported(tmp_path, f'movej(get_inverse_kin({A}, qnear={Q}))\n', **option)
-    assert len(places(solved)) == 1
+    line, sentence = refusal(tmp_path, f'movel({A})\nmovel({Q})\n', **option)
+    assert line == 2
+    assert 'joint positions have no frame; give no frame, origin or scale' in sentence
+    solved = f'movej(get_inverse_kin({A}, qnear={Q}))\n'
+    assert len(places(imported(tmp_path, solved, **option))) == 1
+    # What was solved for a pose of the file is that pose.
+    followed = f'{solved}movej({B})\nmovel(get_inverse_kin({A}, qnear={Q}))\n'
+    assert len(places(imported(tmp_path, followed, **option))) == 3
 
 
 @pytest.mark.parametrize(

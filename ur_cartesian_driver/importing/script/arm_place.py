@@ -39,7 +39,7 @@ class ArmPlace:
         self._flange_poses: list[Pose] = []
         #: For each TCP that was set: the line of the set_tcp call, and the TCP as text.
         self.set_tcps: dict[Pose, tuple[int, str]] = {}
-        #: Joint positions that get_inverse_kin() returned: their pose does not depend on the arm.
+        #: Joint positions that were solved for a pose of the file: the pose counts, on any arm.
         self.solutions: set[tuple[Value, ...]] = set()
 
     @property

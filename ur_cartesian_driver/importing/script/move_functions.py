@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from ur_cartesian_driver.importing.imported_path import SAME_POINT, SAME_TURN
+from ur_cartesian_driver.importing.imported_path import JOINTS_HAVE_NO_FRAME, SAME_POINT, SAME_TURN
 from ur_cartesian_driver.importing.script.collected_events import (
     CollectedEvents,
     CollectedPoint,
@@ -146,6 +146,8 @@ class MoveFunctions:
             pose: Pose | None = self._pose(name, q)
             assert pose is not None
             joints = place.solution(pose, place.joints()) if place.knows_joints else None
+            if joints is not None:
+                place.solutions.add(joints)
         else:
             pose, joints = None, self._angles(name, six(q, 'q'))
         length = None
@@ -245,9 +247,12 @@ class MoveFunctions:
     def _pose(self, name: str, value: Value) -> Pose:
         """Return the pose of a target that is given as a pose or as joint positions."""
         if not is_pose(value):
-            tcp = self._place.tcp
-            self._run.say('joint positions', self._place.of_arm(tcp))
-            return self._place.forward(self._angles(name, six(value, 'pose')), tcp)
+            tcp, q = self._place.tcp, self._angles(name, six(value, 'pose'))
+            if q not in self._place.solutions:
+                if self._place.moves_path:
+                    raise RuntimeException(JOINTS_HAVE_NO_FRAME)
+                self._run.say('joint positions', self._place.of_arm(tcp))
+            return self._place.forward(q, tcp)
         target = pose_argument(value, 'pose')
         farthest = max(target.position, key=abs)
         if abs(farthest) > FAR:
