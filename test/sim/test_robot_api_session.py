@@ -265,6 +265,7 @@ def test_a_program_of_the_configuration_can_be_downloaded_and_uploaded_elsewhere
     [
         *('', 'no JSON', '[]', '{}', '{"program": null}', '[' * 100_000),
         json.dumps(urpx('', 'sleep(1)')),
+        json.dumps(urpx('weld it/a', 'sleep(1)')),
     ],
 )
 def test_what_is_no_program_is_not_uploaded(content):

@@ -91,6 +91,8 @@ def read_urpx(data: bytes) -> tuple[str, Mapping[str, Any]]:
     name = _text_in(content, 'program', 'programInformation', 'name')
     if not name or not _text_in(content, *_SCRIPT):
         raise ValueError('the file lacks the name or the script of a program')
+    if '/' in name:  # programs are known by the names of their files
+        raise ValueError(f'the name of the program, {name!r}, contains a /')
     return name, content
 
 
