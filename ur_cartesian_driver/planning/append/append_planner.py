@@ -554,15 +554,11 @@ class _PartPlanner:
         last, rows = self._appended.last, plan.rows
         # The plan of the first part has checked them, from the point where they begin.
         pulses = self._before.pulses if self._before.points else ()
-        for field, train in pulses:
-            times = plan.reference.time
-            check_speed(
-                train,
-                field,
-                PathClock(plan.reference, is_spline=rows.are_spline),
-                self._arm.model.control_cycle,
-                (float(times[0]), float(times[-1])),
-            )
+        if pulses:
+            clock = PathClock(plan.reference, is_spline=rows.are_spline)
+            span = float(plan.reference.time[0]), float(plan.reference.time[-1])
+            for field, train in pulses:
+                check_speed(train, field, clock, self._arm.model.control_cycle, span)
         records = records_before + int(rows.records.sum())
         ending_records = int(rows.records[len(rows) - ending :].sum())
         # After the last motion, the robot program waits until its outputs are switched.

@@ -158,7 +158,7 @@ def _speeds(steps: Floats, spans: Floats, dense: float) -> Floats:
 
     :param steps: length of each piece (m - 1,).
     :param spans: its duration (m - 1,) [s].
-    :param dense: duration of the longest piece with dense samples [s].
+    :param dense: samples no farther apart than this are dense [s]; inf = all are.
     """
     speeds = [0.0]
     pieces = list(zip(steps.tolist(), spans.tolist(), strict=True))

@@ -9,9 +9,9 @@ trigger pose. So the time of a command (the time of its point plus its offset) b
 pose on the planned path, and the record is sent after the last motion that has returned by then. A
 robot that runs slower than planned switches at the same poses.
 
-Between two samples of the path the tool moves at constant acceleration, because the planner places
-a sample wherever the acceleration changes. So the speeds at the samples follow from their times
-and distances, and with them the place at each time.
+On lines the tool moves at constant acceleration between two samples of the path, because the
+planner places a sample wherever the acceleration changes. So the speeds at the samples follow from
+their times and distances, and with them the place at each time; on splines see ``path_clock``.
 """
 
 from __future__ import annotations
