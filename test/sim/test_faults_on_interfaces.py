@@ -12,7 +12,7 @@ import struct
 import pytest
 from rtde_requests import setup_outputs, START, VERSION_2
 
-from ur_cartesian_driver.motion.state.rtde_state import SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, SafetyMode
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.sim.faults.fault_values import (
     GarbageFault,
@@ -98,6 +98,48 @@ def test_dropped_rtde_clients_are_disconnected_and_may_come_back(robot, connect)
     assert client.is_closed()
     assert streaming(connect, robot).some()
     assert 'Connected' in dashboard.line()
+
+
+def test_what_a_client_sent_before_it_closed_arrives_late(robot, connect):
+    client = connect(robot.ports.dashboard)
+    assert 'Connected' in client.line()
+    robot.inject('delay dashboard 0.1 s')
+    passes(robot, 0.02)
+    client.socket.sendall(b'robotmode\n')
+    client.socket.shutdown(socket.SHUT_WR)
+    assert client.line() == 'Robotmode: RUNNING'
+    assert client.is_closed()
+
+
+def test_nothing_is_carried_out_behind_a_late_farewell(robot, connect):
+    client = connect(robot.ports.dashboard)
+    robot.inject('delay dashboard 0.1 s')
+    passes(robot, 0.02)
+    client.socket.sendall(b'quit\npower off\n')
+    assert client.is_closed()
+    passes(robot, 0.2)
+    assert robot.state().robot_mode is RobotMode.RUNNING
+
+
+def test_a_client_that_breaks_the_protocol_is_disconnected_from_a_late_stream(robot, connect):
+    client = streaming(connect, robot)
+    robot.inject('delay rtde 0.1 s')
+    passes(robot, 0.02)
+    client.socket.sendall(struct.pack('>HB', 3, ord('U')))
+    assert client.is_closed()
+
+
+def test_a_cut_cable_loses_what_was_on_its_way(robot, connect):
+    client = connect(robot.ports.dashboard)
+    assert 'Connected' in client.line()
+    robot.inject('delay dashboard 0.4 s')
+    passes(robot, 0.02)
+    client.socket.sendall(b'robotmode\n')
+    passes(robot, 0.6)  # the answer has set out
+    robot.inject('half_open dashboard')
+    client.socket.settimeout(0.2)
+    with pytest.raises(TimeoutError):
+        client.some()
 
 
 def test_a_port_that_is_dropped_for_a_time_hangs_up_on_callers(robot, connect):

@@ -102,7 +102,7 @@ class ImpairedSockets:
     def freeze(self) -> None:
         """Keep the present sockets open, but send and receive nothing on them."""
         for name in self._names:
-            self._impair_socket(name).frozen = True
+            self._impair_socket(name).freeze()
 
     def inject(self, data: bytes) -> None:
         """Send bytes that no program has sent."""

@@ -66,6 +66,11 @@ class DelayLine:
             self._pieces.append((due, data))
             self.size += len(data)
 
+    def clear(self) -> None:
+        """Lose what is held back."""
+        self._pieces.clear()
+        self.size = 0
+
     def take(self, now: float, rate: float = inf) -> bytes:
         """
         Return the bytes that have become due since the last call.
@@ -101,12 +106,18 @@ class ImpairedConnection:
     @property
     def is_over(self) -> bool:
         """Whether the connection is sound again and holds nothing back."""
-        return (
-            self.impairment is None
-            and not self.frozen
-            and not self.incoming.size
-            and not self.outgoing.size
-        )
+        return self.impairment is None and self.is_drained
+
+    @property
+    def is_drained(self) -> bool:
+        """Whether all data have come through that will."""
+        return not (self.frozen or self.incoming.size or self.outgoing.size)
+
+    def freeze(self) -> None:
+        """Carry no data any more, nor what is held back."""
+        self.frozen = True
+        self.incoming.clear()
+        self.outgoing.clear()
 
     def queue_outgoing(self, data: bytes, now: float) -> None:
         """Queue bytes that the robot sends."""

@@ -68,7 +68,8 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
         self._transport: asyncio.Transport | None = None
         #: Bytes that a fault holds back, or has held back; None = the connection is sound.
         self._impaired: ImpairedConnection | None = None
-        self._closing_after_send = False
+        #: Whether session or client have hung up: what is held back is delivered, then it closes.
+        self._has_hung_up = self._has_ended = False
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)
@@ -87,6 +88,11 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
             self._impaired.queue_incoming(data, self._server.now)
             self._transport_reading(self._impaired.incoming.size < MAX_UNREAD_BYTES)
 
+    def eof_received(self) -> bool:
+        """Stay open for the bytes that a fault holds back, as a slow network does."""
+        self._has_ended = True
+        return self._impaired is not None and not self._impaired.is_drained
+
     def poll(self) -> None:
         """Make the session answer requests that it could not answer at once."""
         self._handle_incoming(b'')
@@ -101,6 +107,8 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
             self._transport.pause_reading()
 
     def _handle_incoming(self, data: bytes) -> None:
+        if self._has_hung_up:
+            return
         try:
             self.write(self.session.feed(data))
         except HangUp as hangup:
@@ -111,13 +119,19 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
             self._hang_up()
 
     def _hang_up(self) -> None:
-        if self._impaired is not None and self._impaired.outgoing.size:
-            self._closing_after_send = True
-        elif self._transport is not None:
+        self._has_hung_up = True
+        if self._impaired is not None:
+            self._impaired.incoming.clear()
+        self._close_if_drained()
+
+    def _close_if_drained(self) -> None:
+        if self._transport is not None and (self._impaired is None or self._impaired.is_drained):
             self._transport.close()
 
     def write(self, data: bytes) -> None:
         """Send data, or drop a client that does not read."""
+        if self._has_hung_up:
+            return
         if self._impaired is None:
             self._send(data)
             return
@@ -160,9 +174,8 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
             self._handle_incoming(data)
         self._transport_reading(impaired.incoming.size < MAX_UNREAD_BYTES)
         self._send(impaired.due_outgoing(now))
-        if self._closing_after_send and not impaired.outgoing.size:
-            self._closing_after_send = False
-            self._hang_up()
+        if self._has_hung_up or self._has_ended:
+            self._close_if_drained()
         if impaired.is_over:
             self._impaired = None
         return not impaired.is_over
@@ -270,7 +283,7 @@ class TcpServer(Generic[S]):
     def freeze(self) -> None:
         """Make all connections half-open: they stay, but nothing is sent or received."""
         for connection in self.connections:
-            connection.impair_connection(self.impairment).frozen = True
+            connection.impair_connection(self.impairment).freeze()
 
     def inject(self, data: bytes) -> None:
         """Send bytes that no session has sent."""
