@@ -49,7 +49,7 @@ def test_other_addresses_may_connect_where_a_parameter_allows_them(make_driver):
     driver = make_driver(
         allowed_peers=('127.0.0.1', OTHER), bind_address='0.0.0.0', reverse_ip='127.0.0.1'
     )
-    driver.wait_ready(5.0)
+    driver.wait_ready(30.0)
     port = driver.status.ports['script_sender_port']
     assert knock(port, OTHER)
     assert not knock(driver.status.ports['reverse_port']), 'the robot program holds that one'

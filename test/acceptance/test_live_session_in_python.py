@@ -24,7 +24,7 @@ OPTIONS = {'live_target_timeout': 1.0}
 
 def test_a_calibrated_arm_goes_to_the_last_target_exactly(make_driver, ur_sim):
     driver = make_driver(OPTIONS)
-    driver.wait_ready(10.0)
+    driver.wait_ready(30.0)
     assert driver.arm.calibrated
     reports = []
     driver.add_servo_listener(reports.append)

@@ -226,7 +226,7 @@ def test_a_node_that_is_there_can_be_the_client(cell, is_spun):
     path = Path(cell.go_home().actual_tcp_pose).at(speed=0.2).by(dy=0.02)
     try:
         with GoalClient(node=node) as client:
-            client.wait_ready(10.0)
+            client.wait_ready(30.0)
             assert client.execute(path).raise_for_error().text.startswith('The point was executed')
         assert (node.executor is not None) == is_spun
     finally:
@@ -240,7 +240,7 @@ def test_clients_come_and_go_on_a_node_whose_executor_waits(cell):
         for _ in range(100):  # a wait that begins meanwhile must not meet a destroyed client
             GoalClient(node=node).close()
         with GoalClient(node=node) as client:
-            client.wait_ready(10.0)
+            client.wait_ready(30.0)
     finally:
         node.destroy_node()
 

@@ -53,7 +53,7 @@ def short_goal(driver, y=0.02):
 def test_the_served_program_runs_as_it_is(served, ur_sim):
     driver, text = served
     upload(ur_sim, wrap_in_program(text))
-    driver.wait_ready(5.0)
+    driver.wait_ready(30.0)
     assert driver.execute(short_goal(driver), timeout=10.0).succeeded
 
 
@@ -71,7 +71,7 @@ def test_a_program_with_other_names_does_the_same(served, ur_sim):
         text, count = re.subn(rf'\b{name}\b', f'renamed_{name}', text)
         assert count >= 2
     upload(ur_sim, wrap_in_program(text))
-    driver.wait_ready(5.0)
+    driver.wait_ready(30.0)
     assert driver.execute(short_goal(driver), timeout=10.0).succeeded
 
 
@@ -82,7 +82,7 @@ def test_an_added_line_is_executed(served, ur_sim):
         f'  local kind = point[{PREFIX}POINT_TYPE]\n  textmsg("this point is a ", kind)',
     )
     upload(ur_sim, wrap_in_program(text))
-    driver.wait_ready(5.0)
+    driver.wait_ready(30.0)
     assert driver.execute(short_goal(driver), timeout=10.0).succeeded
     assert 'this point is a 1' in ur_sim.state().messages
 
@@ -92,7 +92,7 @@ def test_a_changed_constant_changes_the_motion(served, ur_sim, record):
     driver, text = served
     text = text.replace('MULT_TIME = 1000000.0', 'MULT_TIME = 500000.0')
     upload(ur_sim, wrap_in_program(text))
-    driver.wait_ready(5.0)
+    driver.wait_ready(30.0)
     with record() as recording:
         assert driver.execute(short_goal(driver), timeout=10.0).succeeded
     # The first motion of a program takes 80 ms more.
@@ -102,7 +102,7 @@ def test_a_changed_constant_changes_the_motion(served, ur_sim, record):
 def test_a_changed_result_changes_the_outcome(served, ur_sim):
     driver, text = served
     upload(ur_sim, wrap_in_program(text.replace('RESULT_SUCCESS = 0', 'RESULT_SUCCESS = 2')))
-    driver.wait_ready(5.0)
+    driver.wait_ready(30.0)
     outcome = driver.execute(short_goal(driver), timeout=10.0)
     assert outcome.code is ErrorCode.EXECUTION_FAILED
 

@@ -99,7 +99,7 @@ def test_the_driver_compares_the_twin_with_the_robot(
     file = tmp_path / 'twin.yaml'
     file.write_text(twin_text(replace(TRUE, arm=arm)))
     driver = make_driver({'twin_file': str(file), 'allow_other_twin': allowed})
-    driver.wait_ready(10.0)
+    driver.wait_ready(30.0)
     wait_for(lambda: driver.status.serial_number and driver.status.motion_version)
     pose = driver.state.actual_tcp_pose
     x, y, z = pose.position

@@ -30,7 +30,7 @@ def test_a_second_driver_is_refused_and_the_first_goes_on(driver, make_driver, h
     driver.close()  # the robot is free
     wait_for(lambda: ur_sim.state().runtime_state.name == 'STOPPED')
     second.resend_robot_program()
-    second.wait_ready(5.0)
+    second.wait_ready(30.0)
 
 
 @pytest.mark.ur_sim(frequency=125.0)
