@@ -100,11 +100,17 @@ def test_dropped_rtde_clients_are_disconnected_and_may_come_back(robot, connect)
     assert 'Connected' in dashboard.line()
 
 
-def test_what_a_client_sent_before_it_closed_arrives_late(robot, connect):
+def late_dashboard(connect, robot, delay):
+    """Return a client of the dashboard whose connection is delayed in each direction [s]."""
     client = connect(robot.ports.dashboard)
     assert 'Connected' in client.line()
-    robot.inject('delay dashboard 0.1 s')
+    robot.inject(f'delay dashboard {delay} s')
     passes(robot, 0.02)
+    return client
+
+
+def test_what_a_client_sent_before_it_closed_arrives_late(robot, connect):
+    client = late_dashboard(connect, robot, 0.1)
     client.socket.sendall(b'robotmode\n')
     client.socket.shutdown(socket.SHUT_WR)
     assert client.line() == 'Robotmode: RUNNING'
@@ -112,9 +118,7 @@ def test_what_a_client_sent_before_it_closed_arrives_late(robot, connect):
 
 
 def test_nothing_is_carried_out_behind_a_late_farewell(robot, connect):
-    client = connect(robot.ports.dashboard)
-    robot.inject('delay dashboard 0.1 s')
-    passes(robot, 0.02)
+    client = late_dashboard(connect, robot, 0.1)
     client.socket.sendall(b'quit\npower off\n')
     assert client.is_closed()
     passes(robot, 0.2)
@@ -130,16 +134,22 @@ def test_a_client_that_breaks_the_protocol_is_disconnected_from_a_late_stream(ro
 
 
 def test_a_cut_cable_loses_what_was_on_its_way(robot, connect):
-    client = connect(robot.ports.dashboard)
-    assert 'Connected' in client.line()
-    robot.inject('delay dashboard 0.4 s')
-    passes(robot, 0.02)
+    client = late_dashboard(connect, robot, 0.4)
     client.socket.sendall(b'robotmode\n')
     passes(robot, 0.6)  # the answer has set out
     robot.inject('half_open dashboard')
     client.socket.settimeout(0.2)
     with pytest.raises(TimeoutError):
         client.some()
+
+
+def test_a_half_open_connection_ends_with_its_client(robot, connect):
+    """Else the robot keeps the RTDE inputs of a driver that comes back."""
+    client = streaming(connect, robot)
+    robot.inject('half_open rtde')
+    passes(robot, 0.02)
+    client.socket.shutdown(socket.SHUT_WR)
+    assert client.is_closed()
 
 
 def test_a_port_that_is_dropped_for_a_time_hangs_up_on_callers(robot, connect):

@@ -157,7 +157,9 @@ class Controller:
         #: The rate at which motions run now, 0..1; determined by slider, pauses and stops.
         self.scale = 1.0
         #: Whether the arm slows down on its path because the program ended during the motion.
-        self._stopping_on_path = self._cuts_power = False
+        self._stopping_on_path = False
+        #: Whether the power is cut as soon as the arm rests.
+        self._cuts_power = False
         self._joint_history: deque[Vector6] = deque([config.q] * MAX_HISTORY, maxlen=MAX_HISTORY)
         self.programs: ProgramRunner = ProgramRunner(
             make_builtins(self),

@@ -68,8 +68,10 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
         self._transport: asyncio.Transport | None = None
         #: Bytes that a fault holds back, or has held back; None = the connection is sound.
         self._impaired: ImpairedConnection | None = None
-        #: Whether session or client have hung up: what is held back is delivered, then it closes.
-        self._has_hung_up = self._has_ended = False
+        #: Whether the session has hung up: it gets nothing more, but what is held back goes out.
+        self._has_hung_up = False
+        #: Whether the client has: what is held back is still carried out and answered.
+        self._has_ended = False
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)
@@ -91,7 +93,8 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
     def eof_received(self) -> bool:
         """Stay open for the bytes that a fault holds back, as a slow network does."""
         self._has_ended = True
-        return self._impaired is not None and not self._impaired.is_drained
+        held = self._impaired
+        return held is not None and bool(held.incoming.size or held.outgoing.size)
 
     def poll(self) -> None:
         """Make the session answer requests that it could not answer at once."""
