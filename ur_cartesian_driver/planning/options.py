@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal, Protocol
 
 from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.cell.cell import Cell, EMPTY_CELL
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes
 from ur_cartesian_driver.motion.goal.field_annotations import Range
 from ur_cartesian_driver.motion.goal.goal import IOCommand
@@ -88,6 +89,12 @@ class PlanningOptions:
     #:
     #: Example: ['table 0 0 0 0 0 1', 'wall 0 0.6 0 0 -1 0 0.05']
     workspace_planes: tuple[str, ...] = ()
+    #: YAML file with the bodies of the cell: table, fixtures, tools, parts. Goals that bring the
+    #: arm, or what it carries, too close to them are refused. The file is read once, at the start.
+    #: A relative path begins at the folder in which the driver was started. Empty: no file.
+    cell_file: str = ''
+    #: The bodies in cell_file, or those of the owner.
+    cell: Detected[Cell] = EMPTY_CELL
     #: Values that outputs take when a goal or live session ends without success, and when the arm
     #: stops in a pause or a protective stop, each 'kind pin value [current | voltage] [restore]'.
     #: kind is standard_digital, configurable_digital, tool_digital or standard_analog (value:
@@ -179,8 +186,8 @@ class PlanningOptions:
     allow_other_twin: bool = False
     #: The twin in twin_file.
     twin: Detected[Twin | None] = None
-    #: The files from which leads and twin were read; '' = none, or the owner gave them.
-    read_files: Detected[tuple[str, str]] = ('', '')
+    #: The files from which leads, twin and cell were read; '' = none, or the owner gave them.
+    read_files: Detected[tuple[str, str, str]] = ('', '', '')
     #: The robot for which goals are planned, as far as it is known.
     robot: Detected[ArmIdentity] = UNKNOWN_ARM
 
@@ -245,14 +252,17 @@ class PlanningOptions:
         parse_planes(self.workspace_planes)
         parse_safe_outputs(self.safe_outputs)
         # replace() reads a file again only if it names another one.
-        lead_file, twin_file = self.read_files
+        lead_file, twin_file, cell_file = self.read_files
         if self.lead_file != lead_file and (lead_file or not self.leads):
             object.__setattr__(self, 'leads', _read_leads(self.lead_file))
             lead_file = self.lead_file
         if self.twin_file != twin_file and (twin_file or self.twin is None):
             object.__setattr__(self, 'twin', _read_twin(self.twin_file))
             twin_file = self.twin_file
-        object.__setattr__(self, 'read_files', (lead_file, twin_file))
+        if self.cell_file != cell_file and (cell_file or not self.cell):
+            object.__setattr__(self, 'cell', _read_cell(self.cell_file))
+            cell_file = self.cell_file
+        object.__setattr__(self, 'read_files', (lead_file, twin_file, cell_file))
 
     @property
     def twin_problem(self) -> str:
@@ -339,3 +349,23 @@ def _read_twin(path: str) -> Twin | None:
     except ValueError as error:
         raise ValueError(f'twin_file: {path}, arm: {error}') from None
     return twin
+
+
+def _read_cell(path: str) -> Cell:
+    """
+    Return the bodies in a file; '' = none.
+
+    :raises ValueError: the file cannot be read, or is no cell.
+    """
+    if not path:
+        return EMPTY_CELL
+    # Imported here, because most drivers have no such file.
+    from ur_cartesian_driver.motion.cell.cell_file import read_cell
+
+    try:
+        return read_cell(path)
+    except OSError as error:
+        reason = error.strerror or error
+        raise ValueError(f'cell_file is {path!r}, which cannot be read: {reason}.') from None
+    except ValueError as error:
+        raise ValueError(f'cell_file: {error}') from None

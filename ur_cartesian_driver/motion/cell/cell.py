@@ -1,0 +1,212 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The bodies of a cell: where each is, what carries it, and what it may touch.
+
+A body is fixed in the robot's base, or carried by a link of the arm or by the tool. The names of
+the frames are those of the robot description for ROS, without a prefix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from math import isfinite
+from types import MappingProxyType
+
+from ur_cartesian_driver.motion.cell.shapes import HalfSpace, Mesh, Shape
+from ur_cartesian_driver.motion.errors import shortened, suggestion
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+
+#: Distance that the arm keeps from a body for which the cell gives none [m].
+DEFAULT_CLEARANCE = 0.005
+#: The largest clearance [m].
+MAX_CLEARANCE = 1.0
+
+#: The frames that carry bodies, with the number of their link, 0 = the base. They are those of
+#: the robot description; ``tool0_controller`` is the active TCP.
+FRAMES: Mapping[str, int] = MappingProxyType(
+    {
+        'base': 0,
+        'base_link': 0,
+        'shoulder_link': 1,
+        'upper_arm_link': 2,
+        'forearm_link': 3,
+        'wrist_1_link': 4,
+        'wrist_2_link': 5,
+        'wrist_3_link': 6,
+        'flange': 6,
+        'tool0': 6,
+        'tool0_controller': 6,
+    }
+)
+#: Names of what is no body of the cell, but may be allowed to touch one: the arm's own links, and
+#: the cylinder of the parameter ``tool_radius``.
+LINK_NAMES: tuple[str, ...] = (
+    'base_link',
+    'shoulder_link',
+    'upper_arm_link',
+    'forearm_link',
+    'wrist_1_link',
+    'wrist_2_link',
+    'wrist_3_link',
+    'tool',
+)
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedShape:
+    """A shape of a body, and its place on the body."""
+
+    shape: Shape
+    T_body_shape: Pose = IDENTITY
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellBody:
+    """
+    A body of the cell.
+
+    :raises ValueError: the frame is unknown, there is no shape, a clearance is out of bounds, or
+        a half-space is carried by the arm.
+    """
+
+    name: str
+    shapes: tuple[PlacedShape, ...]
+    #: The frame that carries the body, one of :data:`FRAMES`.
+    frame: str = 'base'
+    T_frame_body: Pose = IDENTITY
+    #: Distance to keep from the body [m]; None = that of the cell.
+    clearance: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        if not self.name or self.name in LINK_NAMES:
+            raise ValueError(
+                f'"{self.name}" cannot be the name of a body'
+                + ('; it is a part of the arm' if self.name else '')
+            )
+        if self.frame not in FRAMES:
+            raise ValueError(
+                f'its frame "{shortened(self.frame)}" is unknown; '
+                + suggestion(self.frame, FRAMES, f'known are {", ".join(FRAMES)}')
+            )
+        if not self.shapes:
+            raise ValueError('it has no shape')
+        if self.clearance is not None:
+            check_clearance(self.clearance)
+        if self.is_carried and any(isinstance(each.shape, HalfSpace) for each in self.shapes):
+            raise ValueError(f'a plane has no end, so it cannot move with {self.frame}')
+
+    @property
+    def is_carried(self) -> bool:
+        """Whether the arm carries the body."""
+        return FRAMES[self.frame] > 0
+
+    @property
+    def has_mesh(self) -> bool:
+        """Whether a shape of the body is a mesh."""
+        return any(isinstance(each.shape, Mesh) for each in self.shapes)
+
+
+def check_clearance(value: float) -> None:
+    """
+    Refuse a clearance that is out of bounds.
+
+    :raises ValueError: the text is a clause.
+    """
+    if not (isfinite(value) and 0.0 <= value <= MAX_CLEARANCE):
+        raise ValueError(f'the clearance is {value:g} m; it must be from 0 to {MAX_CLEARANCE:g} m')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """
+    All bodies of a cell. Immutable.
+
+    :raises ValueError: two bodies have one name, a pair names what the cell does not have, or the
+        clearance is out of bounds.
+    """
+
+    bodies: tuple[CellBody, ...] = ()
+    #: Pairs of names that may touch, of bodies and of :data:`LINK_NAMES`.
+    may_touch: frozenset[frozenset[str]] = frozenset()
+    #: Distance that the arm keeps from bodies that give none [m].
+    clearance: float = DEFAULT_CLEARANCE
+    #: The names of the bodies, and the arm's.
+    names: frozenset[str] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Check names, pairs and clearance."""
+        check_clearance(self.clearance)
+        seen: set[str] = set()
+        for body in self.bodies:
+            if body.name in seen:
+                raise ValueError(
+                    f'the name "{body.name}" is used twice; give each body a name of its own'
+                )
+            seen.add(body.name)
+        object.__setattr__(self, 'names', frozenset(seen))
+        for pair in self.may_touch:
+            if len(pair) != 2:
+                raise ValueError(f'may_touch: "{", ".join(pair)}" is no pair of two names')
+            for name in sorted(pair):
+                if name not in seen and name not in LINK_NAMES:
+                    raise ValueError(
+                        f'may_touch names "{shortened(name)}", which the cell does not have; '
+                        + suggestion(name, (*seen, *LINK_NAMES), 'name a body or a link')
+                    )
+
+    def __bool__(self) -> bool:
+        """Return whether there is any body."""
+        return bool(self.bodies)
+
+    def body(self, name: str) -> CellBody:
+        """
+        Return a body.
+
+        :raises ValueError: the cell has no body of this name; the text is a clause.
+        """
+        for body in self.bodies:
+            if body.name == name:
+                return body
+        raise ValueError(
+            f'the cell has no body "{shortened(name)}"; '
+            + suggestion(name, self.names, f'it has {", ".join(sorted(self.names)) or "none"}')
+        )
+
+    def clearance_of(self, body: CellBody) -> float:
+        """Return the distance to keep from a body [m]."""
+        return self.clearance if body.clearance is None else body.clearance
+
+    def with_bodies(self, bodies: Iterable[CellBody]) -> Cell:
+        """Return the cell with bodies added; those of the same name are replaced."""
+        added = {body.name: body for body in bodies}
+        kept = tuple(added.pop(body.name, body) for body in self.bodies)
+        return replace(self, bodies=(*kept, *added.values()))
+
+    def without(self, name: str) -> Cell:
+        """
+        Return the cell without a body.
+
+        :raises ValueError: the cell has no body of this name.
+        """
+        removed = self.body(name)
+        return replace(
+            self,
+            bodies=tuple(body for body in self.bodies if body is not removed),
+            may_touch=frozenset(pair for pair in self.may_touch if name not in pair),
+        )
+
+    def moved(self, name: str, frame: str, T_frame_body: Pose) -> Cell:
+        """
+        Return the cell with a body in another place, or carried by another frame.
+
+        :raises ValueError: the cell has no body of this name, or the frame is unknown.
+        """
+        body = replace(self.body(name), frame=frame, T_frame_body=T_frame_body)
+        return self.with_bodies([body])
+
+
+#: No body at all.
+EMPTY_CELL = Cell()
