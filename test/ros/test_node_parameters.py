@@ -111,6 +111,7 @@ def test_every_option_is_a_parameter_but_for_what_is_found_out():
         'target_payload_known',
         'robot_motion_version',
         'acceleration_known',
+        'cell',
         'dialect',
         'prelude',
         'leads',
