@@ -10,6 +10,7 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import (
     AlreadySent,
+    CollisionPredicted,
     DriverError,
     ErrorCode,
     ERRORS,
@@ -87,6 +88,15 @@ def test_an_error_keeps_class_and_sentence_on_its_way(cls, travel):
     arrived = travel(error)
     assert type(arrived) is cls
     assert str(arrived) == str(error) != ''
+
+
+def test_a_predicted_collision_keeps_its_place_on_its_way_and_in_other_words():
+    error = CollisionPredicted(SENTENCE)
+    assert (error.q, error.bodies) == (None, ())
+    error.q, error.bodies = (0.1,) * 6, ('table', 'forearm_link')
+    for arrived in (pickle.loads(pickle.dumps(error)), error.reworded('In other words.')):
+        assert (arrived.q, arrived.bodies) == (error.q, error.bodies)
+    assert str(error.reworded('In other words.')) == 'In other words.'
 
 
 def test_an_invalid_goal_says_where_what_and_what_to_do():

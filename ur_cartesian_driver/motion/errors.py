@@ -16,7 +16,7 @@ The errors of this package: a class, with the action's code, for each way a goal
     |   |-- Unreachable              no joint solution for a pose
     |   |-- NearSingularity          the path comes too close to a singularity
     |   |-- JointLimitExceeded       the path leaves the range of a joint
-    |   |-- CollisionPredicted       the arm would hit itself or a workspace plane
+    |   |-- CollisionPredicted       the arm would hit itself, a plane or a body
     |   `-- RobotNotReady            not connected, not powered, program not running, busy
     |-- ExecutionEnded           a goal ended before its last point
     |   |-- PathToleranceViolated, GoalToleranceViolated
@@ -182,9 +182,19 @@ class JointLimitExceeded(GoalRefused):
 
 
 class CollisionPredicted(GoalRefused):
-    """The arm would hit itself or a workspace plane."""
+    """The arm would hit itself, a workspace plane or a body of the cell."""
 
     code = ErrorCode.COLLISION
+    #: The joint positions at the place [rad]; None if they are not known.
+    q: tuple[float, float, float, float, float, float] | None = None
+    #: The names of the two bodies, of the cell or of the arm's links; empty if not known.
+    bodies: tuple[str, ...] = ()
+
+    def reworded(self, sentence: str) -> GoalRefused:
+        """Return the same refusal, of the same place and bodies, with another sentence."""
+        error = super().reworded(sentence)
+        error.__dict__.update(self.__dict__)
+        return error
 
 
 class RobotNotReady(GoalRefused):
