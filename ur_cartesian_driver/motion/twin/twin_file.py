@@ -28,12 +28,11 @@ A law that is left out is assumed. Every error names the line.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from datetime import date
-from difflib import get_close_matches
 from pathlib import Path
 from textwrap import indent
-from typing import Any, NoReturn, TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from ur_cartesian_driver.motion.twin.laws import Law, LAWS
 from ur_cartesian_driver.motion.twin.twin import (
@@ -43,14 +42,13 @@ from ur_cartesian_driver.motion.twin.twin import (
     Estimate,
     Twin,
 )
+from ur_cartesian_driver.motion.yaml_nodes import NodeReader, text_of_file
 
 if TYPE_CHECKING:
     import yaml  # else with the first file: a simulator without one needs only numpy
 
 #: The version of the format, with which a file begins.
 FORMAT = 1
-#: No twin is longer [characters]; a recording that was given instead probably is.
-_MAX_LENGTH = 1_000_000
 
 _HEAD = ('twin', 'arm', 'date', 'files')
 _ARM = ('model', 'serial_number', 'software', 'motion_version')
@@ -68,11 +66,7 @@ def read_twin(path: str | Path) -> Twin:
     :raises OSError: the file cannot be read.
     :raises TwinFileError: the file is no twin.
     """
-    try:
-        text = Path(path).read_text(encoding='utf-8')
-    except UnicodeDecodeError:
-        raise TwinFileError(f'{path} is no text in UTF-8, so it is no twin.') from None
-    return twin_from_text(text, str(path))
+    return twin_from_text(text_of_file(Path(path), 'twin', TwinFileError), str(path))
 
 
 def twin_from_text(text: str, name: str) -> Twin:
@@ -141,26 +135,26 @@ def _dumped(content: dict[str, Any]) -> str:
     return text
 
 
-class _Reader:
+class _Reader(NodeReader):
     """Reads one file; ``name`` is its name in error texts."""
 
     def __init__(self, name: str) -> None:
-        self._name = name
+        super().__init__(name, 'twin', TwinFileError)
 
     def twin(self, text: str) -> Twin:
         """Return the twin, see :func:`twin_from_text`."""
-        root = self._root(text)
-        entries = self._entries(root, 'the file', (*_HEAD, *LAWS))
+        root = self.root(text)
+        entries = self.entries(root, 'the file', (*_HEAD, *LAWS), 'law of motion')
         version = entries.get('twin')
         if version is None:
-            self._refuse(
+            self.refuse(
                 root, f'this is no twin: it has no field twin; it begins with twin: {FORMAT}'
             )
-        if (number := self._text(version, 'twin')) != str(FORMAT):
-            self._refuse(version, f'twin is {number}, a format that is not known; use {FORMAT}')
+        if (number := self.text(version, 'twin')) != str(FORMAT):
+            self.refuse(version, f'twin is {number}, a format that is not known; use {FORMAT}')
         for key in ('arm', 'date'):
             if key not in entries:
-                self._refuse(root, f'{key} is missing, so the file may be cut off')
+                self.refuse(root, f'{key} is missing, so the file may be cut off')
         estimates, not_identified = {}, {}
         for name, law in LAWS.items():
             if name not in entries:
@@ -178,62 +172,20 @@ class _Reader:
             not_identified=not_identified,
         )
 
-    def _root(self, text: str) -> yaml.Node:
-        if len(text) > _MAX_LENGTH:
-            raise TwinFileError(f'{self._name} is no twin: it is longer than 1 MB.')
-        import yaml
-
-        try:
-            root = yaml.compose(text, Loader=yaml.SafeLoader)
-        except yaml.YAMLError as error:
-            mark = getattr(error, 'problem_mark', None)
-            line = f', line {mark.line + 1}' if mark else ''
-            what = getattr(error, 'problem', None) or 'it has a character that YAML does not allow'
-            raise TwinFileError(f'{self._name}{line}: this is not YAML: {what}.') from None
-        except RecursionError:
-            raise TwinFileError(f'{self._name} is no twin: it is nested too deeply.') from None
-        if root is None:
-            raise TwinFileError(f'{self._name} is empty, so it is no twin.')
-        return root
-
-    def _entries(
-        self, node: yaml.Node, where: str, known: tuple[str, ...]
-    ) -> dict[str, yaml.Node]:
-        """Return the values of a mapping by name; each name is known and occurs once."""
-        if _kind(node) != 'mapping':
-            self._refuse(node, f'{where} must have fields, NAME: VALUE')
-        found: dict[str, yaml.Node] = {}
-        for key, value in self._pairs(node, where):
-            if key.value in found:
-                self._refuse(key, f'{key.value} is given twice; remove one of them')
-            if key.value not in known:
-                near = get_close_matches(key.value, known, n=1)
-                hint = f'{near[0]} is probably meant' if near else f'known are {", ".join(known)}'
-                kind = 'law of motion' if where == 'the file' else f'field of {where}'
-                self._refuse(key, f'{key.value} is no {kind}; {hint}')
-            found[key.value] = value
-        return found
-
-    def _pairs(self, node: yaml.Node, where: str) -> Iterator[tuple[yaml.Node, yaml.Node]]:
-        for key, value in node.value:
-            if _kind(key) != 'scalar':
-                self._refuse(key, f'a field of {where} has no name')
-            yield key, value
-
     def _law(self, law: Law, node: yaml.Node) -> Estimate | str:
         """Return the estimate of a law, or the reason why it was not identified."""
-        entries = self._entries(node, law.name, (*_ESTIMATE, 'not_identified'))
+        entries = self.entries(node, law.name, (*_ESTIMATE, 'not_identified'))
         if 'not_identified' in entries:
             if len(entries) > 1:
-                self._refuse(node, f'{law.name} is not identified, so it can have no other field')
-            return self._text(entries['not_identified'], f'not_identified of {law.name}')
+                self.refuse(node, f'{law.name} is not identified, so it can have no other field')
+            return self.text(entries['not_identified'], f'not_identified of {law.name}')
         if 'value' not in entries:
-            self._refuse(node, f'{law.name} has no value')
-        unit = self._text(entries['unit'], f'unit of {law.name}') if 'unit' in entries else ''
+            self.refuse(node, f'{law.name} has no value')
+        unit = self.text(entries['unit'], f'unit of {law.name}') if 'unit' in entries else ''
         if unit != law.unit:
             wanted = f'give it in {law.unit}' if law.unit else 'it has none; remove it'
             said = f'has the unit {unit}' if unit else 'has no unit'
-            self._refuse(entries.get('unit', node), f'{law.name} {said}; {wanted}')
+            self.refuse(entries.get('unit', node), f'{law.name} {said}; {wanted}')
         value = self._value(law, entries['value'])
         interval = entries.get('interval')
         try:
@@ -246,74 +198,53 @@ class _Reader:
         except TwinFileError:
             raise
         except ValueError as error:
-            self._refuse(interval or node, f'{law.name} {error}')
+            self.refuse(interval or node, f'{law.name} {error}')
 
     def _value(self, law: Law, node: yaml.Node) -> float | str:
         value: float | str
         if law.choices:
-            value = self._text(node, f'value of {law.name}')
+            value = self.text(node, f'value of {law.name}')
         else:
-            value = self._number(node, f'value of {law.name}')
+            value = self.number(node, f'value of {law.name}')
         if problem := law.problem(value):
-            self._refuse(node, f'{law.name} is {value}; it {problem}')
+            self.refuse(node, f'{law.name} is {value}; it {problem}')
         return value
 
     def _interval(self, law: Law, node: yaml.Node) -> tuple[float, float]:
-        if _kind(node) != 'sequence' or len(node.value) != 2:
-            self._refuse(node, f'the interval of {law.name} must be two numbers, [LOW, HIGH]')
-        low, high = (self._number(item, f'interval of {law.name}') for item in node.value)
+        fault = f'the interval of {law.name} must be two numbers, [LOW, HIGH]'
+        items = self.items(node, fault, length=2)
+        low, high = (self.number(item, f'interval of {law.name}') for item in items)
         return low, high
 
     def _optional_text(self, entries: dict[str, yaml.Node], key: str, law: Law) -> str:
-        return self._text(entries[key], f'{key} of {law.name}') if key in entries else ''
+        return self.text(entries[key], f'{key} of {law.name}') if key in entries else ''
 
     def _arm(self, node: yaml.Node) -> ArmIdentity:
-        entries = self._entries(node, 'arm', _ARM)
+        entries = self.entries(node, 'arm', _ARM)
         if 'model' not in entries:
-            self._refuse(node, 'arm has no model, such as ur5e')
-        texts = {key: self._text(entries[key], f'{key} of arm') for key in entries}
+            self.refuse(node, 'arm has no model, such as ur5e')
+        texts = {key: self.text(entries[key], f'{key} of arm') for key in entries}
         if texts.get('software'):
             self._checked(checked_software, entries['software'], texts['software'])
         version = texts.pop('motion_version', '0')
         if version not in ('0', '1', '2'):
-            self._refuse(
+            self.refuse(
                 entries['motion_version'],
                 f'motion_version of arm is {version}; use 1 or 2, or 0 for unknown',
             )
         return ArmIdentity(**texts, motion_version=int(version))
 
     def _date(self, node: yaml.Node) -> str:
-        return self._checked(checked_day, node, self._text(node, 'date'))
+        return self._checked(checked_day, node, self.text(node, 'date'))
 
     def _files(self, node: yaml.Node | None) -> tuple[str, ...]:
         if node is None:
             return ()
-        if _kind(node) != 'sequence':
-            self._refuse(node, 'files must be a list of names')
-        return tuple(self._text(item, 'a name in files') for item in node.value)
+        items = self.items(node, 'files must be a list of names')
+        return tuple(self.text(item, 'a name in files') for item in items)
 
     def _checked(self, check: Callable[[str], str], node: yaml.Node, text: str) -> str:
         try:
             return check(text)
         except ValueError as error:
-            self._refuse(node, str(error))
-
-    def _number(self, node: yaml.Node, what: str) -> float:
-        text = self._text(node, what)
-        try:
-            return float(text)
-        except ValueError:
-            self._refuse(node, f'the {what} is {text[:60]}, which is no number')
-
-    def _text(self, node: yaml.Node, what: str) -> str:
-        if _kind(node) != 'scalar':
-            self._refuse(node, f'{what} must be one value')
-        return ' '.join(str(node.value).split())
-
-    def _refuse(self, node: yaml.Node, fault: str) -> NoReturn:
-        raise TwinFileError(f'{self._name}, line {node.start_mark.line + 1}: {fault}.')
-
-
-def _kind(node: yaml.Node) -> str:
-    """Return whether a node is a scalar, a sequence or a mapping."""
-    return str(getattr(node, 'id', ''))
+            self.refuse(node, str(error))
