@@ -2,11 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of a motion shows the arm in its place, with the words of the plan."""
 
-from base64 import b64decode
 from dataclasses import replace
 from html import escape
 from importlib import import_module
-import json
 from math import nan, pi
 import re
 import sys
@@ -14,6 +12,7 @@ import sys
 from example_goals import example_goal, OPTIONS
 import numpy as np
 import pytest
+from recorded_scene import scenes_of
 
 from ur_cartesian_driver.cli import main
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -21,7 +20,6 @@ from ur_cartesian_driver.kinematics.link_shapes import LinkFrames
 from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.motion.errors import GoalRefused, Unreachable
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.geometry.workspace import Plane
 from ur_cartesian_driver.motion.goal.goal import Goal, Segment, Waypoint
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
@@ -31,20 +29,6 @@ viser = pytest.importorskip('viser')
 
 HOME = (0.3, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.2)
 TCP = Pose((0.0, 0.0, 0.1))
-
-
-def scenes_of(page):
-    """Return the scenes of a page by name: (time, message) each."""
-    import msgspec
-    import zstandard
-
-    found = re.search(r'SCENES\.type\)\((\{.*?\})\)', page)
-    scenes = {}
-    for name, data in json.loads(found[1]).items():
-        inner = zstandard.ZstdDecompressor().decompress(b64decode(data)[8:])
-        size = int.from_bytes(inner[:8], 'little')
-        scenes[name] = msgspec.msgpack.decode(inner[8 : 8 + size])['messages']
-    return scenes
 
 
 def positions(scene, name):
@@ -128,8 +112,8 @@ def test_a_refused_goal_has_a_page_whatever_is_wrong_with_it():
     no_turn = Pose((0.3, 0.2, 0.4), (0.0, 0.0, 0.0, 0.0))
     joints = Pose((nan,) * 3, (nan,) * 4)
     goal = Goal(waypoints=(Waypoint(pose=joints), Waypoint(pose=no_turn)))
-    table = Plane('table', (0.0, 0.0, -0.1), (0.0, 0.0, 1.0))
-    page = refusal_page(goal, Unreachable('points[1] is wrong.'), arm, HOME, TCP, (table,))
+    options = PlanningOptions(workspace_planes=('table 0 0 -0.1 0 0 1',))
+    page = refusal_page(goal, Unreachable('points[1] is wrong.'), arm, HOME, TCP, options)
     scene = scenes_of(page)['type']
     assert not any('points/0' in m.get('name', '') for _, m in scene)
     assert any(m.get('name') == '/planes/table' for _, m in scene)

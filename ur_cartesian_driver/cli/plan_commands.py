@@ -26,7 +26,6 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY
 from ur_cartesian_driver.motion.geometry.vectors import vector6
-from ur_cartesian_driver.motion.geometry.workspace import parse_planes, Plane
 from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.motion.plan.slow_stretch import speed_advice
@@ -82,7 +81,7 @@ def show(arguments: argparse.Namespace) -> int:
         try:
             found = planning.plan()
             with timed('drawing'):
-                page = motion_page(found, planning.arm, planning.planes)
+                page = motion_page(found, planning.arm, planning.options)
         except GoalRefused as refusal:
             print(f'refused, {code_text(refusal.code)}: {refusal}', file=sys.stderr)
             if planning.goal is None:
@@ -94,7 +93,7 @@ def show(arguments: argparse.Namespace) -> int:
                 planning.arm,
                 state.actual_q,
                 state.T_flange_tcp,
-                planning.planes,
+                planning.options,
             )
     except ImportError as error:
         print(f'ur-cartesian show: {error}', file=sys.stderr)
@@ -130,7 +129,7 @@ def _show_live(arguments: argparse.Namespace) -> int:
             planning.arm,
             state,
             plan=plan,
-            planes=planning.planes,
+            options=planning.options,
             host=arguments.host,
             port=arguments.port,
         ) as page:
@@ -191,11 +190,6 @@ class GoalPlanning:
         self.message = read_goal(arguments) if arguments.file else None
         #: The goal; None before :meth:`plan` has resolved its frames.
         self.goal: Goal | None = None
-
-    @property
-    def planes(self) -> tuple[Plane, ...]:
-        """The planes that the arm must not cross."""
-        return parse_planes(self._settings.planning.workspace_planes)
 
     def plan(self) -> Plan:
         """

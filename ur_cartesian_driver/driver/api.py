@@ -60,7 +60,6 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.events import Outcome, Progress, Pulse
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.geometry.workspace import parse_planes
 from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.goal.joint_goal import JointGoal
 from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
@@ -277,7 +276,7 @@ class Driver(RobotServices, InteractiveMotions):
             if isinstance(goal, JointGoal)
             else plan(goal, state, arm, options)
         )
-        return ArmPlan.of(planned, arm, parse_planes(self.options.workspace_planes))
+        return ArmPlan.of(planned, arm, options)
 
     def start(self, plan: Plan, on_progress: OnProgress | None = None) -> MotionHandle:
         """

@@ -4,12 +4,13 @@
 
 from ur_cartesian_driver.preview.arm_plan import ArmPlan
 from ur_cartesian_driver.preview.live_page import live_page
-from ur_cartesian_driver.preview.motion_page import motion_page, refusal_page
+from ur_cartesian_driver.preview.motion_page import cell_page, motion_page, refusal_page
 from ur_cartesian_driver.preview.plan_samples import postures, Preview, sample, table
 
 __all__ = [
     'ArmPlan',
     'Preview',
+    'cell_page',
     'live_page',
     'motion_page',
     'postures',

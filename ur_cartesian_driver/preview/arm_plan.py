@@ -10,9 +10,9 @@ from tempfile import mkstemp
 import webbrowser
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.geometry.workspace import Plane
 from ur_cartesian_driver.motion.plan.plan import Plan
-from ur_cartesian_driver.preview.motion_page import motion_page
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.preview.motion_page import motion_page, NO_BODIES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -20,16 +20,16 @@ class ArmPlan(Plan):
     """A plan with the arm for which it was made."""
 
     arm: Arm
-    #: The workspace planes, which the plan does not cross.
-    planes: tuple[Plane, ...] = ()
+    #: The options of the plan, with the planes and the cell that it keeps away from.
+    options: PlanningOptions = NO_BODIES
 
     @classmethod
-    def of(cls, plan: Plan, arm: Arm, planes: tuple[Plane, ...] = ()) -> ArmPlan:
-        """Return a plan together with its arm."""
+    def of(cls, plan: Plan, arm: Arm, options: PlanningOptions = NO_BODIES) -> ArmPlan:
+        """Return a plan together with its arm and its options."""
         return cls(
             **{field.name: getattr(plan, field.name) for field in fields(Plan)},
             arm=arm,
-            planes=planes,
+            options=options,
         )
 
     def write_page(self, path: str | Path) -> None:
@@ -38,13 +38,13 @@ class ArmPlan(Plan):
 
         :raises ImportError: viser is not installed; the text says how to get it.
         """
-        Path(path).write_text(motion_page(self, self.arm, self.planes), encoding='utf-8')
+        Path(path).write_text(motion_page(self, self.arm, self.options), encoding='utf-8')
 
     def show(self) -> Path:
         """Write the page to a temporary file, open it in the browser, and return its file path."""
         descriptor, name = mkstemp(prefix='motion_', suffix='.html')
         path = Path(name)
         with open(descriptor, 'w', encoding='utf-8') as file:
-            file.write(motion_page(self, self.arm, self.planes))
+            file.write(motion_page(self, self.arm, self.options))
         webbrowser.open(path.as_uri())
         return path

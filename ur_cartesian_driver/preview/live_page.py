@@ -11,11 +11,13 @@ from math import hypot
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.cell.cell import Cell
 from ur_cartesian_driver.motion.geometry.arrays import Floats
-from ur_cartesian_driver.motion.geometry.workspace import Plane
+from ur_cartesian_driver.motion.geometry.workspace import parse_planes
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
-from ur_cartesian_driver.preview.motion_page import scene_of_plan, serve, Server
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.preview.motion_page import NO_BODIES, scene_of_plan, serve, Server
 
 #: The least length of an edge in the trail of the TCP [m], and the largest number of edges.
 TRAIL_STEP, TRAIL_EDGES = 0.002, 1000
@@ -24,10 +26,12 @@ TRAIL_STEP, TRAIL_EDGES = 0.002, 1000
 class LivePage:
     """A page that follows a robot; made by :func:`live_page`."""
 
-    def __init__(self, server: Server, arm: Arm, state: RobotState, plan: Plan | None) -> None:
-        """Draw the arm where it is, and the plan if there is one."""
+    def __init__(
+        self, server: Server, arm: Arm, state: RobotState, plan: Plan | None, cell: Cell
+    ) -> None:
+        """Draw the arm where it is, its cell, and the plan if there is one."""
         self._arm, self._plan = arm, plan
-        self._scene = scene_of_plan(server, arm, state.T_flange_tcp, plan)
+        self._scene = scene_of_plan(server, arm, state.T_flange_tcp, plan, cell)
         self._tcp = state.T_flange_tcp
         place = np.array(state.actual_tcp_pose.position)
         self._trail = np.array([place, place])
@@ -61,7 +65,7 @@ def live_page(
     state: RobotState,
     *,
     plan: Plan | None = None,
-    planes: tuple[Plane, ...] = (),
+    options: PlanningOptions = NO_BODIES,
     host: str = '127.0.0.1',
     port: int = 8080,
 ) -> Iterator[LivePage]:
@@ -70,12 +74,13 @@ def live_page(
 
     :param state: the robot's present state.
     :param plan: the motion that the robot is expected to make.
+    :param options: their planes and the bodies of their cell are drawn.
     :param host: the address to listen on: anyone who can reach it sees the robot.
     :param port: the first port to try; if it is in use, the next free one is taken.
     :raises ImportError: viser is not installed; the text says how to get it.
     """
-    with serve(planes, host, port) as server:
-        yield LivePage(server, arm, state, plan)
+    with serve(parse_planes(options.workspace_planes), host, port) as server:
+        yield LivePage(server, arm, state, plan, options.cell)
 
 
 def path_deviation(path: Floats, place: Floats) -> float:

@@ -9,7 +9,7 @@ each colouring of the path, with the legend and the report beside the scene.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from html import escape
 import io
@@ -20,18 +20,25 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ur_cartesian_driver.kinematics.cell_poses import T_carrier_body
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.link_shapes import ARM_LINKS, link_shapes, LinkFrames
-from ur_cartesian_driver.motion.errors import GoalRefused
-from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.cell.cell import Cell, EMPTY_CELL
+from ur_cartesian_driver.motion.cell.shapes import Box, Cylinder, HalfSpace, Mesh, Shape, Sphere
+from ur_cartesian_driver.motion.errors import CollisionPredicted, GoalRefused
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.vectors import Joints
-from ur_cartesian_driver.motion.geometry.workspace import Plane
+from ur_cartesian_driver.motion.geometry.workspace import parse_planes, Plane
 from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.motion.plan.primitive import AwaitInput, CallFunction, SwitchOutput
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.clearance import Clearance
 from ur_cartesian_driver.planning.preflight.tightest_margins import normalized_margins
 from ur_cartesian_driver.planning.request.point_events.switched_outputs import describe_command
+from ur_cartesian_driver.preview.distance_curve import distance_curve
+from ur_cartesian_driver.preview.drawn_shapes import coarse_mesh, SQUARE_SIDE, triangles_per_mesh
 from ur_cartesian_driver.preview.plan_samples import Preview, sample, table
 
 Colours = NDArray[np.uint8]
@@ -48,14 +55,17 @@ MAX_NUMBERED_POINTS = 60
 #: :func:`normalized_margins`.
 AMPLE_MARGIN = 0.5
 
-_ARM, _TOOL, _POINT, _START, _OUTPUT, _PLANE, _REFUSED, _TRAIL = (
+#: Colours of bodies that are fixed, that the arm carries, and that would touch.
+FIXED: Colour = (190, 165, 130)
+CARRIED: Colour = (110, 160, 110)
+REFUSED: Colour = (210, 30, 30)
+_ARM, _TOOL, _POINT, _START, _OUTPUT, _PLANE, _TRAIL = (
     (176, 184, 194),
     (90, 100, 110),
     (50, 60, 70),
     (20, 140, 60),
     (200, 120, 0),
     (120, 170, 220),
-    (210, 30, 30),
     (230, 60, 160),
 )
 #: Name and colour of each motion.
@@ -68,6 +78,10 @@ MOTIONS: dict[str, tuple[str, Colour]] = {
     'OptimoveJ': ('optimized joint motion', (200, 60, 140)),
     'Spline': ('spline', (60, 80, 200)),
 }
+#: The options of those who have neither planes nor bodies.
+NO_BODIES = PlanningOptions()
+#: The nodes of the links in the scene.
+_LINK_NODES = tuple(f'/arm/{link.name.lower()}' for link in ARM_LINKS)
 #: Direction to the camera if the path gives none.
 _ASIDE = np.array((0.65, 0.65, 0.4))
 #: Colour of blends.
@@ -89,6 +103,7 @@ aside pre { font: 10px/1.5 ui-monospace, monospace; overflow-x: auto; }
 aside pre + pre { white-space: pre-wrap; }
 aside nav a { margin-right: .8em; }
 aside .refused { color: #c01818; font-weight: 600; }
+aside .distance svg { width: 100%; }
 aside i { display: inline-block; width: .8em; height: .8em; margin: 0 .4em 0 .8em; }
 </style>
 """
@@ -109,28 +124,42 @@ class _Colouring(NamedTuple):
     legend: Sequence[tuple[str, Colour]]
 
 
-def motion_page(plan: Plan, arm: Arm, planes: Sequence[Plane] = ()) -> str:
+def motion_page(plan: Plan, arm: Arm, options: PlanningOptions = NO_BODIES) -> str:
     """
     Return the page of a plan.
 
     :param arm: the arm for which the plan was made.
+    :param options: their planes and the bodies of their cell are drawn.
     :raises ImportError: viser is not installed; the text says how to get it.
     """
     preview = sample(plan, arm, plan.T_flange_active, _period(plan.duration))
     colourings = (_by_type(plan), _by_speed(plan), _by_margin(plan, arm, preview))
     pages = {}
-    with serve(planes) as server:
-        scene = scene_of_plan(server, arm, plan.T_flange_tcp or plan.T_flange_active, plan)
+    tcp = plan.T_flange_tcp or plan.T_flange_active
+    with serve(parse_planes(options.workspace_planes)) as server:
+        scene = scene_of_plan(server, arm, tcp, plan, options.cell)
         for colouring in colourings:
             scene.add_path(plan.reference.poses[:, :3], colouring.colours)
             pages[colouring.name] = scene.record(preview.time, preview.joints)
     texts = ''.join(f'<pre>{escape(text)}</pre>' for text in (table(plan), '\n'.join(plan.report)))
-    return _page(pages, _legends(colourings) + texts)
+    curve = _closest_pairs(preview, arm, tcp, options)
+    return _page(pages, _legends(colourings) + curve + texts)
 
 
-def scene_of_plan(server: Server, arm: Arm, tcp: Pose, plan: Plan | None) -> Scene:
-    """Return a scene with the arm and, if a plan is given, its points, outputs and path."""
-    scene = Scene(server, arm, tcp)
+def _closest_pairs(preview: Preview, arm: Arm, tcp: Pose, options: PlanningOptions) -> str:
+    """Return the curve of the closest pair over time; '' for an empty cell."""
+    if not options.cell:
+        return ''
+    known = ~np.isnan(preview.joints).any(axis=1)
+    distances, pairs = Clearance(arm, tcp, options).closest(preview.joints[known])
+    return distance_curve(preview.time[known], distances, pairs)
+
+
+def scene_of_plan(
+    server: Server, arm: Arm, tcp: Pose, plan: Plan | None, cell: Cell = EMPTY_CELL
+) -> Scene:
+    """Return a scene with arm and cell and, if a plan is given, its points, outputs and path."""
+    scene = Scene(server, arm, tcp, cell)
     if plan is not None:
         scene.add_points(_waypoints(plan))
         scene.add_outputs(_outputs(plan))
@@ -144,12 +173,16 @@ def refusal_page(
     arm: Arm,
     q: Joints,
     tcp: Pose,
-    planes: Sequence[Plane] = (),
+    options: PlanningOptions = NO_BODIES,
 ) -> str:
     """
     Return the page of a goal that was refused: its points, and the place of the refusal in red.
 
+    If the arm would touch something there, the arm is drawn at that place, and what touches in
+    red, too.
+
     :param q: the joint positions of the arm [rad].
+    :param options: their planes and the bodies of their cell are drawn.
     :raises ImportError: viser is not installed; the text says how to get it.
     """
     # The orientation may be what is wrong; points given by joints have no place.
@@ -160,18 +193,43 @@ def refusal_page(
         ]
     )
     has_place = np.isfinite(path).all(axis=1)
-    with serve(planes) as server:
-        scene = Scene(server, arm, tcp)
+    touching: tuple[str, ...] = ()
+    if isinstance(refusal, CollisionPredicted) and refusal.q is not None:
+        q, touching = refusal.q, refusal.bodies
+    with serve(parse_planes(options.workspace_planes)) as server:
+        scene = Scene(server, arm, tcp, options.cell, touching)
         drawn = path[has_place]
         scene.add_path(drawn, np.full((len(drawn) - 1, 3), 150, dtype=np.uint8))
         numbers = np.flatnonzero(has_place[1:]).tolist()
         scene.add_points(zip(numbers, drawn[1:], strict=True))
         place = _place(str(refusal), path)
         if place is not None and np.isfinite(place).all():
-            scene.add_ball('refused', place, 0.012, _REFUSED)
+            scene.add_ball('refused', place, 0.012, REFUSED)
         recorded = scene.record(np.zeros(1), np.array([q]))
     text = f'<p class="refused">Refused: {escape(str(refusal))}</p>'
     return _page({'type': recorded}, text)
+
+
+def cell_page(
+    cell: Cell, arm: Arm, q: Joints, tcp: Pose, text: str, touching: Collection[str] = ()
+) -> str:
+    """
+    Return the page of a cell with the arm at rest.
+
+    :param q: the joint positions of the arm [rad].
+    :param text: stands beside the scene.
+    :param touching: names of bodies and links that are drawn in red.
+    :raises ImportError: viser is not installed; the text says how to get it.
+    """
+    frames = LinkFrames(arm)
+    links = [pose_from_row(row) for row in frames.poses(np.array([q]))[0]]
+    carried = (T_carrier_body(body, frames, tcp) for body in cell.bodies)
+    places = [(links[link] @ T_link_body).position for link, T_link_body in carried]
+    with serve(()) as server:
+        scene = Scene(server, arm, tcp, cell, touching)
+        scene.look_at(np.array([(arm.forward(q) @ tcp).position, *places]))
+        recorded = scene.record(np.zeros(1), np.array([q]))
+    return _page({'type': recorded}, f'<pre>{escape(text)}</pre>')
 
 
 def _period(duration: float) -> float:
@@ -281,34 +339,50 @@ def _outputs(plan: Plan) -> Iterator[tuple[str, Floats]]:
 
 
 class Scene:
-    """The arm, its tool and its path on a server, which shows or records them."""
+    """The arm, its tool, its cell and its path on a server, which shows or records them."""
 
-    def __init__(self, server: Server, arm: Arm, tcp: Pose) -> None:
-        """Draw the arm with its shapes, each in the frame of its link."""
+    def __init__(
+        self,
+        server: Server,
+        arm: Arm,
+        tcp: Pose,
+        cell: Cell = EMPTY_CELL,
+        touching: Collection[str] = (),
+    ) -> None:
+        """
+        Draw the arm and the cell, each shape in the frame of its link.
+
+        :param touching: names of bodies, and of links as in :data:`~.cell.LINK_NAMES`, that are
+            drawn in red.
+        """
         import trimesh
 
         self._server, self._scene = server, server.scene
         self._frames = LinkFrames(arm)
-        self._links = [
-            self._scene.add_frame(f'/arm/{link.name.lower()}', show_axes=False)
-            for link in ARM_LINKS
-        ]
+        self._cell, self._touching = cell, touching
+        self._links = [self._scene.add_frame(name, show_axes=False) for name in _LINK_NODES]
         for k, shape in enumerate(link_shapes(arm, 'collision')):
             if shape.mesh is not None:
                 mesh = trimesh.load_mesh(shape.mesh)
             else:
                 mesh = trimesh.creation.cylinder(shape.radius, shape.length, sections=24)
-            self._add_mesh(
-                f'/arm/{ARM_LINKS[shape.link].name.lower()}/{k}', mesh, _ARM, shape.T_link_shape
-            )
+            node = _LINK_NODES[shape.link]
+            colour = self._colour(f'{node.removeprefix("/arm/")}_link', _ARM)
+            self._add_mesh(f'{node}/{k}', mesh.vertices, mesh.faces, colour, shape.T_link_shape)
         self.set_tool(tcp)
 
+    def _colour(self, name: str, otherwise: Colour) -> Colour:
+        return REFUSED if name in self._touching else otherwise
+
     def set_tool(self, tcp: Pose) -> None:
-        """Draw the tool from flange to TCP, in place of the previous tool."""
+        """Draw the tool from flange to TCP, and the bodies, in place of the previous ones."""
         T_link_tcp = self._frames.flange @ tcp
         reach = np.array([self._frames.flange.position, T_link_tcp.position])
         self._scene.add_line_segments(
-            '/arm/wrist_3/tool', reach[None].astype(np.float32), _TOOL, thickness=0.008
+            '/arm/wrist_3/tool',
+            reach[None].astype(np.float32),
+            self._colour('tool', _TOOL),
+            thickness=0.008,
         )
         self._scene.add_frame(
             '/arm/wrist_3/tcp',
@@ -317,14 +391,44 @@ class Scene:
             position=np.array(T_link_tcp.position),
             wxyz=_wxyz(T_link_tcp),
         )
+        most = triangles_per_mesh(self._cell)
+        for k, body in enumerate(self._cell.bodies):
+            link, T_link_body = T_carrier_body(body, self._frames, tcp)
+            node = f'{_LINK_NODES[link]}/body_{k}'
+            colour = self._colour(body.name, CARRIED if body.is_carried else FIXED)
+            self._scene.add_frame(
+                node,
+                show_axes=False,
+                position=np.array(T_link_body.position),
+                wxyz=_wxyz(T_link_body),
+            )
+            self._scene.add_label(f'{node}/label', body.name, font_screen_scale=0.7)
+            for j, placed in enumerate(body.shapes):
+                self._add_mesh(
+                    f'{node}/{j}',
+                    *_triangles(placed.shape, most),
+                    colour,
+                    placed.T_body_shape,
+                    opacity=0.3 if isinstance(placed.shape, HalfSpace) else None,
+                )
 
-    def _add_mesh(self, name: str, mesh: Any, colour: Colour, pose: Pose) -> None:
+    def _add_mesh(
+        self,
+        name: str,
+        vertices: Any,
+        triangles: Any,
+        colour: Colour,
+        pose: Pose,
+        opacity: float | None = None,
+    ) -> None:
         self._scene.add_mesh_simple(
             name,
-            np.asarray(mesh.vertices, dtype=np.float32),
-            np.asarray(mesh.faces, dtype=np.uint32),
+            np.asarray(vertices, dtype=np.float32),
+            np.asarray(triangles, dtype=np.uint32),
             color=colour,
+            opacity=opacity,
             flat_shading=True,
+            side='double',
             position=np.array(pose.position),
             wxyz=_wxyz(pose),
         )
@@ -423,6 +527,29 @@ def serve(planes: Sequence[Plane], host: str = '127.0.0.1', port: int = 0) -> It
     finally:
         with redirect_stdout(io.StringIO()):
             server.stop()
+
+
+def _triangles(shape: Shape, most: int) -> tuple[Floats, Indices]:
+    """
+    Return vertices and triangles of a shape, in its own frame.
+
+    :param most: largest number of triangles of a mesh.
+    """
+    from trimesh import creation
+
+    match shape:
+        case Mesh():
+            return coarse_mesh(shape, most)
+        case HalfSpace():
+            solid = creation.box((SQUARE_SIDE, SQUARE_SIDE, 0.001))
+            solid.apply_translation((0.0, 0.0, -0.0005))
+        case Box():
+            solid = creation.box(shape.size)
+        case Cylinder():
+            solid = creation.cylinder(shape.radius, shape.length, sections=48)
+        case Sphere():
+            solid = creation.icosphere(3, shape.radius)
+    return np.asarray(solid.vertices), np.asarray(solid.faces)
 
 
 def _light(scene: Any) -> None:

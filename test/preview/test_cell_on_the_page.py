@@ -1,0 +1,147 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The bodies of a cell are on the pages, where they are in the cell."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from recorded_scene import scenes_of
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_description import robot_description
+from ur_cartesian_driver.kinematics.robot_models import MODELS
+from ur_cartesian_driver.motion.cell.cell import Cell, CellBody, PlacedShape
+from ur_cartesian_driver.motion.cell.shapes import Box, Cylinder, HalfSpace, Mesh, Sphere
+from ur_cartesian_driver.motion.errors import CollisionPredicted
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
+from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.preview import cell_page, refusal_page
+from ur_cartesian_driver.preview.drawn_shapes import coarse_mesh, MAX_TRIANGLES, triangles_per_mesh
+
+pytest.importorskip('viser')
+trimesh = pytest.importorskip('trimesh')
+
+ARM = Arm(MODELS['ur5e'])
+Q = (0.3, -pi / 2, 1.4, -1.3, -pi / 2, 0.2)
+TCP = Pose.from_rotation_vector((0.01, 0.02, 0.1, 0.1, 0.2, 0.3))
+PLACE = Pose.from_rotation_vector((0.1, -0.2, 0.3, 0.4, 0.5, -0.6))
+ON_BODY = Pose.from_rotation_vector((0.02, 0.03, -0.04, 0.7, -0.2, 0.1))
+SHAPES = {
+    'box': (Box((0.1, 0.2, 0.3)), trimesh.creation.box((0.1, 0.2, 0.3))),
+    'can': (Cylinder(0.05, 0.2), trimesh.creation.cylinder(0.05, 0.2, sections=48)),
+    'ball': (Sphere(0.07), trimesh.creation.icosphere(3, 0.07)),
+}
+CORNER = Mesh(np.eye(4, 3), np.array([(0, 1, 2), (0, 1, 3)]))
+FRAMES = ('base', 'base_link', 'shoulder_link', 'forearm_link', 'tool0', 'flange')
+
+
+def body(name, shape, frame='base'):
+    return CellBody(
+        name=name, shapes=(PlacedShape(shape, ON_BODY),), frame=frame, T_frame_body=PLACE
+    )
+
+
+def node_pose(scene, name):
+    """Return the pose in which a node is at last, with that of its parents."""
+    parent = name.rpartition('/')[0]
+    T = np.eye(4)
+    for _, message in scene:
+        if message.get('name') == name and 'position' in message:
+            T[:3, 3] = message['position']
+        if message.get('name') == name and 'wxyz' in message:
+            w, x, y, z = message['wxyz']
+            T[:3, :3] = Pose((0.0, 0.0, 0.0), (x, y, z, w)).matrix()[:3, :3]
+    return node_pose(scene, parent) @ T if parent else T
+
+
+def meshes(scene):
+    """Return the props of the meshes by name."""
+    return {
+        message['name']: message['props']
+        for _, message in scene
+        if 'vertices' in message.get('props', {})
+    }
+
+
+def vertices_in_base(scene, name):
+    vertices = meshes(scene)[name]['vertices'].reshape(-1, 3)
+    T = node_pose(scene, name)
+    return vertices @ T[:3, :3].T + T[:3, 3]
+
+
+@pytest.mark.parametrize('frame', [*FRAMES, 'tool0_controller'])
+def test_bodies_are_drawn_where_pinocchio_has_their_frames(frame):
+    pinocchio = pytest.importorskip('pinocchio')
+    model = pinocchio.buildModelFromXML(robot_description(ARM))
+    data = model.createData()
+    pinocchio.framesForwardKinematics(
+        model, data, pinocchio.integrate(model, pinocchio.neutral(model), np.array(Q))
+    )
+    seen = data.oMf[model.getFrameId('tool0' if frame == 'tool0_controller' else frame)]
+    T = (data.oMf[model.getFrameId('base')].inverse() * seen).homogeneous
+    T = T @ (TCP.matrix() if frame == 'tool0_controller' else np.eye(4))
+    T = T @ PLACE.matrix() @ ON_BODY.matrix()
+    cell = Cell(bodies=tuple(body(name, shape, frame) for name, (shape, _) in SHAPES.items()))
+    scene = scenes_of(cell_page(cell, ARM, Q, TCP, ''))['type']
+    for k, (_, solid) in enumerate(SHAPES.values()):
+        (name,) = (each for each in meshes(scene) if each.endswith(f'/body_{k}/0'))
+        found = vertices_in_base(scene, name)
+        expected = solid.vertices @ T[:3, :3].T + T[:3, 3]
+        assert len(found) == len(expected)
+        gaps = np.linalg.norm(found[:, None] - expected, axis=2)
+        assert max(gaps.min(axis=0).max(), gaps.min(axis=1).max()) < 1e-5
+
+
+def test_each_body_has_its_name_and_planes_an_end():
+    cell = Cell(bodies=(body('table <1>', HalfSpace()), body('fixture/left', CORNER)))
+    page = cell_page(cell, ARM, Q, TCP, 'the "table" <1>')
+    scene = scenes_of(page)['type']
+    texts = [m['props']['text'] for _, m in scene if 'text' in m.get('props', {})]
+    assert texts == ['table <1>', 'fixture/left']
+    assert '<pre>the &quot;table&quot; &lt;1&gt;</pre>' in page
+    square = vertices_in_base(scene, '/arm/base/body_0/0')
+    normal = (PLACE @ ON_BODY).matrix()[:3, 2]
+    heights = (square - (PLACE @ ON_BODY).position) @ normal
+    assert heights.max() == pytest.approx(0.0, abs=1e-6)
+    assert 1.0 < np.ptp(square, axis=0).max() < 3.0
+    assert len(vertices_in_base(scene, '/arm/base/body_1/0')) == 4
+
+
+def test_a_refused_goal_shows_the_arm_and_both_bodies_at_the_place():
+    cell = Cell(bodies=(body('table', Box((0.1, 0.1, 0.1))), body('can', Cylinder(0.1, 0.1))))
+    refusal = CollisionPredicted('points[0].pose: too close.')
+    refusal.q, refusal.bodies = (0.5, -1.2, 1.1, -1.0, -1.5, 0.1), ('table', 'forearm_link')
+    goal = Goal(waypoints=(Waypoint(pose=ARM.forward(Q) @ TCP),))
+    page = refusal_page(goal, refusal, ARM, Q, TCP, PlanningOptions(cell=cell))
+    scene = scenes_of(page)['type']
+    red = {
+        name.rpartition('/')[0]
+        for name, props in meshes(scene).items()
+        if tuple(props['color']) == (210, 30, 30)
+    }
+    assert red == {'/arm/base/body_0', '/arm/forearm'}
+    x, y, z = node_pose(scene, '/arm/wrist_3')[:3, 3]
+    assert np.allclose((x, y, z), ARM.forward(refusal.q).position, atol=1e-6)
+
+
+@pytest.mark.slow
+def test_meshes_of_many_triangles_are_drawn_with_fewer_that_look_the_same():
+    fine = trimesh.creation.icosphere(6, 0.5)  # 81,920 triangles
+    mesh = Mesh(np.array(fine.vertices), np.array(fine.faces))
+    cell = Cell(bodies=tuple(body(f'part {k}', mesh) for k in range(4)))
+    most = triangles_per_mesh(cell)
+    assert 4 * most <= MAX_TRIANGLES
+    coarse = trimesh.Trimesh(*coarse_mesh(mesh, most), process=False)
+    assert 0.2 * most < len(coarse.faces) <= most
+    radii = np.linalg.norm(coarse.vertices, axis=1)
+    assert np.allclose(radii, 0.5, atol=0.01)
+    assert coarse.volume == pytest.approx(fine.volume, rel=0.02)
+    assert len(cell_page(cell, ARM, Q, TCP, '')) < 2e6
+
+
+def test_meshes_of_few_triangles_are_drawn_as_they_are():
+    vertices, triangles = coarse_mesh(CORNER, 2)
+    assert vertices is CORNER.vertices
+    assert triangles is CORNER.triangles
