@@ -111,8 +111,8 @@ class NodeReader:
 
     def refuse(self, node: yaml.Node, fault: str) -> NoReturn:
         """Raise the error with a clause on the fault of a node."""
-        fault = ''.join(each if each.isprintable() else '\ufffd' for each in fault)
-        raise self._error(f'{self.name}, line {node.start_mark.line + 1}: {fault}.')
+        line = node.start_mark.line + 1
+        raise self._error(f'{self.name}, line {line}: {printable(fault)}.')
 
 
 def text_of_file(path: Path, what: str, error: type[ValueError]) -> str:
@@ -126,6 +126,11 @@ def text_of_file(path: Path, what: str, error: type[ValueError]) -> str:
             return file.read(_MAX_LENGTH + 1)
         except UnicodeDecodeError:
             raise error(f'{path} is no text in UTF-8, so it is no {what}.') from None
+
+
+def printable(text: str) -> str:
+    """Return a text on one line, so that an error can quote what is in a file."""
+    return ''.join(each if each.isprintable() else '\ufffd' for each in text)
 
 
 def kind_of(node: yaml.Node) -> str:

@@ -124,6 +124,8 @@ class Mesh:
     triangles: Indices = field(repr=False)
     #: The file, '' = none.
     source: str = ''
+    #: The factors of the coordinates in the file along x, y and z.
+    scale: Vector3 = (1.0, 1.0, 1.0)
 
     def __post_init__(self) -> None:
         """Check the arrays and make them read-only."""
@@ -135,7 +137,8 @@ class Mesh:
             raise ValueError('a vertex of the mesh is not finite')
         if triangles.min() < 0 or triangles.max() >= len(vertices):
             raise ValueError('a triangle of the mesh names a vertex that does not exist')
-        size = float(np.ptp(vertices, axis=0).max())
+        with np.errstate(over='ignore'):
+            size = float(np.ptp(vertices, axis=0).max())
         if not 0.0 < size <= MAX_SIZE:
             raise ValueError(
                 f'the mesh is {size:g} m long; it must be longer than 0 and at most '
@@ -149,6 +152,13 @@ class Mesh:
     def bounds(self) -> Floats:
         """The lowest and the highest corner, (2, 3) [m]."""
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether no triangle has an edge of its own: the surface encloses a solid."""
+        begin, end = self.triangles, np.roll(self.triangles, 1, axis=1)
+        edges = np.minimum(begin, end) * len(self.vertices) + np.maximum(begin, end)
+        return not (np.unique_counts(edges).counts % 2).any()
 
 
 Shape: TypeAlias = Box | Cylinder | Sphere | HalfSpace | Mesh

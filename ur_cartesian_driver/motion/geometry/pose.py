@@ -212,6 +212,21 @@ def rotation_vector_from_quaternion(q: Quaternion) -> Vector3:
     return (x * scale, y * scale, z * scale)
 
 
+def quaternion_from_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """Return the unit quaternion of angles about the fixed axes x, y, z [rad], as in a URDF."""
+    cr, sr = cos(0.5 * roll), sin(0.5 * roll)
+    cp, sp = cos(0.5 * pitch), sin(0.5 * pitch)
+    cy, sy = cos(0.5 * yaw), sin(0.5 * yaw)
+    return normalize(
+        (
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+            cr * cp * cy + sr * sp * sy,
+        )
+    )
+
+
 def roll_pitch_yaw_from_quaternion(q: Quaternion) -> Vector3:
     """Return the angles about the fixed axes x, y, z [rad], as a URDF has them."""
     r11, _, _, r21, r22, r23, r31, r32, r33 = rotation_from_quaternion(q)
