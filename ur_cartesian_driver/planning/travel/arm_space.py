@@ -1,0 +1,122 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The space of the joints of one arm with one tool, in which a travel is searched."""
+
+from __future__ import annotations
+
+from math import ceil, radians, tau
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.inverse import solutions
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.clearance import Clearance, Violation
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_change, TcpKinematics
+
+#: No joint turns farther than this from one checked configuration to the next [rad].
+_ROW_STEP = radians(1.0)
+#: Distance between two configurations on a line along the axis of the tool [m], and the largest
+#: turn of a joint between them [rad]: a greater one leads to another branch.
+_LINE_STEP, _MAX_TURN = 0.002, 0.2
+#: The least weight of a joint [m]: wrist 3 turns a tool without length about its own axis.
+_LEAST_WEIGHT = 0.05
+#: Configurations among which one is looked for that is clear of everything.
+_CLEAR_CANDIDATES = 256
+
+
+class ArmSpace:
+    """
+    The configurations of an arm, and those in which it is clear of itself and of its cell.
+
+    :param kinematics: the arm and its TCP.
+    :param options: those of :class:`~.clearance.Clearance`.
+    """
+
+    def __init__(self, kinematics: TcpKinematics, options: PlanningOptions) -> None:
+        """Create the checks."""
+        self.kinematics = kinematics
+        model = kinematics.arm.model
+        self._clearance = Clearance(kinematics.arm, kinematics.T_flange_tcp, options)
+        #: Lowest and highest position of each joint, (2, 6) [rad].
+        self.limits: Floats = np.array(model.position_limits).T
+        # A length along the axis of a joint moves nothing, one across it, and all that follow, do.
+        across, along = np.abs(model.geometry.a), np.abs(model.geometry.d)
+        beyond = np.cumsum((across + along)[::-1])[::-1] - along
+        length = float(np.linalg.norm(kinematics.T_flange_tcp.position))
+        #: How far each joint moves the arm at most, (6,) [m/rad].
+        self.weights: Floats = np.maximum(beyond + length, _LEAST_WEIGHT)
+
+    def free(self, q: Floats) -> Flags:
+        """Return whether each configuration (n, 6) [rad] is clear of everything."""
+        return ~self._clearance.too_close(q)
+
+    def edge_is_free(self, a: Floats, b: Floats) -> bool:
+        """Return whether a straight joint motion is accepted, if its beginning is clear."""
+        count = max(1, ceil(float(np.abs(b - a).max()) / _ROW_STEP))
+        rows = a + np.linspace(0.0, 1.0, count + 1)[1:, None] * (b - a)
+        return self.violation(rows, vector6(a.tolist())) is None
+
+    def violation(self, q: Floats, q_start: Joints) -> Violation | None:
+        """Return the first violation in configurations (n, 6) [rad] on the way from a start."""
+        return self._clearance.check(q, q_start).violation
+
+    def touching(self, q: Joints) -> Violation | None:
+        """Return why the arm cannot be in a configuration, whatever it was in before, or None."""
+        row = np.array([q])
+        if self.free(row)[0]:
+            return None
+        low, high = np.maximum(self.limits[0], -tau), np.minimum(self.limits[1], tau)
+        others = np.random.default_rng(0).uniform(low, high, (_CLEAR_CANDIDATES, 6))
+        # What is close at the start of a check is excused, so the start has to be clear.
+        clear = others[self.free(others)]
+        if len(clear):
+            return self.violation(row, vector6(clear[0].tolist()))
+        return Violation(
+            row=0,
+            text='the arm is too close to something, and in all other postures too',
+            remedy='look at the bodies and planes of the cell',
+        )
+
+    def along_tool(self, q: Joints, distance: float) -> Floats | None:
+        """
+        Return the configurations on a line along the axis z of the tool, without the first.
+
+        :param distance: how far the line goes, negative = backwards [m].
+        :returns: (n, 6) [rad]; None if the arm cannot follow the line.
+        """
+        count = ceil(abs(distance) / _LINE_STEP)
+        begin = self.tcp(q)
+        rows = []
+        for fraction in np.linspace(0.0, 1.0, count + 1)[1:].tolist():
+            pose = begin @ Pose((0.0, 0.0, distance * fraction))
+            there = self.kinematics.solution(pose, q)
+            if there is None or max_joint_change(q, there) > _MAX_TURN:
+                return None
+            rows.append(there)
+            q = there
+        return np.array(rows).reshape(-1, 6)
+
+    def tcp(self, q: Joints) -> Pose:
+        """Return ``T_base_tcp`` in a configuration."""
+        return self.kinematics.arm.forward(q) @ self.kinematics.T_flange_tcp
+
+    def configurations(self, T_base_tcp: Pose, q_near: Joints) -> list[Joints]:
+        """
+        Return the configurations in which the arm reaches a pose, the nearest first.
+
+        Each joint is turned as near to a configuration as its limits allow.
+        """
+        found = solutions(self.kinematics.arm, self.kinematics.flange(T_base_tcp), q_near)
+        if not found:
+            return []
+        q = np.array(found)
+        low, high = self.limits
+        q += tau * np.round((q_near - q) / tau)
+        q -= tau * np.ceil(np.maximum(q - high, 0.0) / tau)
+        q += tau * np.ceil(np.maximum(low - q, 0.0) / tau)
+        q = q[((q >= low) & (q <= high)).all(axis=1)]
+        order = np.argsort(np.linalg.norm((q - q_near) * self.weights, axis=1), kind='stable')
+        return [vector6(row) for row in q[order].tolist()]

@@ -1,0 +1,143 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Find a transfer: the way from one configuration of an arm to one of several others.
+
+The tool is retracted along its axis z, the joints move through free space, and the tool
+approaches along its axis z. Each of the three parts begins and ends at rest or in a blend, which
+is for the planner to check.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ur_cartesian_driver.motion.errors import CollisionPredicted, GoalRefused, Unreachable
+from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
+from ur_cartesian_driver.planning.preflight.clearance import Violation
+from ur_cartesian_driver.planning.travel.arm_space import ArmSpace
+from ur_cartesian_driver.planning.travel.joint_path_search import search_joint_path
+
+#: The largest retract and approach [m]; more must be millimetres by mistake.
+MAX_RETRACT = 1.0
+#: The largest number of samples.
+MAX_SAMPLES = 1_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TransferSettings:
+    """
+    How a transfer begins and ends, and how it is searched.
+
+    :raises ValueError: a number is out of its range; the text is a clause.
+    """
+
+    #: How far the tool is retracted along its axis z before the joints move freely [m].
+    retract: float = 0.05
+    #: The length of the line along the axis z of the tool on which it arrives [m].
+    approach: float = 0.05
+    #: The samples after which a search gives up.
+    max_samples: int = 2000
+    #: Another seed finds another way; the same seed finds the same way again.
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        for name in ('retract', 'approach'):
+            value = getattr(self, name)
+            if not 0.0 <= value <= MAX_RETRACT:  # or NaN
+                raise ValueError(f'{name} is {value:g} m, but must be from 0 to {MAX_RETRACT:g} m')
+        if not 0 <= self.max_samples <= MAX_SAMPLES:
+            raise ValueError(
+                f'max_samples is {self.max_samples}, but must be from 0 to {MAX_SAMPLES}'
+            )
+        if self.seed < 0:
+            raise ValueError(f'seed is {self.seed}, but must not be negative')
+
+
+@dataclass(frozen=True, slots=True)
+class Transfer:
+    """A way through the air, from the end of the retract to the beginning of the approach."""
+
+    #: (k, 6) [rad]; between two rows the joints move straight.
+    waypoints: Floats
+    #: The configuration in which the transfer ends: one of those that were asked for [rad].
+    goal: Joints
+    #: The number of samples that the search took.
+    samples: int
+
+
+def find_transfer(
+    space: ArmSpace,
+    q_start: Joints,
+    goals: Sequence[Joints],
+    settings: TransferSettings,
+    where: str,
+) -> Transfer:
+    """
+    Return a transfer to one of several configurations.
+
+    :param goals: at least one, the preferred one first.
+    :param where: the beginning of a refusal, such as ``The travel to point 0``.
+    :raises CollisionPredicted: the arm touches something at the start, in all goals, at the
+        beginning or the end of the way, or no way was found.
+    :raises Unreachable: the arm cannot follow the line of the retract or of the approach.
+    """
+    if (touching := space.touching(q_start)) is not None:
+        raise _collision(where, 'cannot begin', touching, q_start)
+    left = _along_tool(space, q_start, -settings.retract, f'{where}: the retract', 'retract')
+    arrivals: dict[bytes, Joints] = {}
+    refusal: GoalRefused | None = None
+    for goal in goals:
+        try:
+            if (touching := space.touching(goal)) is not None:
+                raise _collision(where, 'cannot end', touching, goal)
+            what = f'{where}: the approach'
+            begin = _along_tool(space, goal, -settings.approach, what, 'approach')
+            arrivals[begin.tobytes()] = goal
+        except GoalRefused as error:
+            refusal = refusal or error
+    if refusal is not None and not arrivals:
+        raise refusal
+    rows = np.array([np.frombuffer(row) for row in arrivals])
+    found = search_joint_path(
+        space, left, rows, max_samples=settings.max_samples, seed=settings.seed
+    )
+    if found is None:
+        raise CollisionPredicted(
+            f'{where} was not found within {settings.max_samples} samples; allow more samples, '
+            'ask for another posture, or look at the bodies between, and at their clearance.'
+        )
+    end = found.waypoints[-1].tobytes()
+    return Transfer(found.waypoints, arrivals[end], found.samples)
+
+
+def _along_tool(space: ArmSpace, q: Joints, distance: float, what: str, setting: str) -> Floats:
+    """Return the configuration (6,) at the end of a line along the tool, which is checked."""
+    if not distance:
+        return np.array(q)
+    rows = space.along_tool(q, distance)
+    advice = f'use a shorter {setting}'
+    if rows is None:
+        raise Unreachable(
+            f'{what} of {abs(distance):g} m along the axis z of the tool is out of reach, or '
+            f'passes a singularity; {advice}.'
+        )
+    violation = space.violation(rows, q)
+    if violation is not None:
+        at = vector6(rows[violation.row].tolist())
+        raise _collision(f'{what} of {abs(distance):g} m', 'is not free', violation, at, advice)
+    end: Floats = rows[-1]
+    return end
+
+
+def _collision(
+    where: str, what: str, violation: Violation, q: Joints, advice: str = ''
+) -> CollisionPredicted:
+    error = CollisionPredicted(f'{where} {what}: {violation.text}; {advice or violation.remedy}.')
+    error.q = q
+    return error
