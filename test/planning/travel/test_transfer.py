@@ -85,7 +85,7 @@ def test_weights_bound_how_far_a_joint_moves_the_tool(model):
 
 
 def test_configurations_are_turned_near_and_within_limits():
-    near = tuple(np.array(HOME) + (2 * pi - 0.1, 0.0, 0.0, -3.0, 0.0, 6.2))
+    near = tuple(np.add(HOME, (2 * pi - 0.1, 0.0, 0.0, -3.0, 0.0, 6.2)))
     here = space()
     pose = here.tcp(HOME)
     found = np.array(here.configurations(pose, near))
