@@ -21,6 +21,8 @@ from ur_cartesian_driver.motion.goal.goal import (
     ContactEnd,
     Goal,
     OutputKind,
+    PartAction,
+    PartChange,
     Press,
     PulseTrain,
     SafeOutput,
@@ -777,6 +779,25 @@ def test_what_happens_at_points_is_that_of_a_goal():
             open_path.goal()
     with pytest.raises(InvalidGoal, match=r'ends follow_speed\(standard analog output 1\), which'):
         Path(HERE).by(dy=0.1).end_follow_speed(pump)
+
+
+def test_a_part_is_taken_and_put_down_with_its_payload():
+    path = Path(HERE).by(dz=-0.1).attach('part', mass=1.2, center_of_gravity=(0.0, 0.0, 0.1))
+    path = path.by(dz=0.1).by(dy=0.1).release('part').by(dz=0.1)
+    goal = path.goal()
+    assert goal.part_changes == (
+        PartChange(waypoint=0, body='part', action=PartAction.ATTACH),
+        PartChange(waypoint=2, body='part', action=PartAction.RELEASE),
+    )
+    (payload,) = goal.payload_changes
+    assert (payload.waypoint, payload.mass) == (0, 1.2)
+    assert payload.center_of_gravity == (0.0, 0.0, 0.1)
+    assert Path.from_goal(goal).goal() == goal
+    assert Path.from_yaml(path.to_yaml()).goal() == goal
+    with pytest.raises(InvalidGoal, match=r'release\(\) comes before the first point'):
+        Path(HERE).release('part')
+    with pytest.raises(InvalidGoal, match=r'attach\(\) at point 0 is where the arm does not stop'):
+        Path(HERE).by(dz=-0.1, blend=mm(10)).attach('part')
 
 
 def test_pulses_begin_and_end_at_points():

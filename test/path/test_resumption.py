@@ -25,6 +25,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     InputWait,
     IOCommand,
     OutputKind,
+    PartChange,
     PayloadChange,
     Posture,
     Press,
@@ -259,9 +260,12 @@ def test_a_function_is_called_again_where_the_goal_was_stopped_at_its_point_and_
 ):
     calls = tuple(ScriptCall(waypoint=k, function=f'f{k}') for k in (0, 2))
     line = Segment(velocity=0.1)
-    of = goal(line, line, line, Segment(type=following), script_calls=calls)
+    parts = tuple(PartChange(waypoint=k, body=f'f{k}') for k in (0, 2))
+    of = goal(line, line, line, Segment(type=following), script_calls=calls, part_changes=parts)
     left = resume(of, at(*place), overlap=overlap).goal
     assert [call.function for call in left.script_calls] == [f'f{k}' for k in called_again]
+    # The driver's cell has the changes at points that the arm has left.
+    assert [part.body for part in left.part_changes] == [f'f{k}' for k in called_again]
     for call in left.script_calls:
         point = int(call.function[1:])
         assert left.waypoints[call.waypoint].pose == of.waypoints[point].pose

@@ -17,6 +17,8 @@ from ur_cartesian_driver.motion.goal.goal import (
     MAX_OUTPUT_OFFSET,
     MAX_STOP_TIME,
     OutputKind,
+    PartAction,
+    PartChange,
     PayloadChange,
     Press,
     PressFrame,
@@ -430,7 +432,58 @@ class PathWithEvents(PathOfMotions):
         )
         return self._with_event(where, point, change)
 
+    def attach(
+        self,
+        part: str,
+        *,
+        mass: float | None = None,
+        center_of_gravity: Sequence[float] = (0.0, 0.0, 0.0),
+    ) -> Self:
+        """
+        Take a body of the cell at the last point, where the arm stops.
+
+        From there on, the checks move the body with the flange, from where it is. Close the
+        gripper with :meth:`set` at the same point.
+
+        :param part: name of the body in the driver's cell.
+        :param mass: of the payload from there on [kg]; None = the payload stays as it is.
+        :param center_of_gravity: of this payload, in the flange frame [m].
+        :raises InvalidGoal: as for :meth:`dwell`, or a number is out of its range.
+        """
+        return self._with_part(part, PartAction.ATTACH, mass, center_of_gravity)
+
+    def release(
+        self,
+        part: str,
+        *,
+        mass: float | None = None,
+        center_of_gravity: Sequence[float] = (0.0, 0.0, 0.0),
+    ) -> Self:
+        """
+        Put a body of the cell down at the last point, where the arm stops; it stays there.
+
+        Open the gripper with :meth:`set` at the same point.
+
+        :param part: name of a body that the tool carries.
+        :param mass: of the payload from there on [kg]; None = the payload stays as it is.
+        :param center_of_gravity: of this payload, in the flange frame [m].
+        :raises InvalidGoal: as for :meth:`dwell`, or a number is out of its range.
+        """
+        return self._with_part(part, PartAction.RELEASE, mass, center_of_gravity)
+
     # ---- inside --------------------------------------------------------------------------------
+
+    def _with_part(
+        self,
+        part: str,
+        action: PartAction,
+        mass: float | None,
+        center_of_gravity: Sequence[float],
+    ) -> Self:
+        """Return the path with a change of a part at the last point, and of the payload."""
+        where, point = self._as_stop(action.name.lower())
+        path = self._with_event(where, point, PartChange(waypoint=0, body=part, action=action))
+        return path if mass is None else path.payload(mass, center_of_gravity)
 
     def _with_point(self, index: int, point: PathPoint) -> Self:
         """Return the path with one of its points replaced."""

@@ -238,7 +238,14 @@ def _checked_path(
         planner.goal, planner.targets, planner.kinematics, options, remarks, reasons
     )
     geometries = paths.geometries(first, state.actual_tcp_pose, state.actual_q)
-    lines = clearance_lines(planner.arm, planner.tool_tips, options, paths.samples, state.actual_q)
+    lines = clearance_lines(
+        planner.arm,
+        planner.tool_tips,
+        options,
+        paths.samples,
+        state.actual_q,
+        planner.goal.part_changes,
+    )
     return paths, geometries, lines
 
 
@@ -274,7 +281,12 @@ def plan_rounded_goal(planner: GoalPlanner) -> Plan:
     )
     report = RoundedReport(motion)
     clearance = clearance_lines(
-        planner.arm, planner.tool_tips, options, motion.path.samples, state.actual_q
+        planner.arm,
+        planner.tool_tips,
+        options,
+        motion.path.samples,
+        state.actual_q,
+        goal.part_changes,
     )
     return planner.plan(
         goal,
@@ -339,6 +351,7 @@ def _with_offset_band(plan: Plan, planner: GoalPlanner) -> Plan:
         q=q,
         qd=qd,
         tool_tips=planner.tool_tips,
+        part_changes=plan.goal.part_changes,
     ).check()
     remarks = (*plan.remarks, *offset_remarks(band, plan.duration), *warnings[:1])
     return replace(plan, offset_band=band, remarks=remarks)

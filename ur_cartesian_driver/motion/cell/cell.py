@@ -104,6 +104,11 @@ class CellBody:
         return FRAMES[self.frame] > 0
 
     @property
+    def is_on_tool(self) -> bool:
+        """Whether the body moves with the flange."""
+        return FRAMES[self.frame] == FRAMES['flange']
+
+    @property
     def has_mesh(self) -> bool:
         """Whether a shape of the body is a mesh."""
         return any(isinstance(each.shape, Mesh) for each in self.shapes)

@@ -379,6 +379,25 @@ class PayloadChange:
     transition_time: Annotated[float, Range(0.0, MAX_TRANSITION_TIME, 's')] = 0.0
 
 
+class PartAction(IntEnum):
+    """What happens to a body of the cell, numbered as in ``PartChange.action``."""
+
+    #: From the point on, the body moves with the flange, from where it was.
+    ATTACH = 0
+    #: From the point on, the body stays where it was put.
+    RELEASE = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartChange:
+    """Take or put down a body of the cell at a waypoint, where the arm stops; for the checks."""
+
+    waypoint: Annotated[int, POINT]
+    #: Name of the body.
+    body: str
+    action: Annotated[PartAction, ALWAYS] = PartAction.ATTACH
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProportionalOutput:
     """An analog output that follows the speed of the tool between two waypoints."""
@@ -575,3 +594,4 @@ class Goal:
     corner_angle: Annotated[float, CORNER_ANGLE] = 0.0
     feed_override: FeedOverride = FeedOverride()
     pulses: tuple[PulseTrain, ...] = ()
+    part_changes: tuple[PartChange, ...] = ()

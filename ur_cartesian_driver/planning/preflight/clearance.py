@@ -14,7 +14,7 @@ it is treated like all others.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import inf
 from typing import NamedTuple
@@ -30,7 +30,9 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int32s
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes, Plane
+from ur_cartesian_driver.motion.goal.goal import PartChange
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.cell_stretches import cell_stretches
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
 # Rows per block: blocks bound the memory, and a refusal ends the check early.
@@ -180,16 +182,23 @@ def clearance_lines(
     options: PlanningOptions,
     path: JointSamples,
     q_start: Joints,
+    part_changes: Sequence[PartChange] = (),
 ) -> list[str]:
     """
     Return the report lines about the clearance with each of several tool tips.
 
     For parameters and errors see :meth:`Clearance.check` and :func:`clearance_remarks`.
+
+    :param part_changes: the bodies that the tool takes or puts down along the path.
     """
-    checks = (Clearance(arm, tip, options).check(path.q, q_start) for tip in tool_tips)
-    lines = (
-        line for each in checks for line in clearance_remarks(each, path.segment, path.fraction)
-    )
+    lines = []
+    for tip in tool_tips:
+        for rows, cell, start in cell_stretches(
+            part_changes, path.segment, path.q, q_start, arm, tip, options.cell
+        ):
+            used = options if cell is options.cell else replace(options, cell=cell)
+            clear = Clearance(arm, tip, used).check(path.q[rows], start)
+            lines += clearance_remarks(clear, path.segment[rows], path.fraction[rows])
     return list(dict.fromkeys(lines))  # two tips often have the same line
 
 

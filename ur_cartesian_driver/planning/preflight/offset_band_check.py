@@ -14,7 +14,7 @@ The corners of the band are checked along the whole path, as the path itself was
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import ceil, hypot
 
@@ -33,10 +33,11 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, interpolate_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints, norm, Vector3, vector3, vector6
-from ur_cartesian_driver.motion.goal.goal import PathOffset
+from ur_cartesian_driver.motion.goal.goal import PartChange, PathOffset
 from ur_cartesian_driver.motion.plan.offset_band import OFFSET_AXES, OffsetBand
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.cell_stretches import cell_stretches
 from ur_cartesian_driver.planning.preflight.clearance import Clearance, clearance_remarks
 from ur_cartesian_driver.planning.preflight.joint_path_solver import describe_location
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
@@ -239,6 +240,8 @@ class OffsetBandCheck:
     q: Floats
     qd: Floats
     tool_tips: Sequence[Pose]
+    #: The bodies that the tool takes or puts down along the path.
+    part_changes: Sequence[PartChange]
 
     def check(self) -> list[str]:
         """
@@ -306,10 +309,15 @@ class OffsetBandCheck:
         self._check_joint_speeds(q, there, joint_speeds)
         start, warnings = vector6(q[0].tolist()), []
         for T_flange_tip in self.tool_tips:
-            clear = Clearance(arm, T_flange_tip, self.options).check(there, start)
-            lines = clearance_remarks(clear, path.point, path.fraction)
-            if clear.warning is not None:
-                warnings.append(lines[0])
+            # The tool takes and puts down parts on the path, whatever the offset.
+            for rows, cell, before in cell_stretches(
+                self.part_changes, path.point, q, start, arm, T_flange_tip, self.options.cell
+            ):
+                options = replace(self.options, cell=cell)
+                clear = Clearance(arm, T_flange_tip, options).check(there[rows], before)
+                lines = clearance_remarks(clear, path.point[rows], path.fraction[rows])
+                if clear.warning is not None:
+                    warnings.append(lines[0])
         return list(dict.fromkeys(warnings))
 
     def _joints_at(self, corner: Vector3, axes: Floats, q: Floats) -> Floats:

@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.polynomials import MotionRows
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector6, vector6, ZERO6
-from ur_cartesian_driver.motion.goal.goal import PIECES_PER_HORIZON
+from ur_cartesian_driver.motion.goal.goal import PartChange, PIECES_PER_HORIZON
 from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows, ReferencePath
@@ -162,7 +162,9 @@ def plan_spline(
         remarks=(
             *point_remarks(goal, first),
             *([stretch_remark(stretch, limit, path.spline.times[-1])] if limit else []),
-            *_clearance_remarks(path, end, arm, tool_tips or (T_flange_tcp,), start, options),
+            *_clearance_remarks(
+                path, end, arm, tool_tips or (T_flange_tcp,), start, options, goal.part_changes
+            ),
             f'joints: {len(polynomials.piece)} {kind} pieces, which keep the tool within '
             f'{1e3 * polynomials.distance:.3f} mm and {polynomials.angle:.5f} rad of its spline',
             path.tightest_margins.remark,
@@ -348,6 +350,7 @@ def _clearance_remarks(
     tool_tips: Sequence[Pose],
     start: SplineState,
     options: PlanningOptions,
+    part_changes: Sequence[PartChange],
 ) -> list[str]:
     """Return the remarks on clearance, including the stop after a moving end."""
     samples = path.samples
@@ -359,7 +362,7 @@ def _clearance_remarks(
             np.append(samples.fraction, np.ones(len(on))),
             np.concatenate([samples.q, on]),
         )
-    return clearance_lines(arm, tool_tips, options, samples, start.q)
+    return clearance_lines(arm, tool_tips, options, samples, start.q, part_changes)
 
 
 def stretch_times(goal: GoalTable, factor: float) -> GoalTable:

@@ -27,6 +27,7 @@ from ur_cartesian_driver.planning.request.point_events.dwells import (
 )
 from ur_cartesian_driver.planning.request.point_events.input_waits import InputWaits
 from ur_cartesian_driver.planning.request.point_events.output_event import OutputEvent
+from ur_cartesian_driver.planning.request.point_events.part_changes import PartChanges
 from ur_cartesian_driver.planning.request.point_events.payload_changes import PayloadChanges
 from ur_cartesian_driver.planning.request.point_events.point_event import check_point, PointEvent
 from ur_cartesian_driver.planning.request.point_events.presses import Presses
@@ -44,6 +45,7 @@ STOP_EVENTS: tuple[PointEvent[Any], ...] = (
     InputWaits(),
     ScriptCalls(),
     PayloadChanges(),
+    PartChanges(),
     Presses(),
 )
 #: Events that happen while the arm moves.

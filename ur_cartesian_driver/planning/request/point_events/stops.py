@@ -45,18 +45,18 @@ class Stops:
         self._stops: list[PlacedStop] = sorted(stops, key=lambda one: (one.waypoint, one.order))
         #: The goal without its stops, with the times of the motion only.
         self.moving_goal = goal
-        if self._stops:
+        #: The waypoints at which the arm stops, also those where the robot has nothing to do.
+        self.waypoints = frozenset(
+            [stop.waypoint for stop in self._stops]
+            + [change.waypoint for change in goal.part_changes]
+        )
+        if self.waypoints:
             rates = {}
             for name in ('twists', 'accelerations') if is_spline(goal) else ():
                 rates[name] = getattr(goal.waypoints, name).copy()
-                rates[name][[stop.waypoint for stop in self._stops]] = 0.0
+                rates[name][list(self.waypoints)] = 0.0
             mode = resolve_execution_mode(goal)
             self.moving_goal = replace(self._shifted(goal, -1.0, **rates), execution=mode)
-
-    @property
-    def waypoints(self) -> frozenset[int]:
-        """The waypoints at which the arm stops."""
-        return frozenset(stop.waypoint for stop in self._stops)
 
     def delayed(self, times: Floats) -> Floats:
         """Return when points (n,) are reached [s], stops included, from their times without."""
