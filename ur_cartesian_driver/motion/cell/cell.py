@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from math import isfinite
+from math import hypot, isfinite
 from types import MappingProxyType
 
 from ur_cartesian_driver.motion.cell.shapes import HalfSpace, Mesh, Shape
@@ -22,6 +22,11 @@ from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 DEFAULT_CLEARANCE = 0.005
 #: The largest clearance [m].
 MAX_CLEARANCE = 1.0
+#: No coordinate of a place is larger [m]: it is probably given in millimetres.
+MAX_COORDINATE = 100.0
+#: Longest name of a body.
+_MAX_NAME = 100
+_UNIT_TOLERANCE = 1e-6
 
 #: The frames that carry bodies, with the number of their link, 0 = the base. They are those of
 #: the robot description; ``tool0_controller`` is the active TCP.
@@ -56,10 +61,18 @@ LINK_NAMES: tuple[str, ...] = (
 
 @dataclass(frozen=True, slots=True)
 class PlacedShape:
-    """A shape of a body, and its place on the body."""
+    """
+    A shape of a body, and its place on the body.
+
+    :raises ValueError: the place is out of bounds.
+    """
 
     shape: Shape
     T_body_shape: Pose = IDENTITY
+
+    def __post_init__(self) -> None:
+        """Check the place."""
+        check_place(self.T_body_shape)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,8 +80,8 @@ class CellBody:
     """
     A body of the cell.
 
-    :raises ValueError: the frame is unknown, there is no shape, a clearance is out of bounds, or
-        a half-space is carried by the arm.
+    :raises ValueError: name or frame is none, there is no shape, clearance or place are out of
+        bounds, or a half-space is carried by the arm.
     """
 
     name: str
@@ -81,10 +94,14 @@ class CellBody:
 
     def __post_init__(self) -> None:
         """Check the fields."""
-        if not self.name or self.name in LINK_NAMES:
+        if not (0 < len(self.name) <= _MAX_NAME and self.name.isprintable()):
             raise ValueError(
-                f'"{self.name}" cannot be the name of a body'
-                + ('; it is a part of the arm' if self.name else '')
+                f'{shortened(self.name)!r} cannot be the name of a body; use 1 to {_MAX_NAME} '
+                'characters that can be printed'
+            )
+        if self.name in LINK_NAMES or self.name in FRAMES:
+            raise ValueError(
+                f'"{self.name}" cannot be the name of a body; it is a part of the arm'
             )
         if self.frame not in FRAMES:
             raise ValueError(
@@ -93,6 +110,7 @@ class CellBody:
             )
         if not self.shapes:
             raise ValueError('it has no shape')
+        check_place(self.T_frame_body)
         if self.clearance is not None:
             check_clearance(self.clearance)
         if self.is_carried and any(isinstance(each.shape, HalfSpace) for each in self.shapes):
@@ -124,6 +142,24 @@ def check_clearance(value: float) -> None:
         raise ValueError(f'the clearance is {value:g} m; it must be from 0 to {MAX_CLEARANCE:g} m')
 
 
+def check_place(pose: Pose) -> None:
+    """
+    Refuse a pose that no body can have.
+
+    :raises ValueError: a coordinate is out of bounds, or the quaternion has not the length 1; the
+        text is a clause.
+    """
+    for axis, value in zip('xyz', pose.position, strict=True):
+        if not abs(value) <= MAX_COORDINATE:
+            raise ValueError(
+                f'its position has {axis} = {value:g} m; at most {MAX_COORDINATE:g} m are possible'
+            )
+    if not abs(hypot(*pose.quaternion) - 1.0) <= _UNIT_TOLERANCE:
+        raise ValueError(
+            f'the length of its quaternion is {hypot(*pose.quaternion):.4g} instead of 1'
+        )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cell:
     """
@@ -138,6 +174,8 @@ class Cell:
     may_touch: frozenset[frozenset[str]] = frozenset()
     #: Distance that the arm keeps from bodies that give none [m].
     clearance: float = DEFAULT_CLEARANCE
+    #: What the files left open: sentences.
+    remarks: tuple[str, ...] = field(default=(), compare=False)
     #: The names of the bodies, and the arm's.
     names: frozenset[str] = field(init=False, repr=False, compare=False)
 

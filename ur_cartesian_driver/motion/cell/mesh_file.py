@@ -51,7 +51,7 @@ _SOLID_LINE = re.compile(rb'^[ \t]*(?:end)?solid\b.*$', re.MULTILINE)
 #: Statements of OBJ that have nothing to do with the surface. Free-form surfaces are not among
 #: them: without these the part would be incomplete.
 _OTHER_OBJ_WORDS = frozenset(
-    b'vn vt vp p l g o s mg usemtl mtllib usemap maplib shadow_obj trace_obj lod bevel c_interp '
+    b'vn vt vp p l g o s mg usemtl mtllib usemap maplib shadow_obj trace_obj bevel c_interp '
     b'd_interp'.split()
 )
 _OTHER_FORMATS = {
