@@ -3,6 +3,7 @@
 """The bodies of a cell are on the pages, where they are in the cell."""
 
 from math import pi
+import re
 
 import numpy as np
 import pytest
@@ -15,9 +16,10 @@ from ur_cartesian_driver.motion.cell.cell import Cell, CellBody, PlacedShape
 from ur_cartesian_driver.motion.cell.shapes import Box, Cylinder, HalfSpace, Mesh, Sphere
 from ur_cartesian_driver.motion.errors import CollisionPredicted
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
-from ur_cartesian_driver.planning import PlanningOptions
-from ur_cartesian_driver.preview import cell_page, refusal_page
+from ur_cartesian_driver.motion.goal.goal import Goal, PartAction, PartChange, Waypoint
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.stop_prediction import state_at_rest
+from ur_cartesian_driver.preview import cell_page, motion_page, refusal_page
 from ur_cartesian_driver.preview.drawn_shapes import coarse_mesh, MAX_TRIANGLES, triangles_per_mesh
 
 pytest.importorskip('viser')
@@ -86,8 +88,7 @@ def test_bodies_are_drawn_where_pinocchio_has_their_frames(frame):
     cell = Cell(bodies=tuple(body(name, shape, frame) for name, (shape, _) in SHAPES.items()))
     scene = scenes_of(cell_page(cell, ARM, Q, TCP, ''))['type']
     for k, (_, solid) in enumerate(SHAPES.values()):
-        (name,) = (each for each in meshes(scene) if each.endswith(f'/body_{k}/0'))
-        found = vertices_in_base(scene, name)
+        found = vertices_in_base(scene, f'/cell/{k}/0')
         expected = solid.vertices @ T[:3, :3].T + T[:3, 3]
         assert len(found) == len(expected)
         gaps = np.linalg.norm(found[:, None] - expected, axis=2)
@@ -101,12 +102,12 @@ def test_each_body_has_its_name_and_planes_an_end():
     texts = [m['props']['text'] for _, m in scene if 'text' in m.get('props', {})]
     assert texts == ['table <1>', 'fixture/left']
     assert '<pre>the &quot;table&quot; &lt;1&gt;</pre>' in page
-    square = vertices_in_base(scene, '/arm/base/body_0/0')
+    square = vertices_in_base(scene, '/cell/0/0')
     normal = (PLACE @ ON_BODY).matrix()[:3, 2]
     heights = (square - (PLACE @ ON_BODY).position) @ normal
     assert heights.max() == pytest.approx(0.0, abs=1e-6)
     assert 1.0 < np.ptp(square, axis=0).max() < 3.0
-    assert len(vertices_in_base(scene, '/arm/base/body_1/0')) == 4
+    assert len(vertices_in_base(scene, '/cell/1/0')) == 4
 
 
 def test_a_refused_goal_shows_the_arm_and_both_bodies_at_the_place():
@@ -121,7 +122,7 @@ def test_a_refused_goal_shows_the_arm_and_both_bodies_at_the_place():
         for name, props in meshes(scene).items()
         if tuple(props['color']) == (210, 30, 30)
     }
-    assert red == {'/arm/base/body_0', '/arm/forearm'}
+    assert red == {'/cell/0', '/arm/forearm'}
     x, y, z = node_pose(scene, '/arm/wrist_3')[:3, 3]
     assert np.allclose((x, y, z), ARM.forward(refusal.q).position, atol=1e-6)
 
@@ -139,6 +140,55 @@ def test_meshes_of_many_triangles_are_drawn_with_fewer_that_look_the_same():
     assert np.allclose(radii, 0.5, atol=0.01)
     assert coarse.volume == pytest.approx(fine.volume, rel=0.02)
     assert len(cell_page(cell, ARM, Q, TCP, '')) < 2e6
+
+
+@pytest.mark.slow
+def test_a_part_moves_with_the_tool_from_where_it_is_taken_to_where_it_is_put_down():
+    """The tool only shifts, so the part is shifted as far as the tool while it is held."""
+    start = ARM.forward(Q) @ TCP
+    places = [np.add(start.position, shift) for shift in ((0, 0.05, 0), (0, 0.05, 0.1), (0, 0, 0))]
+    goal = Goal(
+        waypoints=tuple(
+            Waypoint(pose=Pose(tuple(place.tolist()), start.quaternion)) for place in places
+        ),
+        part_changes=(
+            PartChange(waypoint=0, body='part'),
+            PartChange(waypoint=1, body='part', action=PartAction.RELEASE),
+        ),
+    )
+    at = np.add(start.position, (0.0, 0.3, -0.3))
+    part = CellBody(
+        name='part',
+        shapes=(PlacedShape(Sphere(0.02)),),
+        T_frame_body=Pose(tuple(at.tolist())),
+    )
+    wall = CellBody(
+        name='wall',
+        shapes=(PlacedShape(Box((0.1, 2.0, 2.0))),),
+        T_frame_body=Pose((-1.3, 0.0, 0.0)),
+    )
+    options = PlanningOptions(cell=Cell(bodies=(wall, part)))
+    made = plan(goal, state_at_rest(ARM, Q, TCP), ARM, options)
+    page = motion_page(made, ARM, options)
+    for scene in scenes_of(page).values():
+        of_part, of_wrist = (
+            [
+                (time, message['position'])
+                for time, message in scene
+                if message['type'] == 'SetPositionMessage' and message['name'] == name
+            ]
+            for name in ('/cell/1', '/arm/wrist_3')
+        )
+        found = np.array([place for _, place in of_part])
+        assert np.allclose(found[0], at, atol=1e-5)
+        assert np.allclose(found[-1], at + places[1] - places[0], atol=1e-5)
+        held = {time: place for time, place in of_part[2:-1]}
+        assert len(held) > 20
+        wrist = dict(of_wrist)
+        offsets = np.array([np.subtract(held[time], wrist[time]) for time in held])
+        assert np.ptp(offsets, axis=0).max() < 1e-4
+    assert 'closest pair' in page
+    assert re.search(r'<title>[^<]*part</title>', page)
 
 
 def test_meshes_of_few_triangles_are_drawn_as_they_are():

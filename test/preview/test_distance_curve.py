@@ -37,7 +37,10 @@ def test_each_piece_has_its_pair_and_together_they_are_the_curve():
         assert np.allclose(scale * values + offset, along, atol=0.1)
         assert abs(scale) > 50.0
     assert places[:, 1].min() == places[np.argmax(distances), 1]  # up is far
-    assert lines == ['table and tool: -0.050 m at 1.50 s', '<clamp> and forearm: 0.300 m at 3.00 s']
+    assert lines == [
+        'table and tool: -0.050 m at 1.50 s',
+        '<clamp> and forearm: 0.300 m at 3.00 s',
+    ]
 
 
 def test_where_nothing_is_measured_there_is_no_curve():

@@ -17,7 +17,8 @@ from ur_cartesian_driver.motion.geometry.workspace import parse_planes
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.preview.motion_page import NO_BODIES, scene_of_plan, serve, Server
+from ur_cartesian_driver.preview.motion_page import NO_BODIES, scene_of_plan
+from ur_cartesian_driver.preview.scene import serve, Server
 
 #: The least length of an edge in the trail of the TCP [m], and the largest number of edges.
 TRAIL_STEP, TRAIL_EDGES = 0.002, 1000
