@@ -27,7 +27,9 @@ from ur_cartesian_driver.driver import Driver, MotionHandle
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.goal.known_frames import Frames
+from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter
+from ur_cartesian_driver.ros.goals.cell_marker_publisher import CellMarkerPublisher
 from ur_cartesian_driver.ros.goals.deferred_action_server import (
     DeferredActionServer,
     end_goal,
@@ -57,13 +59,17 @@ class GoalServer:
     def __init__(self, node: Node, driver: Driver, settings: Settings) -> None:
         """Start to serve."""
         self._transforms = listen_to_tf(node, settings.node.tf_max_age)
+        self._plan_markers = PlanMarkerPublisher(node, settings.frames.base)
+        #: Publishes the cell; whoever changes the cell has it published anew.
+        self.cell_markers = CellMarkerPublisher(node, driver)
         self._context = GoalContext(
             driver=driver,
             arbiter=ArmArbiter(),
             frames=settings.frames.with_transforms(self._transforms),
             clock=node.get_clock(),
             settings=settings,
-            show=PlanMarkerPublisher(node, settings.frames.base).publish,
+            show=self._show,
+            show_refusal=self.cell_markers.publish,
         )
         # Guards ``_closing`` and ``_runs``.
         self._lock = threading.Lock()
@@ -74,6 +80,10 @@ class GoalServer:
         self._servers: dict[str, Any] = {
             action.name: self._serve(node, action) for action in installed_actions()
         }
+
+    def _show(self, plan: Plan) -> None:
+        self._plan_markers.publish(plan)
+        self.cell_markers.forget_refusal()
 
     def _serve(self, node: Node, action: GoalAction) -> DeferredActionServer:
         return DeferredActionServer(  # type: ignore[no-untyped-call]  # rclpy's

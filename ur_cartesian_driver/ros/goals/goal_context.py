@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from rclpy.clock import Clock
 
 from ur_cartesian_driver.driver import Driver
+from ur_cartesian_driver.motion.errors import CollisionPredicted
 from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter
@@ -27,6 +28,8 @@ class GoalContext:
     settings: Settings
     #: Shows a plan; called in the threads of goals.
     show: Callable[[Plan], None]
+    #: Shows what a refused goal would touch; called in the threads of goals.
+    show_refusal: Callable[[CollisionPredicted], None]
 
     def now(self) -> int:
         """Return the time of the node's clock [ns]."""

@@ -18,6 +18,7 @@ from typing import Any
 from ur_cartesian_driver.driver import MotionHandle
 from ur_cartesian_driver.motion.errors import (
     Cancelled,
+    CollisionPredicted,
     DriverError,
     ErrorCode,
     GoalRefused,
@@ -233,7 +234,11 @@ class GoalRun:
         return self._plan(self.action.resolved(goal, self.handle.request, self._context))
 
     def _plan(self, goal: AnyGoal) -> Plan:
-        plan = self._context.driver.plan(goal)
+        try:
+            plan = self._context.driver.plan(goal)
+        except CollisionPredicted as refusal:
+            self._context.show_refusal(refusal)
+            raise
         self._check_wanted()
         return plan
 
