@@ -15,9 +15,11 @@ from concurrent.futures import Future
 import contextlib
 from dataclasses import replace
 import logging
+import threading
 
 from ur_cartesian_driver.driver.appender import Appender, encode_part
 from ur_cartesian_driver.driver.callbacks import LOG
+from ur_cartesian_driver.driver.changeable_cell import ChangeableCell
 from ur_cartesian_driver.driver.ipc.channel import (
     ArmSetup,
     Configure,
@@ -48,6 +50,7 @@ from ur_cartesian_driver.driver.recordings.recorder import plan_metadata
 from ur_cartesian_driver.driver.reported_robot import ReportedRobot
 from ur_cartesian_driver.driver.robot_services import RobotServices
 from ur_cartesian_driver.driver.running_motions import RunningMotions
+from ur_cartesian_driver.driver.running_path import RunningPath
 from ur_cartesian_driver.execution.goal.motion_job import job_from_plan, MotionJob
 from ur_cartesian_driver.execution.goal.temporary_tcp import same_tcp
 from ur_cartesian_driver.execution.goal.timeouts import STOP_TIMEOUT
@@ -93,7 +96,7 @@ LOOP_LOST = 'The robot loop ended unexpectedly, or hangs; the robot program stop
 CANCEL_TIMEOUT = 2.0 * STOP_TIMEOUT + 1.0
 
 
-class Driver(RobotServices, InteractiveMotions):
+class Driver(RobotServices, InteractiveMotions, ChangeableCell):
     """
     The driver of one robot; thread-safe. Open it, or use it as a context manager.
 
@@ -142,6 +145,7 @@ class Driver(RobotServices, InteractiveMotions):
         )
         self._send = self._loop.send
         self._running = RunningMotions(self._loop)
+        self._cell_lock = threading.Lock()
         #: Whether a loop that replaces a lost one may upload the robot program.
         self._may_upload = True
 
@@ -284,6 +288,7 @@ class Driver(RobotServices, InteractiveMotions):
 
         :raises RobotNotReady: the robot program is not connected, a motion is running, or the plan
             was made for another robot program.
+        :raises GoalRefused: the cell has changed since the plan was made, and it would touch.
         :raises LocalProtocolError: a value of the plan does not fit into a message.
         """
         if plan.older_program != self.config.dialect.older_program:
@@ -291,12 +296,19 @@ class Driver(RobotServices, InteractiveMotions):
                 'The plan was made for another robot program than the one that runs; make it with '
                 'Driver.plan().'
             )
+        planned_in = plan.options.cell if isinstance(plan, ArmPlan) else None
+        cell = self._check_cell_of(plan, planned_in)
         if plan.goal.keep_open:
             options = self._options_for(self._require(self.state))
             part = plan_first_part(plan, self.arm, options)
             points, job = encode_part(part)
-            return self._start_motion(plan, points, job, on_progress, part=part)
-        return self._start_motion(plan, encode_plan(plan), job_from_plan(plan), on_progress)
+            motion = self._start_motion(plan, points, job, on_progress, part=part)
+        else:
+            points, job = encode_plan(plan), job_from_plan(plan)
+            motion = self._start_motion(plan, points, job, on_progress)
+        if self.options.cell is not cell:
+            self._check_running_soon()
+        return motion
 
     def execute(
         self,
@@ -474,21 +486,38 @@ class Driver(RobotServices, InteractiveMotions):
             else '',
         )
         data = pack_parts(request)
-        active = ActiveMotion(number, plan, on_progress, self._send, self._log)
+        active = ActiveMotion(
+            number,
+            plan,
+            on_progress,
+            self._send,
+            self._log,
+            path=RunningPath(plan, job.spline, self._take_part_change) if plan.segments else None,
+        )
         if job.feed_override is not None:
             active.motion.feed_problem = (
                 HAS_FEED_INPUT if self.config.feed_override_input else None
             )
         if part is not None:
-            active.motion.appender = self._make_appender(active.motion, part)
+            active.motion.appender = self._make_appender(active, part)
         self._running.start(active, data, lambda: self.status.not_ready())
         return active.motion
 
-    def _make_appender(self, motion: MotionHandle, part: AppendPlan) -> Appender:
+    def _make_appender(self, active: ActiveMotion, part: AppendPlan) -> Appender:
         """Return the appender, which plans and offers the points appended to a goal."""
+        motion, cell = active.motion, self.options.cell
 
         def planning_inputs() -> tuple[Arm, PlanningOptions]:
-            return self.arm, self._options_for(self._require(self.state))
+            nonlocal cell
+            options = self._options_for(self._require(self.state))
+            cell = options.cell
+            return self.arm, options
+
+        def on_appended(appended: AppendPlan, job: MotionJob) -> None:
+            if active.path is not None:
+                active.path.append(appended.plan, appended.start_time, job.spline)
+            if self.options.cell is not cell:
+                self._check_running_soon()
 
         return Appender(
             motion.number,
@@ -496,6 +525,7 @@ class Driver(RobotServices, InteractiveMotions):
             send=self._send,
             planning_inputs=planning_inputs,
             progress=lambda: motion.progress,
+            on_appended=on_appended,
         )
 
     def _start_stationary(

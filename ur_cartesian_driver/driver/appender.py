@@ -84,6 +84,7 @@ class Appender:
         planning_inputs: Callable[[], tuple[Arm, PlanningOptions]],
         send: Callable[[AppendToMotion], None],
         progress: Callable[[], Progress | None],
+        on_appended: Callable[[AppendPlan, MotionJob], None] = lambda part, job: None,
         timeout: float = ANSWER_TIMEOUT,
     ) -> None:
         """
@@ -92,10 +93,12 @@ class Appender:
         :param opened: the plan of the first points.
         :param planning_inputs: returns the present arm and planning options.
         :param progress: returns the newest progress report of the motion.
+        :param on_appended: called with each part that the loop has accepted.
         :param timeout: how long to wait for an answer [s].
         """
         self._timeout = timeout
         self._motion = motion
+        self._on_appended = on_appended
         self._arm_and_options, self._send, self._progress = planning_inputs, send, progress
         self._goal: AppendableGoal = opened.next_goal
         self._is_open = True
@@ -175,6 +178,7 @@ class Appender:
             answer = yield self._offer(job, points, part.records_before, part.cut_time)
             if not answer.refusal:
                 self._goal = part.next_goal
+                self._on_appended(part, job)
                 return AppendResult(
                     points=part.next_goal.points,
                     first=part.next_goal.points - len(new_points.waypoints),

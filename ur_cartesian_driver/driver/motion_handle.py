@@ -20,6 +20,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
     SetPathOffset,
     TemporaryTcpSet,
 )
+from ur_cartesian_driver.driver.running_path import RunningPath
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.geometry.vectors import vector3
@@ -80,6 +81,14 @@ class MotionHandle:
         :param by: a noun phrase for the other motion, which the text of the outcome contains.
         """
         self._send(CancelMotion(motion=self.number, preempted_by=by))
+
+    def stop_before_collision(self, reason: str) -> None:
+        """
+        Stop the arm, as :meth:`cancel` does, because it would touch; the outcome is COLLISION.
+
+        :param reason: a clause for the text of the outcome.
+        """
+        self._send(CancelMotion(motion=self.number, collision=reason.rstrip('.')))
 
     def append(
         self,
@@ -210,12 +219,15 @@ class ActiveMotion:
         on_progress: OnProgress | None,
         send: Callable[[Request], None],
         log: logging.Logger = LOG,
+        *,
+        path: RunningPath | None = None,
     ) -> None:
         """
         Begin with no progress and no outcome.
 
         :param send: sends requests to the robot loop.
         :param log: takes the errors of ``on_progress``.
+        :param path: follows the progress; None = the motion has no planned path.
         """
         self._outcome: Future[Outcome] = Future()
         self._on_progress, self._log = on_progress, log
@@ -227,6 +239,7 @@ class ActiveMotion:
         self._plan_report: tuple[str, ...] | None = None
         #: The outcome of the motion; None before the motion has ended.
         self._ended: Outcome | None = None
+        self.path = path
         #: The handle that the owner holds.
         self.motion = MotionHandle(number, self._outcome, send, self.make_report)
         if plan.offset_band is not None:
@@ -260,6 +273,8 @@ class ActiveMotion:
     def report(self, progress: Progress) -> None:
         """Keep a progress report of the robot loop, and pass it on."""
         self.motion.progress = progress
+        if self.path is not None:
+            self.path.report(progress)
         if self._on_progress is not None:
             run_callback(self._on_progress, progress, self._log)
 
@@ -267,6 +282,8 @@ class ActiveMotion:
         """Deliver the outcome; any further outcome is ignored."""
         if self.motion.appender is not None:
             self.motion.appender.end()
+        if self.path is not None:
+            self.path.end(outcome)
         with self._lock:
             if self._ended is not None:
                 return

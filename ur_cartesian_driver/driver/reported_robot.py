@@ -138,10 +138,10 @@ class ReportedRobot:
         if self._has_warned_of_cell:
             return
         self._has_warned_of_cell = True
-        unchecked = []
-        if not self._options.workspace_planes:
+        unchecked, bodies = [], self._options.cell.bodies
+        if not self._options.workspace_planes and all(body.is_carried for body in bodies):
             unchecked.append('workspace_planes is empty, so no table, wall or ceiling is checked')
-        if self._options.tool_radius == 0.0:
+        if self._options.tool_radius == 0.0 and not any(body.is_on_tool for body in bodies):
             unchecked.append('tool_radius is 0, so the tool is not checked')
         if unchecked:
             self._log.warning('%s: goals may cause collisions', ', and '.join(unchecked))

@@ -83,6 +83,12 @@ class RunningMotions:
         with self._loop.lock:
             return [active.motion for active in self._motions.values()]
 
+    @property
+    def active(self) -> list[ActiveMotion]:
+        """The driver's side of the running motion, or an empty list."""
+        with self._loop.lock:
+            return list(self._motions.values())
+
     def runs(self, number: int) -> bool:
         """Return whether motion ``number`` is running."""
         return number in self._motions

@@ -64,6 +64,13 @@ class PreemptRequested:
     by: str = 'a newer motion'
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CollisionFound:
+    """What is left of the path would touch, because the cell changed; the reason is a clause."""
+
+    reason: str
+
+
 #: The name of the connection to the RTDE inputs in :class:`LinkLost`.
 INPUTS_LINK = 'RTDE inputs'
 
@@ -119,6 +126,7 @@ Event: TypeAlias = (
     | TrajectoryEnded
     | CancelRequested
     | PreemptRequested
+    | CollisionFound
     | LinkLost
     | OutputsSecured
     | ContactWatchChanged

@@ -174,6 +174,8 @@ class CancelMotion:
     motion: int
     #: The motion that preempts this one, as part of a sentence; empty = this one is cancelled.
     preempted_by: str = ''
+    #: Why what is left of the path would touch, as a clause; empty = this is not the reason.
+    collision: str = ''
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

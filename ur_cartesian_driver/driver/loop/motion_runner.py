@@ -66,6 +66,7 @@ from ur_cartesian_driver.execution.goal.temporary_tcp import same_tcp
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,
+    CollisionFound,
     ContactWatchChanged,
     Event,
     INPUTS_LINK,
@@ -224,9 +225,13 @@ class MotionRunner:
 
     def cancel(self, request: CancelMotion) -> None:
         """Stop the requested motion, if it is running."""
-        by = request.preempted_by
-        if request.motion == self._number:
-            self._recorder.add_event('cancel', by and f'preempted by {by}')
+        if request.motion != self._number:
+            return
+        by, collision = request.preempted_by, request.collision
+        self._recorder.add_event('cancel', collision or (by and f'preempted by {by}'))
+        if collision:
+            self.handle_event(CollisionFound(reason=collision))
+        else:
             self.handle_event(PreemptRequested(by=by) if by else CancelRequested())
 
     def close(self) -> None:

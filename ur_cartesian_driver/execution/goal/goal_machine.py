@@ -247,6 +247,8 @@ class GoalMachine:
                 return GoalSignal.CANCEL, reason
             case events.PreemptRequested(by=by):
                 return GoalSignal.PREEMPT, f'{by} took the place of this one'
+            case events.CollisionFound(reason=reason):
+                return GoalSignal.COLLISION, reason
             case events.LinkLost(link='program', reason=reason):
                 return GoalSignal.PROGRAM_STOPPED, f'the robot program hung up: {reason}'
             case events.LinkLost(link=link, reason=reason):

@@ -12,8 +12,8 @@ state, and the error code if the signal decides the outcome of the goal.
   answer of the robot program. If there is nothing to prepare, ARMED follows at once.
 * **MOVING**: the robot program runs points. Its result SUCCESS leads to SETTLING. A cause that
   stops the arm by itself (safety, connection) ends the goal at once, because the robot program
-  would not read our CANCEL; our own reasons to stop (cancel, preemption, tolerance) lead to
-  CANCELLING.
+  would not read our CANCEL; our own reasons to stop (cancel, preemption, tolerance, a change of
+  the cell) lead to CANCELLING.
 * **RUNNING_OUT**: no more points came in time for an open goal (keep_open). The ending, which
   brings the arm to rest at or after the last known point, has been sent, with the number of
   records. Points that come now wait for the program's SUCCESS, and are executed from rest.
@@ -131,7 +131,8 @@ _RESULTS = (
     GoalSignal.CONTACT,
     GoalSignal.TOUCHED,
 )
-_USER_STOPS = (GoalSignal.CANCEL, GoalSignal.PREEMPT)
+#: Stops that users, or the owner of the goal, ask for.
+_REQUESTED_STOPS = (GoalSignal.CANCEL, GoalSignal.PREEMPT, GoalSignal.COLLISION)
 
 #: Transitions if the arm stops by itself: this deeper reason replaces an outcome that is already
 #: decided and waits for the stop.
@@ -142,7 +143,7 @@ _ON_STOP = {
 _WHILE_RUNNING = {
     **_ON_STOP,
     **_decide(GoalState.RESTORING, GoalSignal.CANCELED, GoalSignal.FAILURE, GoalSignal.CONTACT),
-    **_decide(GoalState.CANCELLING, *_USER_STOPS, GoalSignal.VIOLATION, GoalSignal.DEVIATION),
+    **_decide(GoalState.CANCELLING, *_REQUESTED_STOPS, GoalSignal.VIOLATION, GoalSignal.DEVIATION),
     **_decide(GoalState.CANCELLING, GoalSignal.STALE, GoalSignal.TOUCHED),
     **_decide(GoalState.ENDED, GoalSignal.STANDSTILL),
 }
@@ -155,7 +156,7 @@ TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = {
         **_ON_STOP,
         **_to(GoalState.ARMING, *_RESULTS),
         **_to(GoalState.MOVING, GoalSignal.ARMED),
-        **_decide(GoalState.RESTORING, *_USER_STOPS, GoalSignal.STALE, GoalSignal.NOT_READY),
+        **_decide(GoalState.RESTORING, *_REQUESTED_STOPS, GoalSignal.STALE, GoalSignal.NOT_READY),
         **_decide(GoalState.RESTORING, GoalSignal.TOUCHED),
     },
     GoalState.MOVING: {
@@ -172,37 +173,37 @@ TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = {
         **_to(GoalState.AWAITING_POINTS, *_RESULTS),
         **_to(GoalState.MOVING, GoalSignal.APPENDED),
         **_to(GoalState.SETTLING, GoalSignal.NO_MORE_POINTS),
-        **_decide(GoalState.RESTORING, *_USER_STOPS, GoalSignal.DEVIATION, GoalSignal.STALE),
+        **_decide(GoalState.RESTORING, *_REQUESTED_STOPS, GoalSignal.DEVIATION, GoalSignal.STALE),
         **_decide(GoalState.RESTORING, GoalSignal.ABANDONED, GoalSignal.TOUCHED),
     },
     GoalState.SETTLING: {
         **_ON_STOP,
         **_to(GoalState.SETTLING, *_RESULTS),
-        **_decide(GoalState.RESTORING, *_USER_STOPS, GoalSignal.DEVIATION, GoalSignal.STALE),
+        **_decide(GoalState.RESTORING, *_REQUESTED_STOPS, GoalSignal.DEVIATION, GoalSignal.STALE),
         **_decide(GoalState.RESTORING, GoalSignal.SETTLED, GoalSignal.NOT_SETTLED),
         **_decide(GoalState.RESTORING, GoalSignal.TOUCHED),
     },
     GoalState.CANCELLING: {
         **_ON_STOP,
-        **_to(GoalState.CANCELLING, *_RESULTS, *_USER_STOPS),
+        **_to(GoalState.CANCELLING, *_RESULTS, *_REQUESTED_STOPS),
         **_to(GoalState.COMING_TO_REST, GoalSignal.CANCELED),
         **_to(GoalState.ENDED, GoalSignal.UNANSWERED),
         **_decide(GoalState.ENDED, GoalSignal.UNCONFIRMED),
     },
     GoalState.COMING_TO_REST: {
         **_ON_STOP,
-        **_to(GoalState.COMING_TO_REST, *_RESULTS, *_USER_STOPS),
+        **_to(GoalState.COMING_TO_REST, *_RESULTS, *_REQUESTED_STOPS),
         **_to(GoalState.RESTORING, GoalSignal.AT_REST),
         **_decide(GoalState.ENDED, GoalSignal.UNCONFIRMED),
     },
     GoalState.RESTORING: {
-        **_to(GoalState.RESTORING, *_RESULTS, *_USER_STOPS),
+        **_to(GoalState.RESTORING, *_RESULTS, *_REQUESTED_STOPS),
         **_to(GoalState.ENDED, *_STOPS, GoalSignal.PROGRAM_STOPPED),
         **_to(GoalState.ENDED, GoalSignal.RESTORED, GoalSignal.TIMEOUT),
     },
     GoalState.PROGRAM_LOST: {
         **_decide(GoalState.ENDED, *_STOPS),
-        **_to(GoalState.PROGRAM_LOST, *_RESULTS, *_USER_STOPS, GoalSignal.PROGRAM_STOPPED),
+        **_to(GoalState.PROGRAM_LOST, *_RESULTS, *_REQUESTED_STOPS, GoalSignal.PROGRAM_STOPPED),
         **_to(GoalState.ENDED, GoalSignal.TIMEOUT),
     },
     GoalState.ENDED: {},

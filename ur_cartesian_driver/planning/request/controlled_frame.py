@@ -19,7 +19,7 @@ import numpy as np
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, cross_rows, normalized_rows
-from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
+from ur_cartesian_driver.motion.goal.goal import ArcMode, Goal, SegmentType
 from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, rows_where
 from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
@@ -90,7 +90,7 @@ def retarget_to_tcp(
     )
 
 
-def tool_tips(goal: GoalTable, T_flange_active: Pose) -> tuple[Pose, ...]:
+def tool_tips(goal: Goal | GoalTable, T_flange_active: Pose) -> tuple[Pose, ...]:
     """
     Return the tool tips to check for collisions: the active TCP and the controlled frame.
 

@@ -1,0 +1,220 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The cell of a driver, which its owner and its goals change while it runs.
+
+The options of the driver are replaced as a whole, so that every plan has one cell. What is left of
+a running motion is checked in the new cell by a thread of its own: the robot loop never waits for
+it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+import logging
+import threading
+
+from ur_cartesian_driver.driver.motion_handle import ActiveMotion
+from ur_cartesian_driver.driver.running_motions import RunningMotions
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.cell.cell import Cell, CellBody, DEFAULT_CLEARANCE
+from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Joints
+from ur_cartesian_driver.motion.goal.goal import PartChange
+from ur_cartesian_driver.motion.plan.plan import Plan
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.cell_stretches import attached, changed, released
+from ur_cartesian_driver.planning.preflight.path_left import PathLeft
+from ur_cartesian_driver.planning.request.point_events.part_changes import check_part_changes
+
+
+class ChangeableCell(ABC):
+    """The part of a driver that keeps its cell."""
+
+    options: PlanningOptions
+    _log: logging.Logger
+    _running: RunningMotions
+    #: Guards the replacement of the options, and the attributes below; set by the driver.
+    _cell_lock: threading.Lock
+    #: Counts the changes that running motions have to be checked for.
+    _cell_changes = 0
+    _is_checking = False
+
+    @property
+    @abstractmethod
+    def arm(self) -> Arm:
+        """The arm's kinematics."""
+
+    @property
+    @abstractmethod
+    def state(self) -> RobotState | None:
+        """The newest robot state."""
+
+    @property
+    def cell(self) -> Cell:
+        """The bodies of the cell now, with those that the tool carries."""
+        return self.options.cell
+
+    def change_cell(
+        self,
+        bodies: Cell | Iterable[CellBody] = (),
+        *,
+        remove: Iterable[str] = (),
+        attach: Iterable[str] = (),
+        release: Iterable[str] = (),
+    ) -> Cell:
+        """
+        Change the bodies of the cell; make all changes, or none.
+
+        A running goal of which the rest would touch now is stopped soon after, as COLLISION.
+
+        :param bodies: bodies to add; those of the same names are replaced. The pairs of a cell
+            that may touch, and its clearance for these bodies, come along.
+        :param remove: names of bodies to remove first.
+        :param attach: names of bodies that the tool carries from now on, from where they are.
+        :param release: names of bodies that stay where the tool has them now.
+        :returns: the new cell.
+        :raises InvalidGoal: a change cannot be made; the text says why.
+        :raises RobotNotReady: the robot does not report where the tool is.
+        """
+        with self._cell_lock:
+            cell = self.options.cell
+            for name in _names('remove', remove):
+                cell = _made('remove', cell.without, name)
+            cell = _with_bodies(cell, bodies)
+            for what, make, names in (
+                ('attach', attached, attach),
+                ('release', released, release),
+            ):
+                for name in _names(what, names):
+                    state = self._state_with_tool()
+                    where = self.arm, state.actual_q, state.T_flange_tcp
+                    cell = _made(what, make, cell, name, *where)
+            self.options = replace(self.options, cell=cell)
+        self._check_running_soon()
+        return cell
+
+    def _state_with_tool(self) -> RobotState:
+        state = self.state
+        if state is None:
+            raise RobotNotReady(
+                'The robot does not report its state, so it is not known where the tool is.'
+            )
+        return state
+
+    # ---- changes by goals ---------------------------------------------------------------------
+
+    def _take_part_change(self, change: PartChange, q: Joints, T_flange_tcp: Pose) -> None:
+        """Take over a change at a point that the arm has passed; ``q``: the joints there [rad]."""
+        with self._cell_lock:
+            try:
+                cell = changed(self.options.cell, change, self.arm, q, T_flange_tcp)
+            except ValueError as error:  # the cell has been changed meanwhile
+                self._log.warning(
+                    'The cell stays as it is at point %d of the goal: %s.', change.waypoint, error
+                )
+            else:
+                self.options = replace(self.options, cell=cell)
+
+    # ---- plans and motions in another cell ----------------------------------------------------
+
+    def _check_cell_of(self, plan: Plan, planned_in: Cell | None) -> Cell:
+        """
+        Check a plan that was made in another cell, and return the present cell.
+
+        :param planned_in: the cell of the plan; None = it is not known.
+        :raises GoalRefused: the plan would touch, or changes bodies that are not there.
+        """
+        options = self.options
+        if planned_in == options.cell:
+            return options.cell
+        if options.cell or plan.goal.part_changes:
+            check_part_changes(plan.goal, options.cell)
+            try:
+                PathLeft.of(plan).check(self.arm, options, plan.start, plan.goal.part_changes)
+            except GoalRefused as error:
+                raise error.reworded(f'The cell is not that of the plan: {error}') from None
+        return options.cell
+
+    def _check_running_soon(self) -> None:
+        """Have a thread check what is left of the running motion."""
+        with self._cell_lock:
+            self._cell_changes += 1
+            if self._is_checking or not self._running.active:
+                return
+            self._is_checking = True
+        threading.Thread(target=self._check_running, name='cell check', daemon=True).start()
+
+    def _check_running(self) -> None:
+        while True:
+            with self._cell_lock:
+                changes = self._cell_changes
+            for active in self._running.active:
+                if reason := self._touches(active):
+                    active.motion.stop_before_collision(reason)
+            with self._cell_lock:
+                if changes == self._cell_changes:
+                    self._is_checking = False
+                    return
+
+    def _touches(self, active: ActiveMotion) -> str:
+        """Return why a motion cannot go on in the present cell, as a clause; '' = it can."""
+        try:
+            if active.path is not None:
+                active.path.check(self.arm, self.options)
+        except GoalRefused as error:
+            return f'the cell has changed, and what is left of the path would touch: {error}'
+        except Exception as error:  # a motion that cannot be checked must not go on
+            self._log.exception('checking a motion in the changed cell failed')
+            return (
+                'the cell has changed, and what is left of the path cannot be checked '
+                f'({type(error).__name__}: {error})'
+            )
+        return ''
+
+
+def _with_bodies(cell: Cell, bodies: Cell | Iterable[CellBody]) -> Cell:
+    """
+    Return a cell with more bodies.
+
+    :raises InvalidGoal: something else than a body is given.
+    """
+    given = list(bodies.bodies if isinstance(bodies, Cell) else bodies)
+    for body in given:
+        if not isinstance(body, CellBody):
+            raise InvalidGoal('bodies', f'contains {body!r:.60}, which is no CellBody')
+    if not isinstance(bodies, Cell):
+        return cell.with_bodies(given)
+    if bodies.clearance != DEFAULT_CLEARANCE:
+        given = [replace(body, clearance=bodies.clearance_of(body)) for body in given]
+    cell = cell.with_bodies(given)
+    return replace(cell, may_touch=cell.may_touch | bodies.may_touch)
+
+
+def _names(what: str, names: Iterable[str]) -> list[str]:
+    """
+    Return names in a list.
+
+    :raises InvalidGoal: a single text is given, or something else than texts.
+    """
+    given = [names] if isinstance(names, str) else list(names)
+    for name in given:
+        if not isinstance(name, str):
+            raise InvalidGoal(what, f'contains {name!r:.60}, which is no name of a body')
+    return given
+
+
+def _made(what: str, make: Callable[..., Cell], *arguments: object) -> Cell:
+    """
+    Return the cell after a change.
+
+    :raises InvalidGoal: the change cannot be made.
+    """
+    try:
+        return make(*arguments)
+    except ValueError as error:
+        raise InvalidGoal(what, f'is not possible: {str(error).rstrip(".")}') from None

@@ -1,0 +1,102 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The path of a running motion: what is left of it, and how it changes the cell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import inf
+import threading
+from typing import TypeAlias
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Joints
+from ur_cartesian_driver.motion.goal.goal import PartChange
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.plan import Plan
+from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning.preflight.path_left import joints_at, PathLeft
+from ur_cartesian_driver.planning.request.point_events.goal_rest import NO_FRACTION
+
+#: Takes a change of the cell, with the joints at its point [rad] and the active TCP.
+TakePartChange: TypeAlias = Callable[[PartChange, Joints, Pose], None]
+
+
+class RunningPath:
+    """The planned path of a motion, part after part; thread-safe."""
+
+    def __init__(
+        self, plan: Plan, spline: JointSpline | None, take_part_change: TakePartChange
+    ) -> None:
+        """
+        Begin at the start of a plan.
+
+        :param spline: the joints over time of a goal in SERVO.
+        :param take_part_change: called at each point at which the cell changes.
+        """
+        self._start, self._take_part_change = plan.start, take_part_change
+        self._T_flange_tcp = plan.T_flange_tcp or plan.T_flange_active
+        #: Guards the attributes below.
+        self._lock = threading.Lock()
+        self._paths = [PathLeft.of(plan, spline)]
+        #: The changes to come, each with the joints at its point [rad].
+        self._part_changes = [
+            (change, joints_at(plan, change.waypoint))
+            for change in sorted(plan.goal.part_changes, key=lambda each: each.waypoint)
+        ]
+        #: The newest progress; None before the first report.
+        self._progress: Progress | None = None
+
+    def report(self, progress: Progress) -> None:
+        """Keep a progress report, and change the cell at the points that the arm has left."""
+        self._progress = progress
+        self._pass_points(float(progress.waypoint))
+
+    def end(self, outcome: Outcome) -> None:
+        """Change the cell at the points that the arm had left when the motion ended."""
+        if outcome.succeeded:
+            self._pass_points(inf)
+        elif outcome.stopped is not None:
+            self._pass_points(outcome.stopped.point + outcome.stopped.fraction - NO_FRACTION)
+
+    def _pass_points(self, place: float) -> None:
+        """
+        Change the cell at the points before a place.
+
+        :param place: a number ``k + u``: the fraction u of the segment to point k.
+        """
+        if not self._part_changes:
+            return
+        with self._lock:
+            passed = [each for each in self._part_changes if each[0].waypoint + 1.0 <= place]
+            del self._part_changes[: len(passed)]
+        for change, q in passed:
+            self._take_part_change(change, q, self._T_flange_tcp)
+
+    def append(self, plan: Plan, start_time: float, spline: JointSpline | None) -> None:
+        """
+        Add appended points.
+
+        :param start_time: when they take the place of what was planned before [s].
+        """
+        now = 0.0 if self._progress is None else self._progress.time
+        with self._lock:
+            paths = [replace(path, until=min(path.until, start_time)) for path in self._paths]
+            self._paths = [path for path in paths if path.end > now]
+            self._paths.append(PathLeft.of(plan, spline))
+
+    def check(self, arm: Arm, options: PlanningOptions) -> None:
+        """
+        Check what is left of the path in another cell.
+
+        :raises GoalRefused: it would touch; or its joints are not known.
+        """
+        progress = self._progress
+        time, q = (0.0, self._start) if progress is None else (progress.time, progress.desired_q)
+        with self._lock:
+            paths, changes = list(self._paths), [change for change, _ in self._part_changes]
+        for path in paths:
+            path.check(arm, options, q, changes, time)

@@ -1,0 +1,97 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What is left of a planned path, to check it in another cell.
+
+Plans are checked when they are made. If the cell changes before the arm moves or while it moves,
+only the distances from the bodies of the cell are checked again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Self
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
+from ur_cartesian_driver.motion.goal.goal import PartChange
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.plan import Plan, ReferencePath
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.clearance import clearance_lines, JointSamples
+from ur_cartesian_driver.planning.preflight.offset_band_check import dense_path, path_joints
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
+from ur_cartesian_driver.planning.request.controlled_frame import tool_tips
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PathLeft:
+    """A path, and where it ends if another one takes its place."""
+
+    reference: ReferencePath
+    #: The joints over time of a goal in SERVO; None = they follow from the path of the tool.
+    spline: JointSpline | None
+    T_flange_tcp: Pose
+    tool_tips: tuple[Pose, ...]
+    #: Time from which another path is in effect [s].
+    until: float = inf
+
+    @classmethod
+    def of(cls, plan: Plan, spline: JointSpline | None = None) -> Self:
+        """Return the whole path of a plan; ``spline``: its joints over time, if they are known."""
+        return cls(
+            reference=plan.reference,
+            spline=spline,
+            T_flange_tcp=plan.T_flange_tcp or plan.T_flange_active,
+            tool_tips=tool_tips(plan.goal, plan.T_flange_active),
+        )
+
+    @property
+    def end(self) -> float:
+        """The time at which the path ends [s]."""
+        return min(float(self.reference.time[-1]), self.until)
+
+    def check(
+        self,
+        arm: Arm,
+        options: PlanningOptions,
+        q: Joints,
+        part_changes: Sequence[PartChange],
+        time: float = 0.0,
+    ) -> None:
+        """
+        Check the path from a time on.
+
+        :param options: with the cell as it is at this time.
+        :param q: the joint positions at this time [rad].
+        :param part_changes: those that are still to come.
+        :param time: since the start of the goal [s].
+        :raises GoalRefused: the path would touch; or the joints along it are not known.
+        """
+        path = self.reference.since(time)
+        if len(path.time) < 2 or self.end <= time:
+            return
+        path = dense_path(path)
+        if self.spline is not None:
+            joints = self.spline.rows(path.time)[0]
+        else:
+            kinematics = TcpKinematics(arm, self.T_flange_tcp)
+            joints, _ = path_joints(path, kinematics, q)
+        ahead = (path.time >= time) & (path.time <= self.until)
+        samples = JointSamples(path.point[ahead], path.fraction[ahead], joints[ahead])
+        if len(samples.q):
+            # The arm itself and the planes are as they were when the path was planned.
+            only_cell = replace(options, self_collision='off', workspace_planes=())
+            clearance_lines(arm, self.tool_tips, only_cell, samples, q, part_changes)
+
+
+def joints_at(plan: Plan, waypoint: int) -> Joints:
+    """Return the joint positions at a point at which the arm stops [rad]."""
+    rows = plan.rows
+    row = int(np.searchsorted(rows.waypoints, waypoint, side='right')) - 1
+    return plan.start if row < 0 else vector6(rows.joints[row].tolist())
