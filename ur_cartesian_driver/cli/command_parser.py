@@ -260,6 +260,17 @@ def _add_send(command: CommandParser) -> None:
     )
 
 
+def _add_pose(command: CommandParser) -> None:
+    """Add where the arm stands, and its TCP."""
+    command.add_argument(
+        '--joints',
+        type=joints,
+        metavar='Q1,...,Q6',
+        help='initial joint positions [rad]; by default home',
+    )
+    _add_tcp(command, ', as the pendant shows it [m, rad]; by default the flange')
+
+
 def _add_planning(command: CommandParser, optional: bool = False) -> None:
     """Add the goal, and the options that give what a driver would read from its robot."""
     _add_goal(command, optional)
@@ -268,13 +279,7 @@ def _add_planning(command: CommandParser, optional: bool = False) -> None:
         choices=sorted(MODELS),
         help='model of the robot; by default the parameter ur_type',
     )
-    command.add_argument(
-        '--joints',
-        type=joints,
-        metavar='Q1,...,Q6',
-        help='initial joint positions [rad]; by default home',
-    )
-    _add_tcp(command, ', as the pendant shows it [m, rad]; by default the flange')
+    _add_pose(command)
     command.add_argument(
         '--params-file',
         type=Path,
@@ -339,6 +344,38 @@ def _add_show(command: CommandParser) -> None:
         default=8080,
         help='port of that page, or the next free one',
     )
+
+
+def _add_cell(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import cell_command
+
+    command.set_defaults(run=cell_command.show_or_check)
+    command.add_argument(
+        'what',
+        choices=('show', 'check'),
+        help='show = list the bodies; check = find those that the arm, where it stands, or what '
+        'it carries is too close to; the exit status is then 1',
+    )
+    command.add_argument('file', help='the cell, like cell.yaml')
+    command.add_argument(
+        '--html',
+        type=argument_types.output_file,
+        metavar='PAGE',
+        help='HTML file that shows the cell and the arm; bodies that touch are red',
+    )
+    add_model(command, '--model')
+    _add_pose(command)
+    _add_length(
+        command,
+        'tool-radius',
+        0.0,
+        'of the cylinder from flange to TCP, the parameter tool_radius',
+    )
+    add_calibration(command)
+    command.add_argument(
+        '--robot-ip', metavar='ADDRESS', help='take joint positions and TCP of this robot instead'
+    )
+    add_ports(command, 'its RTDE port', rtde=30004)
 
 
 def _add_sweep(command: CommandParser) -> None:
@@ -731,6 +768,10 @@ COMMANDS: dict[str, tuple[str, Callable[[CommandParser], None]]] = {
     'show': (
         'plan a goal without a robot, and show the arm on its path in the browser',
         _add_show,
+    ),
+    'cell': (
+        'list the bodies of a cell, draw them, and find those that the resting arm touches',
+        _add_cell,
     ),
     'sweep': (
         'plan a goal at other places, on other robots and calibrations, and print the margins',
