@@ -145,6 +145,17 @@ HANDED_BACK = Row(
     },
 )
 
+#: The driver's own thread finds it, some tens of milliseconds after the call.
+IN_THE_WAY = Row(
+    fault='a body of the cell comes into the way of what is left (`~/change_cell`)',
+    cause=('body in the way',),
+    code=E.COLLISION,
+    result_within=0.7,
+    rest_within=0.7,
+    phases=(*MOVING, 'cancelling'),
+    differs={'cancelling': {'code': E.CANCELLED}},
+)
+
 #: States come ever later; so does the one that shows the arm at rest.
 CONGESTED = Row(
     fault='RTDE carries less data than needed',
@@ -195,6 +206,7 @@ HEADLESS = (
         differs=REFUSED,
     ),
     HANDED_BACK,
+    IN_THE_WAY,
     Row(
         fault="another client's program replaces ours",
         cause=('foreign_motion z 0.02',),

@@ -141,8 +141,8 @@ class Owner:
         self.send(CallRobot(number=self._calls, call=call))
         return self._calls
 
-    def cancel(self):
-        self.send(CancelMotion(motion=len(self.motions)))
+    def cancel(self, *, collision=''):
+        self.send(CancelMotion(motion=len(self.motions), collision=collision))
 
     def hang_up(self):
         self._writer.close()

@@ -145,7 +145,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         )
         self._send = self._loop.send
         self._running = RunningMotions(self._loop)
-        self._cell_lock = threading.Lock()
+        self._cell_lock, self._cell_listeners = threading.Lock(), []
         #: Whether a loop that replaces a lost one may upload the robot program.
         self._may_upload = True
 

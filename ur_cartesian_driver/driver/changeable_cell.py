@@ -16,6 +16,7 @@ from dataclasses import replace
 import logging
 import threading
 
+from ur_cartesian_driver.driver.callbacks import run_callback
 from ur_cartesian_driver.driver.motion_handle import ActiveMotion
 from ur_cartesian_driver.driver.running_motions import RunningMotions
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -40,6 +41,7 @@ class ChangeableCell(ABC):
     _running: RunningMotions
     #: Guards the replacement of the options, and the attributes below; set by the driver.
     _cell_lock: threading.Lock
+    _cell_listeners: list[Callable[[Cell], None]]
     #: Counts the changes that running motions have to be checked for.
     _cell_changes = 0
     _is_checking = False
@@ -58,6 +60,10 @@ class ChangeableCell(ABC):
     def cell(self) -> Cell:
         """The bodies of the cell now, with those that the tool carries."""
         return self.options.cell
+
+    def add_cell_listener(self, callback: Callable[[Cell], None]) -> None:
+        """Call back with each new cell, in the thread that has changed it."""
+        self._cell_listeners.append(callback)
 
     def change_cell(
         self,
@@ -96,7 +102,12 @@ class ChangeableCell(ABC):
                     cell = _made(what, make, cell, name, *where)
             self.options = replace(self.options, cell=cell)
         self._check_running_soon()
+        self._tell_listeners(cell)
         return cell
+
+    def _tell_listeners(self, cell: Cell) -> None:
+        for callback in self._cell_listeners:
+            run_callback(callback, cell, self._log)
 
     def _state_with_tool(self) -> RobotState:
         state = self.state
@@ -117,8 +128,9 @@ class ChangeableCell(ABC):
                 self._log.warning(
                     'The cell stays as it is at point %d of the goal: %s.', change.waypoint, error
                 )
-            else:
-                self.options = replace(self.options, cell=cell)
+                return
+            self.options = replace(self.options, cell=cell)
+        self._tell_listeners(cell)
 
     # ---- plans and motions in another cell ----------------------------------------------------
 

@@ -40,6 +40,7 @@ from ur_cartesian_driver.ros.parameters.node_parameters import (
 )
 from ur_cartesian_driver.ros.parameters.parameter_table import ParameterError, ParameterValue
 from ur_cartesian_driver.ros.services.append_service import AppendService
+from ur_cartesian_driver.ros.services.cell_service import CellService
 from ur_cartesian_driver.ros.services.command_services import CommandServices
 from ur_cartesian_driver.ros.services.contact_action import ContactAction
 from ur_cartesian_driver.ros.state.joint_states_check import JointStatesCheck
@@ -119,6 +120,7 @@ class CartesianDriverNode(Node):
         self._components.append(self._publisher)
         self.action_server = GoalServer(self, self.driver, settings)
         self._components.append(self.action_server)
+        self.driver.add_cell_listener(lambda _: self.action_server.cell_markers.publish())
         self._components.append(AppendService(self, self.action_server))
         self.path_offsets = PathOffsetSubscriber(self, self.action_server)
         self.feed_overrides = FeedOverrideSubscriber(self, self.action_server)
@@ -136,6 +138,7 @@ class CartesianDriverNode(Node):
         self._components.append(FreedriveService(self, self.driver, arbiter))
         self.contact_action = ContactAction(self, self.driver)
         self._components.append(self.contact_action)
+        self._components.append(CellService(self, self.driver))
         self._publisher.start()
         self._call_services = CommandServices(self, self.driver, self._is_idle)
         steady_timer(

@@ -193,9 +193,9 @@ class GoalRun:
         arbiter = self._context.arbiter
         if not arbiter.acquire(self.arm_request):
             if isinstance(goal, JointGoal):
-                check_joint_goal(goal, self._context.settings.planning)
+                check_joint_goal(goal, self._context.driver.options)
             else:
-                check(goal, self._context.settings.planning)
+                check(goal, self._context.driver.options)
             holder = arbiter.holder
             other = (
                 'Another goal is'

@@ -1,0 +1,77 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The cell of a running node, changed by its service."""
+
+from typing import Any
+
+import pytest
+from visualization_msgs.msg import MarkerArray
+
+from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS
+from ur_cartesian_driver.srv import ChangeCell
+
+pytestmark = pytest.mark.slow
+
+BODIES = """\
+cell: 1
+clearance: 0.01
+bodies:
+  post:
+    cylinder: {radius: 0.02, length: 0.3}
+    position: [0, -1.2, 0.15]
+  part:
+    box: [0.02, 0.02, 0.02]
+    position: [0, -1.3, 0.1]
+may_touch:
+- [part, tool]
+"""
+
+
+@pytest.fixture
+def change(single_cell):
+    client = single_cell.client_node.create_client(ChangeCell, '/ur_cartesian_driver/change_cell')
+    single_cell.spin_until(client.service_is_ready)
+
+    def call(**fields):
+        request = ChangeCell.Request(**fields)
+        return single_cell.await_(client.call_async(request), timeout=8.0)
+
+    yield call
+    call(remove=sorted(body.name for body in single_cell.node.driver.cell.bodies))
+
+
+def test_a_changed_cell_is_shown(single_cell, change):
+    shown: list[Any] = []
+    single_cell.client_node.create_subscription(
+        MarkerArray, '/ur_cartesian_driver/cell_markers', shown.append, LATCHED_QOS
+    )
+    change(bodies=BODIES)
+    single_cell.spin_until(lambda: shown and 'post' in {each.ns for each in shown[-1].markers})
+    change(remove=['post'])
+    single_cell.spin_until(lambda: {each.ns for each in shown[-1].markers} == {'part', ''})
+
+
+def test_bodies_come_as_the_text_of_a_file_and_all_or_nothing_changes(single_cell, change):
+    answer = change(bodies=BODIES, attach=['part'])
+    assert (answer.success, answer.message) == (True, 'The cell has post, part (tool0).')
+    cell = single_cell.node.driver.cell
+    assert cell.clearance_of(cell.body('post')) == 0.01
+    assert cell.may_touch == {frozenset({'part', 'tool'})}
+    for request, text in (
+        (
+            {'bodies': BODIES, 'remove': ['pots']},
+            'the cell has no body "pots"; did you mean post?',
+        ),
+        ({'bodies': 'cell: 1\nbodies:\n  x: {box: [1, 2]}\n'}, 'bodies'),
+        ({'bodies': '{'}, 'bodies'),
+        ({'attach': ['part']}, '"part" is on the tool already'),
+        ({'remove': ['post'], 'release': ['post']}, 'the cell has no body "post"'),
+    ):
+        refused = change(**request)
+        assert not refused.success
+        assert text in refused.message
+        assert '\n' not in refused.message
+        assert single_cell.node.driver.cell is cell
+    answer = change(release=['part'], remove=['post'])
+    assert (answer.success, answer.message) == (True, 'The cell has part.')
+    assert change(remove=['part']).message == 'The cell has no bodies.'
