@@ -70,7 +70,7 @@ def test_check_names_the_closest_pair_if_nothing_touches(write, tip, capsys):
     file = write(np.add(tip, (0.0, 0.0, -0.1)), clearance=0.01)
     assert main(['cell', 'check', file, *WORDS]) == 0
     found = capsys.readouterr().out
-    assert '20.0 mm apart (clearance 10 mm)' in found
+    assert 'closest fixed body: probe and ball are 20.0 mm apart (clearance 10 mm)' in found
     assert main(['cell', 'check', file, *WORDS, '--model', 'ur10e']) == 0
     assert '20.0 mm apart' not in capsys.readouterr().out
 

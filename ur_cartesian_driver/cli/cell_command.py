@@ -22,9 +22,11 @@ from ur_cartesian_driver.motion.cell.cell import Cell, CellBody
 from ur_cartesian_driver.motion.cell.cell_file import read_cell
 from ur_cartesian_driver.motion.cell.cell_remarks import cell_remarks
 from ur_cartesian_driver.motion.cell.shapes import HalfSpace, Mesh, Shape
-from ur_cartesian_driver.motion.geometry.pose import IDENTITY
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector3, vector6
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
+from ur_cartesian_driver.preview import cell_page
+from ur_cartesian_driver.preview.distance_curve import groups_of_pairs
 from ur_cartesian_driver.robot.rtde.probe import read_state
 from ur_cartesian_driver.sim import SimulatorConfig
 from ur_cartesian_driver.sim.command_line.simulate import calibration
@@ -41,22 +43,23 @@ def show_or_check(arguments: argparse.Namespace) -> int:
         q = vector6(arguments.joints or SimulatorConfig().q)
         state = state_at_rest(arm, q, arguments.tcp or IDENTITY)
     q, tcp = state.actual_q, state.T_flange_tcp
-    lines, touching, status = cell_lines(cell), set[str](), 0
+    table = cell_table(cell)
+    lines, touching, status = cell_notes(cell), set[str](), 0
     if arguments.what == 'check':
         if clause := missing_coal(cell):
             raise ValueError(f'{arguments.file} {clause}')
-        distances = CellDistances(arm, tcp, cell, arguments.tool_radius)
-        pairs = distances.pairs_below(np.array(q))
+        radius = arguments.tool_radius
+        pairs = CellDistances(arm, tcp, cell, radius).pairs_below(np.array(q))
         touching = {name for a, b, _, _ in pairs for name in (a, b)}
         lines = [f'{model.name}, joints {" ".join(f"{value:.4g}" for value in q)} rad']
-        lines += touching_lines(pairs) if pairs else [_closest_line(distances, q)]
+        lines += touching_lines(pairs) if pairs else closest_lines(cell, arm, q, tcp, radius)
         status = 1 if pairs else 0
+    else:
+        print(table)
     print(*lines, sep='\n')
     if arguments.html:
-        from ur_cartesian_driver.preview import cell_page
-
         try:
-            page = cell_page(cell, arm, q, tcp, '\n'.join(lines), touching)
+            page = cell_page(cell, arm, q, tcp, (table, '\n'.join(lines)), touching)
         except ImportError as error:
             print(f'ur-cartesian cell: {error}', file=sys.stderr)
             return 1
@@ -65,8 +68,8 @@ def show_or_check(arguments: argparse.Namespace) -> int:
     return status
 
 
-def cell_lines(cell: Cell) -> list[str]:
-    """Return a table of the bodies, the pairs that may touch, and what is odd."""
+def cell_table(cell: Cell) -> str:
+    """Return a table of the bodies."""
     rows = [('name', 'frame', 'shapes', 'size [mm]', 'clearance [mm]')]
     rows += [
         (
@@ -79,12 +82,16 @@ def cell_lines(cell: Cell) -> list[str]:
         for body in cell.bodies
     ]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = [
+    return '\n'.join(
         '  '.join(f'{text:<{width}}' for text, width in zip(row, widths, strict=True)).rstrip()
         for row in rows
-    ]
-    lines += [f'may touch: {" and ".join(pair)}' for pair in sorted(map(sorted, cell.may_touch))]
-    return [*lines, *cell_remarks(cell)]
+    )
+
+
+def cell_notes(cell: Cell) -> list[str]:
+    """Return the pairs that may touch, and what is odd."""
+    pairs = sorted(map(sorted, cell.may_touch))
+    return [*(f'may touch: {a} and {b}' for a, b in pairs), *cell_remarks(cell)]
 
 
 def touching_lines(pairs: Sequence[tuple[str, str, float, float]]) -> list[str]:
@@ -108,15 +115,21 @@ def touching_lines(pairs: Sequence[tuple[str, str, float, float]]) -> list[str]:
     ]
 
 
-def _closest_line(distances: CellDistances, q: Joints) -> str:
-    (distance,), (number,) = distances.closest(np.array([q]))
-    if not np.isfinite(distance):
-        return 'nothing in the cell can touch the arm, or what it carries'
-    a, b, clearance = distances.pairs[number]
-    return (
-        f'nothing touches; the closest are {a} and {b}, {1e3 * distance:.1f} mm apart (clearance '
-        f'{1e3 * clearance:g} mm)'
-    )
+def closest_lines(
+    cell: Cell, arm: Arm, q: Joints, T_flange_tcp: Pose, tool_radius: float
+) -> list[str]:
+    """Return how close an arm is that touches nothing."""
+    lines = ['nothing touches']
+    for title, group in groups_of_pairs(cell).items():
+        distances = CellDistances(arm, T_flange_tcp, group, tool_radius)
+        (distance,), (number,) = distances.closest(np.array([q]))
+        if np.isfinite(distance):
+            a, b, clearance = distances.pairs[number]
+            lines.append(
+                f'{title}: {a} and {b} are {1e3 * distance:.1f} mm apart (clearance '
+                f'{1e3 * clearance:g} mm)'
+            )
+    return lines
 
 
 def _shapes_text(body: CellBody) -> str:

@@ -1,26 +1,52 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The closest pair of bodies over time, as a picture in a page."""
+"""
+The closest pair of bodies over time, as a picture in a page.
+
+A tool is always near the link beside it. Pairs that the arm carries have a curve of their own, so
+that they do not hide how near the arm comes to what stands around it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from html import escape
+from itertools import product
 
 import numpy as np
 
+from ur_cartesian_driver.motion.cell.cell import Cell, LINK_NAMES
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 
-#: Width and height of the curve in the picture, and room for the numbers beside it.
-_WIDTH, _HEIGHT, _ROOM = 400, 110, 46
+#: Width and height of the curve in the picture, and width of the numbers beside it.
+_WIDTH, _HEIGHT, _INDENT = 400, 110, 46
 _COLOURS = ('#1e6edc', '#e68214', '#14965a', '#963cbe', '#c83c8c', '#00a0be', '#8a6d3b', '#555')
 #: Largest number of pairs in the list below the curve.
 _MAX_LISTED = len(_COLOURS)
 
 
-def distance_curve(time: Floats, distances: Floats, pairs: Sequence[str]) -> str:
+def groups_of_pairs(cell: Cell) -> dict[str, Cell]:
+    """Return cells of which only some pairs are measured: with fixed bodies, and on the arm."""
+    carried = [body.name for body in cell.bodies if body.is_carried]
+    own = [(a, b) for a, b in product(carried, (*LINK_NAMES, *carried)) if a != b]
+    groups = {
+        'closest fixed body': replace(
+            cell, may_touch=cell.may_touch | {frozenset(pair) for pair in own}
+        )
+    }
+    if carried:
+        for body in cell.bodies:
+            cell = cell if body.is_carried else cell.without(body.name)
+        groups['closest on the arm'] = cell
+    return groups
+
+
+def distance_curve(title: str, time: Floats, distances: Floats, pairs: Sequence[str]) -> str:
     """
     Return HTML with the smallest distance over time, and the pairs that have it, nearest first.
+
+    The HTML is empty if no distance is known.
 
     :param time: (n,) [s]
     :param distances: (n,) [m], infinite where nothing is measured.
@@ -41,14 +67,14 @@ def distance_curve(time: Floats, distances: Floats, pairs: Sequence[str]) -> str
     picture = _picture(
         time[known], distances[known], [pairs[row] for row in known.tolist()], colours
     )
-    return f'<p class="distance"><b>closest pair</b><br>{picture}{"".join(lines)}</p>'
+    return f'<p class="distance"><b>{escape(title)}</b><br>{picture}{"".join(lines)}</p>'
 
 
 def _picture(time: Floats, distances: Floats, pairs: list[str], colours: dict[str, str]) -> str:
     end = float(time[-1]) or 1.0
     low, high = min(0.0, float(distances.min())), max(0.0, float(distances.max()))
     high = high if high > low else low + 1.0
-    x = _ROOM + _WIDTH * time / end
+    x = _INDENT + _WIDTH * time / end
     y = 8 + _HEIGHT * (high - distances) / (high - low)
     ends = [k for k in range(1, len(pairs)) if pairs[k] != pairs[k - 1]]
     curves = []
@@ -63,10 +89,10 @@ def _picture(time: Floats, distances: Floats, pairs: list[str], colours: dict[st
     zero = 8 + _HEIGHT * high / (high - low)
     bottom = _HEIGHT + 24
     return (
-        f'<svg viewBox="0 0 {_ROOM + _WIDTH + 8} {bottom}" font-size="11">'
-        f'<path d="M{_ROOM},{zero:.1f} h{_WIDTH} M{_ROOM},8 v{_HEIGHT}" stroke="#999"/>'
+        f'<svg viewBox="0 0 {_INDENT + _WIDTH + 8} {bottom}" font-size="11">'
+        f'<path d="M{_INDENT},{zero:.1f} h{_WIDTH} M{_INDENT},8 v{_HEIGHT}" stroke="#999"/>'
         f'<text x="0" y="14">{high:.3f} m</text><text x="0" y="{zero + 4:.1f}">0</text>'
-        f'<text x="{_ROOM}" y="{bottom - 2}">0 s</text>'
-        f'<text x="{_ROOM + _WIDTH}" y="{bottom - 2}" text-anchor="end">{time[-1]:.2f} s</text>'
+        f'<text x="{_INDENT}" y="{bottom - 2}">0 s</text>'
+        f'<text x="{_INDENT + _WIDTH}" y="{bottom - 2}" text-anchor="end">{time[-1]:.2f} s</text>'
         f'{"".join(curves)}</svg>'
     )

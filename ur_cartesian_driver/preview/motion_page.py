@@ -37,7 +37,7 @@ from ur_cartesian_driver.planning.preflight.cell_stretches import changed
 from ur_cartesian_driver.planning.preflight.clearance import Clearance
 from ur_cartesian_driver.planning.preflight.tightest_margins import normalized_margins
 from ur_cartesian_driver.planning.request.point_events.switched_outputs import describe_command
-from ur_cartesian_driver.preview.distance_curve import distance_curve
+from ur_cartesian_driver.preview.distance_curve import distance_curve, groups_of_pairs
 from ur_cartesian_driver.preview.plan_samples import Preview, sample, table
 from ur_cartesian_driver.preview.scene import Colour, Colours, REFUSED, Scene, serve, Server
 
@@ -118,7 +118,7 @@ def motion_page(plan: Plan, arm: Arm, options: PlanningOptions = NO_BODIES) -> s
         for colouring in colourings:
             scene.add_path(plan.reference.poses[:, :3], colouring.colours)
             pages[colouring.name] = scene.record(preview.time, preview.joints, cells)
-    texts = ''.join(f'<pre>{escape(text)}</pre>' for text in (table(plan), '\n'.join(plan.report)))
+    texts = _preformatted((table(plan), '\n'.join(plan.report)))
     curve = _closest_pairs(preview, cells, arm, tcp, options) if options.cell else ''
     return _page(pages, _legends(colourings) + curve + texts)
 
@@ -138,16 +138,21 @@ def _cells(plan: Plan, preview: Preview, arm: Arm, tcp: Pose, cell: Cell) -> dic
 def _closest_pairs(
     preview: Preview, cells: dict[int, Cell], arm: Arm, tcp: Pose, options: PlanningOptions
 ) -> str:
-    """Return the curve of the closest pair over time."""
+    """Return the curves of the closest pairs over time."""
     known = ~np.isnan(preview.joints.sum(axis=1))
-    distances, pairs = np.full(len(known), inf), [''] * len(known)
-    for begin, end in pairwise([*cells, len(known)]):
-        rows = begin + np.flatnonzero(known[begin:end])
-        clearance = Clearance(arm, tcp, replace(options, cell=cells[begin]))
-        distances[rows], names = clearance.closest(preview.joints[rows])
-        for row, (a, b) in zip(rows.tolist(), names, strict=True):
-            pairs[row] = f'{a} and {b}'
-    return distance_curve(preview.time, distances, pairs)
+    curves = ''
+    titles = dict.fromkeys(title for cell in cells.values() for title in groups_of_pairs(cell))
+    for title in titles:
+        distances, pairs = np.full(len(known), inf), [''] * len(known)
+        for begin, end in pairwise([*cells, len(known)]):
+            rows = begin + np.flatnonzero(known[begin:end])
+            cell = groups_of_pairs(cells[begin]).get(title, EMPTY_CELL)
+            clearance = Clearance(arm, tcp, replace(options, cell=cell))
+            distances[rows], names = clearance.closest(preview.joints[rows])
+            for row, (a, b) in zip(rows.tolist(), names, strict=True):
+                pairs[row] = f'{a} and {b}'
+        curves += distance_curve(title, preview.time, distances, pairs)
+    return curves
 
 
 def scene_of_plan(
@@ -206,13 +211,18 @@ def refusal_page(
 
 
 def cell_page(
-    cell: Cell, arm: Arm, q: Joints, tcp: Pose, text: str, touching: Collection[str] = ()
+    cell: Cell,
+    arm: Arm,
+    q: Joints,
+    tcp: Pose,
+    texts: Iterable[str] = (),
+    touching: Collection[str] = (),
 ) -> str:
     """
     Return the page of a cell with the arm at rest.
 
     :param q: the joint positions of the arm [rad].
-    :param text: stands beside the scene.
+    :param texts: stand beside the scene: a table, then what is wrapped.
     :param touching: names of bodies and links that are drawn in red.
     :raises ImportError: viser is not installed; the text says how to get it.
     """
@@ -224,7 +234,11 @@ def cell_page(
         scene = Scene(server, arm, tcp, cell, touching)
         scene.look_at(np.array([(arm.forward(q) @ tcp).position, *places]))
         recorded = scene.record(np.zeros(1), np.array([q]))
-    return _page({'type': recorded}, f'<pre>{escape(text)}</pre>')
+    return _page({'type': recorded}, _preformatted(texts))
+
+
+def _preformatted(texts: Iterable[str]) -> str:
+    return ''.join(f'<pre>{escape(text)}</pre>' for text in texts)
 
 
 def _period(duration: float) -> float:
