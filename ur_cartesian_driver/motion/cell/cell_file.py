@@ -106,7 +106,7 @@ def cell_from_text(text: str, name: str, folder: str | Path) -> Cell:
     :param folder: where the names of other files begin.
     :raises CellFileError: the text is no cell, or a file that it names cannot be used.
     """
-    return _Reader(name, Path(folder)).cell(text)
+    return _CellReader(name, Path(folder)).cell(text)
 
 
 def cell_text(cell: Cell) -> str:
@@ -189,7 +189,7 @@ class _Draft:
     clearance: float | None
 
 
-class _Reader(NodeReader):
+class _CellReader(NodeReader):
     """Reads one file; ``name`` is its name in error texts."""
 
     def __init__(self, name: str, folder: Path) -> None:

@@ -89,7 +89,7 @@ def read_mesh(path: str | Path, scale: Vector3 = (1.0, 1.0, 1.0)) -> Mesh:
     for factor in scale:
         if not (isfinite(factor) and 1e-9 <= abs(factor) <= 1e9):
             raise MeshFileError(f'the scale is {factor:g}; for a file in millimetres it is 0.001')
-    reader = _Reader(path.name)
+    reader = _MeshReader(path.name)
     vertices, triangles = reader.mesh(path)
     with np.errstate(over='ignore'):
         vertices = vertices * np.array(scale)
@@ -119,7 +119,7 @@ def _are_proper(vertices: Floats, triangles: Indices) -> Flags:
     return ~is_line
 
 
-class _Reader:
+class _MeshReader:
     """Reads one file; ``name`` is its name in error texts."""
 
     def __init__(self, name: str) -> None:
@@ -204,9 +204,11 @@ class _Reader:
         lines = [line for line in _lines(data) if line[1][0] not in (b'solid', b'endsolid')]
         for k, (number, words) in enumerate(lines):
             if words[0] != (expected := _FACET_LINES[k % len(_FACET_LINES)]):
+                if k == len(lines) - 1:
+                    break
                 self.refuse(f'begins with {_quoted(words[:1])}, not {expected.decode()}', number)
         self._coordinates([line for line in lines if line[1][0] == b'vertex'])
-        self.refuse('does not end with a whole facet and endsolid, so it is cut off')
+        self.refuse('is cut off: it does not end with a whole facet and endsolid')
 
     # -- OBJ -----------------------------------------------------------------------------------
 

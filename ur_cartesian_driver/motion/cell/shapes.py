@@ -20,6 +20,8 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
 #: No shape is larger than this [m]: one that is has probably been given in millimetres.
 MAX_SIZE = 50.0
+#: Corners of a mesh that are nearer than this are one [m].
+_SAME_PLACE = 1e-6
 
 
 def _check_size(name: str, value: float) -> None:
@@ -156,9 +158,13 @@ class Mesh:
     @property
     def is_closed(self) -> bool:
         """Whether no triangle has an edge of its own: the surface encloses a solid."""
-        begin, end = self.triangles, np.roll(self.triangles, 1, axis=1)
-        edges = np.minimum(begin, end) * len(self.vertices) + np.maximum(begin, end)
-        return not (np.unique_counts(edges).counts % 2).any()
+        # Programs write the corner of two triangles with different last digits.
+        places = np.round(self.vertices / _SAME_PLACE)
+        numbers = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
+        begin = numbers[self.triangles]
+        end = np.roll(begin, 1, axis=1)
+        edges = np.minimum(begin, end) * len(numbers) + np.maximum(begin, end)
+        return not (np.unique_counts(edges[begin != end]).counts % 2).any()
 
 
 Shape: TypeAlias = Box | Cylinder | Sphere | HalfSpace | Mesh

@@ -94,11 +94,11 @@ def urdf_bodies(
     :param leave_out: the links that are no bodies.
     :raises UrdfError: the file cannot be used.
     """
-    return _Reader(name, folder).bodies(data, T_base_root, clearance, leave_out)
+    return _UrdfReader(name, folder).bodies(data, T_base_root, clearance, leave_out)
 
 
 @dataclass(frozen=True, slots=True)
-class _Joint:
+class _UrdfJoint:
     """A joint of the file, at 0."""
 
     name: str
@@ -108,7 +108,7 @@ class _Joint:
     element: Element
 
 
-class _Reader:
+class _UrdfReader:
     """Reads one file; ``name`` is its name in error texts."""
 
     def __init__(self, name: str, folder: Path) -> None:
@@ -207,9 +207,9 @@ class _Reader:
             self._refuse(f'has more than {_MAX_LINKS} links')
         return links
 
-    def _joints(self, robot: Element, links: Collection[str]) -> dict[str, _Joint]:
+    def _joints(self, robot: Element, links: Collection[str]) -> dict[str, _UrdfJoint]:
         """Return the joint above each link."""
-        joints: dict[str, _Joint] = {}
+        joints: dict[str, _UrdfJoint] = {}
         for element in robot.findall('joint'):
             name, kind = self._attribute(element, 'name'), self._attribute(element, 'type')
             if kind != 'fixed' and kind not in _MOVING:
@@ -232,11 +232,13 @@ class _Reader:
                     f'{shortened(joints[child].name)}',
                     element,
                 )
-            joints[child] = _Joint(name, parent, self._origin(element), kind != 'fixed', element)
+            joints[child] = _UrdfJoint(
+                name, parent, self._origin(element), kind != 'fixed', element
+            )
         return joints
 
     def _places(
-        self, links: Mapping[str, Element], joints: Mapping[str, _Joint]
+        self, links: Mapping[str, Element], joints: Mapping[str, _UrdfJoint]
     ) -> dict[str, Pose]:
         """Return ``T_root_link`` of each link, with all joints at 0."""
         roots = [link for link in links if link not in joints]
@@ -412,7 +414,7 @@ class _Reader:
         raise UrdfError(printable(f'{f"line {line} of " if line else ""}{self._name} {fault}'))
 
 
-def _joints_above(link: str, joints: Mapping[str, _Joint]) -> Iterator[_Joint]:
+def _joints_above(link: str, joints: Mapping[str, _UrdfJoint]) -> Iterator[_UrdfJoint]:
     """Yield the joints from a link up to the root."""
     while link in joints:
         yield joints[link]
