@@ -295,7 +295,7 @@ class _CellReader(NodeReader):
         return HalfSpace()
 
     def _mesh(self, where: str, node: yaml.Node, scale_node: yaml.Node | None) -> Mesh:
-        file, scale = self._name_of(node), (1.0, 1.0, 1.0)
+        file, scale = self._file(node), (1.0, 1.0, 1.0)
         if scale_node is not None and kind_of(scale_node) == 'scalar':
             scale = 3 * (self._finite(scale_node, f'scale of {where}'),)
         elif scale_node is not None:
@@ -359,7 +359,7 @@ class _CellReader(NodeReader):
         entries = self.entries(node, 'urdf', _URDF)
         if 'file' not in entries:
             self.refuse(node, 'file of urdf is missing')
-        file = self._name_of(entries['file'])
+        file = self._file(entries['file'])
         fault = 'leave_out of urdf must be a list of links'
         links = self._list(entries.get('leave_out'), fault)
         place = self._place(entries, 'urdf', node)
@@ -405,6 +405,12 @@ class _CellReader(NodeReader):
         if kind_of(node) != 'scalar':
             self.refuse(node, 'a name must be one value')
         return str(node.value)
+
+    def _file(self, node: yaml.Node) -> str:
+        name = self._name_of(node)
+        if not (name and name.isprintable()):
+            self.refuse(node, f'"{shortened(name)}" cannot be the name of a file')
+        return name
 
     def _clearance(self, node: yaml.Node | None, where: str) -> float | None:
         if node is None:
