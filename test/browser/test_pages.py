@@ -104,13 +104,29 @@ def test_the_links_choose_what_the_colours_say(tab, tmp_path):
 def test_a_refused_goal_shows_where(tab, tmp_path):
     file = tmp_path / 'page.html'
     assert main(['show', 'square', '--ur-type', 'ur3e', '-o', str(file)]) == 1
+    assert red_pixels(tab, file) > 4
+    assert 'Refused' in tab.page.locator('aside').inner_text()
+
+
+def test_a_refusal_in_a_cell_shows_link_and_post_in_red(tab, tmp_path):
+    cell, file = tmp_path / 'cell.yaml', tmp_path / 'page.html'
+    cell.write_text(
+        'cell: 1\nbodies:\n'
+        '  post: {cylinder: {radius: 0.04, length: 0.5}, position: [-0.45, 0.1, 0.25]}\n'
+    )
+    assert main(['show', 'seam', '-p', f'cell_file:={cell}', '-o', str(file)]) == 1
+    assert red_pixels(tab, file) > 1000
+    assert 'post' in tab.page.locator('aside').inner_text()
+    assert tab.problems == []
+
+
+def red_pixels(tab, file):
+    """Open a page and return how much of its scene is red."""
     tab.page.goto(file.as_uri())
     tab.page.wait_for_selector('canvas')
     tab.page.wait_for_timeout(1000)
     picture = tab.picture()
-    red = picture[:, :, 0] - np.maximum(picture[:, :, 1], picture[:, :, 2]) > 0.35
-    assert red.sum() > 4
-    assert 'Refused' in tab.page.locator('aside').inner_text()
+    return (picture[:, :, 0] - np.maximum(picture[:, :, 1], picture[:, :, 2]) > 0.35).sum()
 
 
 @pytest.fixture

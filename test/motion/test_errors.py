@@ -93,9 +93,9 @@ def test_an_error_keeps_class_and_sentence_on_its_way(cls, travel):
 def test_a_predicted_collision_keeps_its_place_on_its_way_and_in_other_words():
     error = CollisionPredicted(SENTENCE)
     assert (error.q, error.bodies) == (None, ())
-    error.q, error.bodies = (0.1,) * 6, ('table', 'forearm_link')
+    error.q, error.bodies, error.cell = (0.1,) * 6, ('table', 'forearm_link'), 'as it is then'
     for arrived in (pickle.loads(pickle.dumps(error)), error.reworded('In other words.')):
-        assert (arrived.q, arrived.bodies) == (error.q, error.bodies)
+        assert vars(arrived) == vars(error)
     assert str(error.reworded('In other words.')) == 'In other words.'
 
 

@@ -127,6 +127,39 @@ def test_a_refused_goal_shows_the_arm_and_both_bodies_at_the_place():
     assert np.allclose((x, y, z), ARM.forward(refusal.q).position, atol=1e-6)
 
 
+def test_a_refused_goal_shows_a_held_part_in_the_hand():
+    """The part is taken above the table, and would hit a wall on its way."""
+    start = ARM.forward(Q) @ TCP
+    above, behind = (
+        Pose(tuple(np.add(start.position, (0.0, y, 0.0)).tolist()), start.quaternion)
+        for y in (0.02, 0.3)
+    )
+    part, wall = (
+        CellBody(
+            name=name,
+            shapes=(PlacedShape(shape),),
+            T_frame_body=Pose(tuple(np.add(start.position, offset).tolist())),
+        )
+        for name, shape, offset in (
+            ('part', Sphere(0.02), (0.0, 0.02, -0.15)),
+            ('wall', Box((0.2, 0.02, 0.1)), (0.0, 0.25, -0.15)),
+        )
+    )
+    goal = Goal(
+        waypoints=(Waypoint(pose=above), Waypoint(pose=behind)),
+        part_changes=(PartChange(waypoint=0, body='part'),),
+    )
+    options = PlanningOptions(cell=Cell(bodies=(part, wall)))
+    with pytest.raises(CollisionPredicted) as caught:
+        plan(goal, state_at_rest(ARM, Q, TCP), ARM, options)
+    assert set(caught.value.bodies) == {'part', 'wall'}
+    scene = scenes_of(refusal_page(goal, caught.value, ARM, Q, TCP, options))['type']
+    centre = node_pose(scene, '/cell/0')[:3, 3]
+    side = wall.T_frame_body.position[1] - 0.01
+    assert side - 0.0051 < centre[1] + 0.02 < side
+    assert np.allclose(centre[[0, 2]], np.array(part.T_frame_body.position)[[0, 2]], atol=1e-4)
+
+
 @pytest.mark.slow
 def test_meshes_of_many_triangles_are_drawn_with_fewer_that_look_the_same():
     fine = trimesh.creation.icosphere(6, 0.5)  # 81,920 triangles

@@ -189,6 +189,8 @@ class CollisionPredicted(GoalRefused):
     q: tuple[float, float, float, float, float, float] | None = None
     #: The names of the two bodies, of the cell or of the arm's links; empty if not known.
     bodies: tuple[str, ...] = ()
+    #: The :class:`~.cell.Cell` at the place, in which parts may have been moved; None = not known.
+    cell: object = None
 
     def reworded(self, sentence: str) -> GoalRefused:
         """Return the same refusal, of the same place and bodies, with another sentence."""

@@ -194,10 +194,12 @@ def refusal_page(
     )
     has_place = np.isfinite(path).all(axis=1)
     touching: tuple[str, ...] = ()
+    cell = options.cell
     if isinstance(refusal, CollisionPredicted) and refusal.q is not None:
         q, touching = refusal.q, refusal.bodies
+        cell = refusal.cell if isinstance(refusal.cell, Cell) else cell
     with serve(parse_planes(options.workspace_planes)) as server:
-        scene = Scene(server, arm, tcp, options.cell, touching)
+        scene = Scene(server, arm, tcp, cell, touching)
         drawn = path[has_place]
         scene.add_path(drawn, np.full((len(drawn) - 1, 3), 150, dtype=np.uint8))
         numbers = np.flatnonzero(has_place[1:]).tolist()

@@ -10,6 +10,7 @@ from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
 
 from ur_cartesian_driver.driver import Driver
+from ur_cartesian_driver.motion.cell.cell import Cell
 from ur_cartesian_driver.motion.errors import CollisionPredicted
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY
 from ur_cartesian_driver.motion.goal.known_frames import BASE
@@ -40,6 +41,7 @@ class CellMarkerPublisher:
         message = cell_markers(cell, prefix, stamp)
         if refusal is not None:
             tcp = IDENTITY if driver.state is None else driver.state.T_flange_tcp
+            cell = refusal.cell if isinstance(refusal.cell, Cell) else cell
             red = refusal_markers(refusal, cell, driver.arm, tcp, prefix + BASE, stamp)
             others = [one for one in message.markers if one.ns not in refusal.bodies]
             message.markers = others + red.markers
