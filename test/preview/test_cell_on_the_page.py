@@ -225,6 +225,22 @@ def test_a_part_moves_with_the_tool_from_where_it_is_taken_to_where_it_is_put_do
     assert re.search(r'<title>[^<]*part</title>', page)
 
 
+def test_of_a_cloud_of_triangles_some_are_drawn():
+    """None of them has two corners nearby, and none shares a corner."""
+    corners = np.random.default_rng(0).uniform(-1.0, 1.0, (30_000, 3))
+    cloud = Mesh(corners, np.arange(30_000).reshape(-1, 3))
+    for most in (100, 3000):
+        vertices, triangles = coarse_mesh(cloud, most)
+        assert 0 < len(triangles) <= most
+        assert triangles.max() < len(vertices)
+        assert np.ptp(vertices[triangles.reshape(-1)], axis=0).min() > 0.5
+    specks = Mesh(
+        np.repeat(corners[:1000], 3, axis=0) + 1e-6 * corners[:3000], cloud.triangles[:1000]
+    )
+    vertices, triangles = coarse_mesh(specks, 100)
+    assert 50 < len(triangles) <= 100
+
+
 def test_meshes_of_few_triangles_are_drawn_as_they_are():
     vertices, triangles = coarse_mesh(CORNER, 2)
     assert vertices is CORNER.vertices

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from math import ceil
+
 import numpy as np
 
 from ur_cartesian_driver.motion.cell.cell import Cell
@@ -12,8 +14,8 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 
 #: Side of the square that stands for a half-space [m].
 SQUARE_SIDE = 1.6
-#: Largest number of triangles of all meshes of a cell together.
-MAX_TRIANGLES = 20_000
+#: Largest number of triangles of all meshes of a cell together, and the least of each mesh.
+MAX_TRIANGLES, _MIN_TRIANGLES = 20_000, 100
 #: By how much the raster of the vertices grows until a mesh has few enough triangles.
 _COARSER = 1.3
 
@@ -21,32 +23,44 @@ _COARSER = 1.3
 def triangles_per_mesh(cell: Cell) -> int:
     """Return the largest number of triangles that each mesh of a cell is drawn with."""
     meshes = sum(isinstance(placed.shape, Mesh) for body in cell.bodies for placed in body.shapes)
-    return MAX_TRIANGLES // max(1, meshes)
+    return max(_MIN_TRIANGLES, MAX_TRIANGLES // max(1, meshes))
 
 
 def coarse_mesh(mesh: Mesh, most: int) -> tuple[Floats, Indices]:
     """
     Return vertices (n, 3) [m] and triangles (m, 3) of a mesh: its own, or fewer but like them.
 
-    Vertices that share a cube of a raster become one, in their middle.
+    Vertices that share a cube of a raster become one, in their middle. Where that leaves nothing,
+    as of a cloud of small triangles, some of the triangles are returned.
 
     :param most: the largest number of triangles.
     """
     vertices, triangles = mesh.vertices, mesh.triangles
     low, high = mesh.bounds
-    cube = float((high - low).max()) / max(2.0, most**0.5)
+    cubes = max(2.0, most**0.5)
     while len(triangles) > most:
-        vertices, triangles = _on_raster(mesh, np.floor((mesh.vertices - low) / cube))
-        cube *= _COARSER
+        numbers = ((mesh.vertices - low) * (cubes / (high - low).max())).astype(np.int64)
+        vertices, triangles = _on_raster(mesh, numbers, int(cubes) + 1)
+        cubes /= _COARSER
+    if not len(triangles):
+        return mesh.vertices, mesh.triangles[:: ceil(len(mesh.triangles) / most)]
     return vertices, triangles
 
 
-def _on_raster(mesh: Mesh, cubes: Floats) -> tuple[Floats, Indices]:
-    """Return vertices and triangles with the vertices of each cube (n, 3) put together."""
-    _, of_vertex, counts = np.unique(cubes, axis=0, return_inverse=True, return_counts=True)
-    of_vertex = of_vertex.reshape(-1)
-    middles = np.zeros((len(counts), 3))
-    np.add.at(middles, of_vertex, mesh.vertices)
+def _on_raster(mesh: Mesh, cubes: Indices, count: int) -> tuple[Floats, Indices]:
+    """
+    Return vertices and triangles with the vertices of each cube put together.
+
+    :param cubes: (n, 3) the cube of each vertex; ``count`` = one more than their largest number.
+    """
+    x, y, z = cubes.T
+    _, of_vertex, counts = np.unique(
+        (x * count + y) * count + z, return_inverse=True, return_counts=True
+    )
+    middles = np.stack([np.bincount(of_vertex, column) for column in mesh.vertices.T], axis=1)
     corners = of_vertex[mesh.triangles]
-    a, b, c = corners.T
-    return middles / counts[:, None], corners[(a != b) & (b != c) & (c != a)]
+    a, b, c = np.sort(corners, axis=1).T
+    n = len(counts)  # at most a million or so, so that the keys do not overflow
+    _, first = np.unique((a * n + b) * n + c, return_index=True)
+    first = first[(a[first] < b[first]) & (b[first] < c[first])]
+    return middles / counts[:, None], corners[first]
