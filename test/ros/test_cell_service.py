@@ -4,9 +4,13 @@
 
 from typing import Any
 
+from planning_scenes import box, held, pose, scene
 import pytest
 from visualization_msgs.msg import MarkerArray
 
+from ur_cartesian_driver.motion.cell.cell import CellBody, PlacedShape
+from ur_cartesian_driver.motion.cell.shapes import Sphere
+from ur_cartesian_driver.ros.goals.planning_scene_subscriber import PlanningSceneSubscriber
 from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS
 from ur_cartesian_driver.srv import ChangeCell
 
@@ -49,6 +53,30 @@ def test_a_changed_cell_is_shown(single_cell, change):
     single_cell.spin_until(lambda: shown and 'post' in {each.ns for each in shown[-1].markers})
     change(remove=['post'])
     single_cell.spin_until(lambda: {each.ns for each in shown[-1].markers} == {'part', ''})
+
+
+def test_objects_of_the_planning_scene_become_bodies_beside_the_others(single_cell, capfd):
+    """moveit_msgs need not be installed for the conversion; the topic needs it."""
+    node, driver = single_cell.node, single_cell.node.driver
+    scenes = PlanningSceneSubscriber(node, driver, node.action_server.frames, '/scene')
+    driver.change_cell([CellBody(name='own', shapes=(PlacedShape(Sphere(0.01)),))])
+    try:
+        scenes.take(
+            scene(box('part', at=pose(y=-1.2)), attached=[held(box('held'), link='tool0')])
+        )
+        cell = driver.cell
+        assert cell.names == {'own', 'part', 'held'}
+        assert frozenset({'held', 'tool'}) in cell.may_touch
+        scenes.take(scene(box('new'), box('own')))
+        assert driver.cell is cell
+        scenes.take(scene(is_diff=False))
+        assert driver.cell.names == {'own'}
+    finally:
+        scenes.close()
+        driver.change_cell(remove=driver.cell.names)
+    said = capfd.readouterr().err
+    assert 'planning_scene_topic is /scene, but moveit_msgs is not installed' in said
+    assert 'The planning scene is not taken over: object "own": the cell has another bo' in said
 
 
 def test_bodies_come_as_the_text_of_a_file_and_all_or_nothing_changes(single_cell, change):

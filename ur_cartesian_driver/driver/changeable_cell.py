@@ -13,6 +13,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import partial
 import logging
 import threading
 
@@ -72,6 +73,7 @@ class ChangeableCell(ABC):
         remove: Iterable[str] = (),
         attach: Iterable[str] = (),
         release: Iterable[str] = (),
+        may_touch: Iterable[frozenset[str]] = (),
     ) -> Cell:
         """
         Change the bodies of the cell; make all changes, or none.
@@ -83,6 +85,7 @@ class ChangeableCell(ABC):
         :param remove: names of bodies to remove first.
         :param attach: names of bodies that the tool carries from now on, from where they are.
         :param release: names of bodies that stay where the tool has them now.
+        :param may_touch: pairs of names that may touch from now on.
         :returns: the new cell.
         :raises InvalidGoal: a change cannot be made; the text says why.
         :raises RobotNotReady: the robot does not report where the tool is.
@@ -92,6 +95,9 @@ class ChangeableCell(ABC):
             for name in _names('remove', remove):
                 cell = _made('remove', cell.without, name)
             cell = _with_bodies(cell, bodies)
+            if may_touch:
+                pairs = cell.may_touch | frozenset(map(frozenset, may_touch))
+                cell = _made('may_touch', partial(replace, cell, may_touch=pairs))
             for what, make, names in (
                 ('attach', attached, attach),
                 ('release', released, release),

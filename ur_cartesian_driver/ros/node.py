@@ -29,6 +29,7 @@ from ur_cartesian_driver.driver.callbacks import LOG
 from ur_cartesian_driver.ros.goals.action_server import GoalServer
 from ur_cartesian_driver.ros.goals.feed_override_subscriber import FeedOverrideSubscriber
 from ur_cartesian_driver.ros.goals.path_offset_subscriber import PathOffsetSubscriber
+from ur_cartesian_driver.ros.goals.planning_scene_subscriber import PlanningSceneSubscriber
 from ur_cartesian_driver.ros.live.freedrive_service import FreedriveService
 from ur_cartesian_driver.ros.live.live_target_subscriber import LiveTargetSubscriber
 from ur_cartesian_driver.ros.live.servo_state_publisher import ServoStatePublisher
@@ -139,6 +140,11 @@ class CartesianDriverNode(Node):
         self.contact_action = ContactAction(self, self.driver)
         self._components.append(self.contact_action)
         self._components.append(CellService(self, self.driver))
+        if topic := settings.node.planning_scene_topic:
+            self.planning_scenes = PlanningSceneSubscriber(
+                self, self.driver, self.action_server.frames, topic
+            )
+            self._components.append(self.planning_scenes)
         self._publisher.start()
         self._call_services = CommandServices(self, self.driver, self._is_idle)
         steady_timer(

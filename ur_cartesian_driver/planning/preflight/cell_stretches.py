@@ -45,7 +45,7 @@ def attached(cell: Cell, name: str, arm: Arm, q: Joints, T_flange_tcp: Pose) -> 
     body = cell.body(name)
     if body.is_on_tool:
         raise ValueError(f'"{name}" is on the tool already')
-    T_flange_body = arm.forward(q).inverse() @ _T_base_body(body, arm, q, T_flange_tcp)
+    T_flange_body = arm.forward(q).inverse() @ place_in_base(body, arm, q, T_flange_tcp)
     return cell.moved(name, 'tool0', T_flange_body)
 
 
@@ -59,7 +59,7 @@ def released(cell: Cell, name: str, arm: Arm, q: Joints, T_flange_tcp: Pose) -> 
     body = cell.body(name)
     if not body.is_on_tool:
         raise ValueError(f'"{name}" is not on the tool')
-    return cell.moved(name, 'base', _T_base_body(body, arm, q, T_flange_tcp))
+    return cell.moved(name, 'base', place_in_base(body, arm, q, T_flange_tcp))
 
 
 def changed(cell: Cell, change: PartChange, arm: Arm, q: Joints, T_flange_tcp: Pose) -> Cell:
@@ -102,7 +102,13 @@ def cell_stretches(
         yield CellStretch(slice(begin, len(q)), cell, start)
 
 
-def _T_base_body(body: CellBody, arm: Arm, q: Joints, T_flange_tcp: Pose) -> Pose:
+def place_in_base(body: CellBody, arm: Arm, q: Joints, T_flange_tcp: Pose) -> Pose:
+    """
+    Return the pose of a body in the robot's base.
+
+    :param q: the joint positions [rad].
+    :param T_flange_tcp: the active TCP.
+    """
     frames = LinkFrames(arm)
     link, T_link_body = T_carrier_body(body, frames, T_flange_tcp)
     return pose_from_row(frames.poses(np.array([q]))[0, link].tolist()) @ T_link_body

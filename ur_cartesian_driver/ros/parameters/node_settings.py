@@ -39,6 +39,9 @@ class NodeSettings:
     #: that the driver does not know itself are looked up in tf2, if it is installed. Static
     #: transforms have no age.
     tf_max_age: Annotated[float, Range(0.001, 3600.0)] = 1.0
+    #: Topic on which MoveIt publishes its planning scene, for example /monitored_planning_scene:
+    #: its objects become bodies of the cell, if moveit_msgs is installed. Empty: none.
+    planning_scene_topic: str = ''
     #: true: the arm follows a pose on ~/live_target as soon as it arrives and no goal runs.
     live_target_enabled: bool = False
     #: Largest rate of ~/servo_state [Hz]; 0.0: never.

@@ -1,0 +1,82 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""MoveIt's planning scene as bodies of the cell (``planning_scene_topic``)."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+import contextlib
+import traceback
+from typing import Any
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+from ur_cartesian_driver.driver import Driver
+from ur_cartesian_driver.motion.errors import DriverError
+from ur_cartesian_driver.motion.goal.known_frames import Frames
+from ur_cartesian_driver.ros.message_fields import class_of
+from ur_cartesian_driver.ros.messages.planning_scene import ArmPlace, Scene, updated_scene
+
+#: The type of the topic.
+TYPE = 'moveit_msgs/msg/PlanningScene'
+#: Each message changes the scene of those before it, so none may be lost.
+_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+
+
+class PlanningSceneSubscriber:
+    """Takes planning scenes over, one after the other in a thread of its own."""
+
+    def __init__(self, node: Node, driver: Driver, frames: Frames, topic: str) -> None:
+        """Subscribe, if moveit_msgs is installed."""
+        self._logger: Any = node.get_logger()
+        self._driver, self._frames = driver, frames
+        self._names: frozenset[str] = frozenset()
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix='planning scene')
+        kind = class_of(TYPE)
+        if kind is None:
+            self._logger.error(
+                f'planning_scene_topic is {topic}, but moveit_msgs is not installed: nothing of '
+                'the planning scene is checked.'
+            )
+            return
+        self._subscription = node.create_subscription(
+            kind, topic, self._received, _QOS, callback_group=MutuallyExclusiveCallbackGroup()
+        )
+
+    def close(self) -> None:
+        """Take no further scene over."""
+        self._thread.shutdown(cancel_futures=True)
+
+    def _received(self, message: Any) -> None:
+        with contextlib.suppress(RuntimeError):  # close() was called
+            self._thread.submit(self.take, message)
+
+    def take(self, message: Any) -> None:
+        """Take a message over, or log why not."""
+        driver = self._driver
+        place = ArmPlace(
+            arm=driver.arm,
+            state=driver.state,
+            frames=self._frames,
+            prefix=driver.options.tf_prefix,
+        )
+        before = Scene(cell=driver.cell, names=self._names & driver.cell.names)
+        try:
+            after = updated_scene(before, message, place)
+            changed = [body for body in after.cell.bodies if body not in before.cell.bodies]
+            pairs = after.cell.may_touch - before.cell.may_touch
+            if changed or pairs or before.cell.names != after.cell.names:
+                driver.change_cell(
+                    changed,
+                    remove=before.cell.names - after.cell.names,
+                    may_touch=pairs,
+                )
+        except (DriverError, ValueError) as error:
+            clause = str(error).rstrip('.')
+            self._logger.error(f'The planning scene is not taken over: {clause}.')
+        except Exception:  # whatever the message has, the next one may be right
+            self._logger.error(traceback.format_exc())
+        else:
+            self._names = after.names
