@@ -4,11 +4,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import ceil, radians, tau
 
 import numpy as np
 
 from ur_cartesian_driver.kinematics.inverse import solutions
+from ur_cartesian_driver.motion.cell.cell import EMPTY_CELL
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
@@ -18,11 +20,13 @@ from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_chan
 
 #: No joint turns farther than this from one checked configuration to the next [rad].
 _ROW_STEP = radians(1.0)
+#: Only every so many of these configurations are looked at first.
+_FIRST_STRIDE = 8
 #: Distance between two configurations on a line along the axis of the tool [m], and the largest
 #: turn of a joint between them [rad]: a greater one leads to another branch.
 _LINE_STEP, _MAX_TURN = 0.002, 0.2
 #: The least weight of a joint [m]: wrist 3 turns a tool without length about its own axis.
-_LEAST_WEIGHT = 0.05
+_MIN_WEIGHT = 0.05
 #: Configurations among which one is looked for that is clear of everything.
 _CLEAR_CANDIDATES = 256
 
@@ -39,7 +43,9 @@ class ArmSpace:
         """Create the checks."""
         self.kinematics = kinematics
         model = kinematics.arm.model
-        self._clearance = Clearance(kinematics.arm, kinematics.T_flange_tcp, options)
+        arm, T_flange_tcp = kinematics.arm, kinematics.T_flange_tcp
+        self._clearance = Clearance(arm, T_flange_tcp, options)
+        self._without_cell = Clearance(arm, T_flange_tcp, replace(options, cell=EMPTY_CELL))
         #: Lowest and highest position of each joint, (2, 6) [rad].
         self.limits: Floats = np.array(model.position_limits).T
         # A length along the axis of a joint moves nothing, one across it, and all that follow, do.
@@ -47,38 +53,53 @@ class ArmSpace:
         beyond = np.cumsum((across + along)[::-1])[::-1] - along
         length = float(np.linalg.norm(kinematics.T_flange_tcp.position))
         #: How far each joint moves the arm at most, (6,) [m/rad].
-        self.weights: Floats = np.maximum(beyond + length, _LEAST_WEIGHT)
+        self.weights: Floats = np.maximum(beyond + length, _MIN_WEIGHT)
 
     def free(self, q: Floats) -> Flags:
         """Return whether each configuration (n, 6) [rad] is clear of everything."""
         return ~self._clearance.too_close(q)
 
-    def edge_is_free(self, a: Floats, b: Floats) -> bool:
+    def seems_free(self, a: Floats, b: Floats) -> bool:
+        """Return whether a straight joint motion is clear in places, but for its beginning."""
+        rows = _rows(a, b)
+        # Most motions that are not free are found by a few places.
+        return not any(
+            self._clearance.too_close(some).any()
+            for some in (rows[::-_FIRST_STRIDE], rows)
+            if len(some)
+        )
+
+    def is_free(self, a: Floats, b: Floats) -> bool:
         """Return whether a straight joint motion is accepted, if its beginning is clear."""
-        count = max(1, ceil(float(np.abs(b - a).max()) / _ROW_STEP))
-        rows = a + np.linspace(0.0, 1.0, count + 1)[1:, None] * (b - a)
-        return self.violation(rows, vector6(a.tolist())) is None
+        return self.violation(_rows(a, b), vector6(a.tolist())) is None
 
     def violation(self, q: Floats, q_start: Joints) -> Violation | None:
         """Return the first violation in configurations (n, 6) [rad] on the way from a start."""
         return self._clearance.check(q, q_start).violation
 
     def touching(self, q: Joints) -> Violation | None:
-        """Return why the arm cannot be in a configuration, whatever it was in before, or None."""
+        """
+        Return why the arm is not clear of everything in a configuration; None if it is.
+
+        A travel keeps clear also of what the planner only warns of.
+        """
         row = np.array([q])
         if self.free(row)[0]:
             return None
+        alone = self._without_cell
         low, high = np.maximum(self.limits[0], -tau), np.minimum(self.limits[1], tau)
         others = np.random.default_rng(0).uniform(low, high, (_CLEAR_CANDIDATES, 6))
         # What is close at the start of a check is excused, so the start has to be clear.
-        clear = others[self.free(others)]
+        clear = others[~alone.too_close(others)]
         if len(clear):
-            return self.violation(row, vector6(clear[0].tolist()))
-        return Violation(
-            row=0,
-            text='the arm is too close to something, and in all other postures too',
-            remedy='look at the bodies and planes of the cell',
-        )
+            found = alone.check(row, vector6(clear[0].tolist()))
+            if (violation := found.violation or found.warning) is not None:
+                return violation
+        distances, [bodies] = self._clearance.closest(row)
+        near, remedy = 'is too close to something', 'look at the planes and bodies of the cell'
+        if all(bodies):
+            near = f'is too close: {bodies[0]} and {bodies[1]} are {distances[0]:.4f} m apart'
+        return Violation(row=0, text=f'the arm {near}', remedy=remedy, bodies=bodies, q=q)
 
     def along_tool(self, q: Joints, distance: float) -> Floats | None:
         """
@@ -120,3 +141,10 @@ class ArmSpace:
         q = q[((q >= low) & (q <= high)).all(axis=1)]
         order = np.argsort(np.linalg.norm((q - q_near) * self.weights, axis=1), kind='stable')
         return [vector6(row) for row in q[order].tolist()]
+
+
+def _rows(a: Floats, b: Floats) -> Floats:
+    """Return the configurations on a straight joint motion, without its beginning."""
+    count = max(1, ceil(float(np.abs(b - a).max()) / _ROW_STEP))
+    rows: Floats = a + np.linspace(0.0, 1.0, count + 1)[1:, None] * (b - a)
+    return rows

@@ -9,6 +9,11 @@ planning", ICRA 2000), one from the start, one from all goals. Which motions are
 by a :class:`JointSpace`, so the search knows neither arm nor obstacles. The number of samples
 bounds the search, not the time, and a seed draws them: the same question has the same answer on
 every machine.
+
+To prove that a motion is free takes much longer than to look at places on it. So trees grow by
+motions that seem free, and those that lead from the start to a goal are proved when they are
+found (R. Bohlin and L. Kavraki, "Path planning using lazy PRM", ICRA 2000, do likewise). What
+lies behind a motion that is not free is cut off, and the search goes on.
 """
 
 from __future__ import annotations
@@ -26,7 +31,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 _STEP = 0.35
 #: Samples are drawn around start and goals, up to this far outside of the box about them [rad]:
 #: most ways round an obstacle are near, and some need another turn of a joint.
-_LEAST_MARGIN, _GREATEST_MARGIN = 0.2, pi
+_MIN_MARGIN, _MAX_MARGIN = 0.2, pi
 #: Rounds of shortening, and random chords that are tried in each.
 _ROUNDS, _CHORDS = 3, 30
 #: A chord replaces what it cuts off if it is shorter by more than this fraction.
@@ -47,12 +52,11 @@ class JointSpace(Protocol):
     def free(self, q: Floats) -> Flags:
         """Return whether the arm touches nothing in each configuration (n, 6) [rad]."""
 
-    def edge_is_free(self, a: Floats, b: Floats) -> bool:
-        """
-        Return whether the arm touches nothing on the straight joint motion from a to b.
+    def seems_free(self, a: Floats, b: Floats) -> bool:
+        """Return whether the arm touches nothing in places on the straight motion from a to b."""
 
-        The beginning of the motion is known to be free.
-        """
+    def is_free(self, a: Floats, b: Floats) -> bool:
+        """Return whether the arm touches nothing anywhere on this motion, which seems free."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +84,7 @@ def search_joint_path(
         return None
     goals = goals[np.argsort(_lengths(space, goals - start), kind='stable')]
     for goal in goals:
-        if space.edge_is_free(start, goal):
+        if _is_free(space, start, goal):
             return FoundPath(np.array([start, goal]), 0)
     random = np.random.default_rng(seed)
     found = _grow(space, start, goals, max_samples, random)
@@ -92,6 +96,10 @@ def search_joint_path(
 def path_length(space: JointSpace, waypoints: Floats) -> float:
     """Return the length of a joint path, weighted by how far each joint moves the arm [m]."""
     return float(_lengths(space, np.diff(waypoints, axis=0)).sum())
+
+
+def _is_free(space: JointSpace, a: Floats, b: Floats) -> bool:
+    return space.seems_free(a, b) and space.is_free(a, b)
 
 
 def _within(limits: Floats, q: Floats) -> Flags:
@@ -106,7 +114,7 @@ def _lengths(space: JointSpace, changes: Floats) -> Floats:
 
 
 class _Tree:
-    """Configurations that are connected by free motions to one of the roots."""
+    """Configurations that are connected to one of the roots by motions that seem free."""
 
     def __init__(self, space: JointSpace, roots: Floats) -> None:
         self._space = space
@@ -114,6 +122,8 @@ class _Tree:
         self._rows[: len(roots)] = roots
         #: The number of the node before each node; -1 = it is a root.
         self._before = [-1] * len(roots)
+        #: The nodes to which the motion is proved to be free.
+        self._proved: set[int] = set()
 
     def nearest(self, q: Floats) -> int:
         """Return the number of the node that is nearest to a configuration."""
@@ -131,7 +141,7 @@ class _Tree:
         step = _STEP * float(self._space.weights.max())
         arrives = length <= step
         there = q if arrives else here + (q - here) * (step / length)
-        if not self._space.edge_is_free(here, there):
+        if not self._space.seems_free(here, there):
             return -1, False
         count = len(self._before)
         if count == len(self._rows):
@@ -144,6 +154,28 @@ class _Tree:
         """Return the configuration of a node."""
         row: Floats = self._rows[node]
         return row
+
+    def prove(self, node: int) -> bool:
+        """Return whether a node is connected to its root by free motions; cut it off if not."""
+        nodes = []
+        while self._before[node] >= 0:
+            nodes.append(node)
+            node = self._before[node]
+        for k in nodes[::-1]:
+            if k not in self._proved:
+                if not self._space.is_free(self._rows[self._before[k]], self._rows[k]):
+                    self._cut(k)
+                    return False
+                self._proved.add(k)
+        return True
+
+    def _cut(self, node: int) -> None:
+        """Take a node and all that follow it out of the tree: none of them is near anything."""
+        gone = {node}
+        for k in range(node + 1, len(self._before)):
+            if self._before[k] in gone:
+                gone.add(k)
+        self._rows[list(gone)] = np.inf
 
     def branch(self, node: int) -> Floats:
         """Return the configurations from a node to its root."""
@@ -164,12 +196,17 @@ def _grow(
     hull = np.vstack([start, goals])
     low, high = hull.min(axis=0), hull.max(axis=0)
     for sample in range(1, max_samples + 1):
-        margin = random.uniform(_LEAST_MARGIN, _GREATEST_MARGIN)
+        margin = random.uniform(_MIN_MARGIN, _MAX_MARGIN)
         target = random.uniform(
             np.maximum(low - margin, space.limits[0]), np.minimum(high + margin, space.limits[1])
         )
         new, _ = one.grow(one.nearest(target), target)
-        if new >= 0 and (met := _connected(other, one.row(new))) >= 0:
+        if (
+            new >= 0
+            and (met := _connected(other, one.row(new))) >= 0
+            and one.prove(new)
+            and other.prove(met)
+        ):
             path = np.concatenate([one.branch(new)[::-1], other.branch(met)[1:]])
             return FoundPath(path if one is from_start else path[::-1], sample)
         one, other = other, one
@@ -200,7 +237,7 @@ def _without_corners(space: JointSpace, path: Floats) -> Floats:
     kept, k = [0], 0
     while k < len(path) - 1:
         later = range(len(path) - 1, k + 1, -1)
-        k = next((j for j in later if space.edge_is_free(path[k], path[j])), k + 1)
+        k = next((j for j in later if _is_free(space, path[k], path[j])), k + 1)
         kept.append(k)
     return path[kept]
 
@@ -218,6 +255,6 @@ def _cut(space: JointSpace, path: Floats, random: np.random.Generator) -> Floats
         for k, place in zip((first, last), places, strict=True)
     )
     chord = float(_lengths(space, (b - a)[None])[0])
-    if chord > (1.0 - _WORTHWHILE) * (places[1] - places[0]) or not space.edge_is_free(a, b):
+    if chord > (1.0 - _WORTHWHILE) * (places[1] - places[0]) or not _is_free(space, a, b):
         return path
     return np.concatenate([path[: first + 1], [a, b], path[last + 1 :]])

@@ -139,5 +139,5 @@ def _collision(
     where: str, what: str, violation: Violation, q: Joints, advice: str = ''
 ) -> CollisionPredicted:
     error = CollisionPredicted(f'{where} {what}: {violation.text}; {advice or violation.remedy}.')
-    error.q = q
+    error.q, error.bodies = q, violation.bodies
     return error
