@@ -13,6 +13,8 @@ from ur_cartesian_driver.cli import main
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.link_shapes import LinkFrames
 from ur_cartesian_driver.kinematics.robot_models import MODELS
+from ur_cartesian_driver.motion.cell.cell import Cell, CellBody, PlacedShape
+from ur_cartesian_driver.motion.cell.shapes import Sphere
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 from ur_cartesian_driver.planning import plan, PlanningOptions
@@ -83,6 +85,32 @@ def test_the_page_follows_the_robot(planned, viser_server):
         assert f'planned path | {1e3 * off:.2f} mm' in server.texts[0].content
         page.say_lost('the robot sent nothing for 1 s')
         assert 'Not connected' in server.texts[0].content
+
+
+def test_bodies_follow_the_link_and_the_tcp_that_carry_them(viser_server):
+    place = Pose.from_rotation_vector((0.02, 0.03, 0.04, 0.1, 0.2, 0.3))
+    frames = ('base', 'tool0', 'tool0_controller')
+    bodies = tuple(
+        CellBody(
+            name=f'in {frame}',
+            shapes=(PlacedShape(Sphere(0.01)),),
+            frame=frame,
+            T_frame_body=place,
+        )
+        for frame in frames
+    )
+    options = PlanningOptions(cell=Cell(bodies=bodies))
+    with live_page(ARM, state_at_rest(ARM, HOME, TCP), options=options, port=0) as page:
+        (server,) = viser_server
+        for q, tcp in ((HOME, TCP), ((1.0, *HOME[1:]), TCP), (HOME, Pose((0.0, 0.1, 0.3)))):
+            page.update(state_at_rest(ARM, q, tcp))
+            flange = ARM.forward(q)
+            expected = (place, flange @ place, flange @ tcp @ place)
+            for k, T in enumerate(expected):
+                found = node(server, f'/cell/{k}')
+                w, x, y, z = found.wxyz
+                drawn = Pose(tuple(found.position), (x, y, z, w))
+                assert np.allclose(drawn.matrix(), T.matrix(), atol=1e-6)
 
 
 def test_the_deviation_is_the_distance_from_the_nearest_edge():
