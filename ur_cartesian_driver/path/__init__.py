@@ -17,6 +17,7 @@ from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import ContactEnd, PressFrame, StaleOffset, Tolerance
 from ur_cartesian_driver.motion.goal.known_frames import Frames, StaticFrame
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
+from ur_cartesian_driver.path.joining import join
 from ur_cartesian_driver.path.orientations import (
     against,
     axis_angle,
@@ -43,6 +44,7 @@ from ur_cartesian_driver.path.outputs import (
 from ur_cartesian_driver.path.path_builder import Path
 from ur_cartesian_driver.path.path_motions import FREE
 from ur_cartesian_driver.path.resumption import resume, ResumedGoal
+from ur_cartesian_driver.path.travels.traveller import Travel
 from ur_cartesian_driver.path.units import deg, mm
 
 __all__ = [
@@ -62,6 +64,7 @@ __all__ = [
     'StaleOffset',
     'StaticFrame',
     'Tolerance',
+    'Travel',
     'X',
     'Y',
     'Z',
@@ -74,6 +77,7 @@ __all__ = [
     'deg',
     'digital',
     'digital_input',
+    'join',
     'mm',
     'resume',
     'roll_pitch_yaw',

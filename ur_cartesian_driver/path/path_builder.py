@@ -10,6 +10,7 @@ raises an :exc:`~ur_cartesian_driver.motion.errors.InvalidGoal` at the program l
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from numbers import Integral
@@ -25,7 +26,7 @@ from ur_cartesian_driver.goal_files import (
 )
 from ur_cartesian_driver.goal_files.goal_reading import nanoseconds
 from ur_cartesian_driver.goal_files.goal_schema import message_of, with_defaults
-from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal
 from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.geometry.vectors import ZERO3
@@ -41,7 +42,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     StaleOffset,
     Tolerance,
 )
-from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
+from ur_cartesian_driver.motion.goal.goal_columns import goal_table, GoalTable
 from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.path.centre_line import CentreLine, RestToRest
 from ur_cartesian_driver.path.outputs import Output
@@ -76,7 +77,18 @@ from ur_cartesian_driver.path.path_points import (
     seen_from,
 )
 from ur_cartesian_driver.path.resumption import APPROACH, OVERLAP, resume
+from ur_cartesian_driver.path.travels.traveller import (
+    ArmPlace,
+    BLEND_FACTORS,
+    Leg,
+    no_start,
+    PathBegin,
+    Travel,
+    Traveller,
+)
 from ur_cartesian_driver.path.weave import strokes, woven
+from ur_cartesian_driver.planning.request.goal_fields import is_rounded
+from ur_cartesian_driver.planning.request.validate import check
 
 
 @dataclass(frozen=True, slots=True, init=False, repr=False)
@@ -307,6 +319,89 @@ class Path(PathWithEvents):
             _feed=other._feed,
             _settings=merged(self._settings, other._settings),
         )
+
+    def travel_to(self, other: Path, by: Travel) -> Path:
+        """
+        Return this path, a way through the air, and another path.
+
+        The tool is retracted along its axis z, the arm goes where it touches nothing, with the
+        joint speed of :meth:`at`, and the tool approaches the start of the other path along its
+        axis z. A path without points is where the arm stands.
+
+        :param by: the arm, where it is when this path begins, and how it travels.
+        :raises GoalRefused: a path cannot be executed, or no way was found.
+        :raises InvalidGoal: the other path has no start, or cannot follow this one.
+        """
+        place = by.begin
+        if self._points:
+            place = by.end_of(self.goal(by.frames, by.snapshot), place)
+        return self._travelled(other, by, place, 'The travel')[0]
+
+    def _travelled(
+        self, other: Path, by: Travel, place: ArmPlace, where: str
+    ) -> tuple[Path, ArmPlace]:
+        """
+        Return the path of :meth:`travel_to`, and where the arm is at its end.
+
+        :param place: where the arm is at the end of this path.
+        :param where: the beginning of refusals.
+        """
+        traveller = Traveller(by, place, other._begin(by, where), where)
+        runs = traveller.runs()
+        legs, entry = traveller.legs(tuple(runs))
+        path = self
+        if legs and self._points:
+            last = self._points[-1]  # the tool reaches it before it is retracted
+            segment = replace(last.segment, blend_radius=0.0)
+            last = replace(last, segment=segment, feed_blend=False, auto_blend=False)
+            path = self._with(_points=(*self._points[:-1], last))
+        refusal: GoalRefused | None = None
+        for factor in BLEND_FACTORS if legs else ():
+            air = self._with(_start=None, _points=())._with_legs(legs, factor)
+            try:
+                by.end_of(air.goal(by.frames, by.snapshot), place)
+            except GoalRefused as error:
+                refusal = error
+            else:
+                path, refusal = path._with_legs(legs, factor), None
+                break
+        if refusal is not None:
+            raise refusal.reworded(f'{where}: {refusal}')
+        joined = path.then(other)
+        goal = joined.goal(by.frames, by.snapshot)
+        if legs and is_rounded(goal_table(goal)):
+            raise InvalidGoal(
+                where,
+                'leads to or from a path with rounded corners, which has no joint motions',
+                'execute the paths one by one',
+            )
+        check(goal, by.options)
+        return joined, runs[entry]
+
+    def _with_feed_of(self, other: Path) -> Path:
+        """Return this path with the speeds that hold at the end of another one."""
+        return self._with(_feed=other._feed)
+
+    def _begin(self, by: Travel, where: str) -> PathBegin:
+        """
+        Return where the path begins for an arm that travels to it.
+
+        :raises InvalidGoal: the path has no start.
+        """
+        if self.start is None or not self._points:
+            raise no_start(where)
+        return PathBegin(self.goal(by.frames, by.snapshot), self.start)
+
+    def _with_legs(self, legs: Iterable[Leg], factor: float) -> Path:
+        """Return the path with the motions of a travel, whose blends are scaled by a factor."""
+        path = self.free(None)
+        for leg in legs:
+            blend = factor * leg.blend
+            if leg.posture is None:
+                path = path.line(leg.pose, blend=blend)
+            else:
+                path = path.joint(leg.pose, blend=blend, posture=leg.posture)
+        return path._with(_feed=self._feed)
 
     def offset(
         self, dx: float = 0.0, dy: float = 0.0, dz: float = 0.0, *, of_tool: bool = False

@@ -1,0 +1,217 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Ways through the air between paths: where an arm is at their ends, and how it gets from one to one.
+
+A path says where the tool goes, not which arm carries it. So a travel needs the arm, the state in
+which the whole path begins, and the options that planning will have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from math import isfinite
+
+import numpy as np
+
+from ur_cartesian_driver import planning
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.cell.cell import Cell
+from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal
+from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
+from ur_cartesian_driver.motion.goal.goal import Goal
+from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.cell_stretches import changed
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_change, TcpKinematics
+from ur_cartesian_driver.planning.stop_prediction import at_set_point, state_at_rest
+from ur_cartesian_driver.planning.travel.arm_space import ArmSpace
+from ur_cartesian_driver.planning.travel.transfer import find_transfer, TransferSettings
+
+#: The largest fraction of a motion that a blend takes at each end, and the least radius [m].
+_BLEND_SHARE, _MIN_BLEND = 0.4, 1e-3
+#: Fractions of these radii that are tried, until the blended path passes all checks.
+BLEND_FACTORS = (1.0, 0.5, 0.25, 0.1, 0.0)
+#: Configurations that differ by less than this [rad] are the same.
+_SAME = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Travel(TransferSettings):
+    """
+    The arm that travels from path to path, and how it travels.
+
+    :raises ValueError: a number is out of its range.
+    """
+
+    #: The arm, calibrated if the calibration is known.
+    arm: Arm
+    #: The state in which the whole path begins.
+    state: RobotState
+    options: PlanningOptions = field(default_factory=PlanningOptions)
+    #: The frames that the paths can name.
+    frames: Frames = field(default_factory=Frames)
+    #: Largest blend radius of the motions through the air [m]; smaller where it does not fit.
+    blend: float = 0.05
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        TransferSettings.__post_init__(self)
+        if not (isfinite(self.blend) and self.blend >= 0.0):
+            raise ValueError(f'blend is {self.blend:g} m, but must be finite, and not negative')
+
+    @property
+    def snapshot(self) -> ArmSnapshot:
+        """Where the arm is when the whole path begins, for frames that move with it."""
+        return ArmSnapshot.of(self.state)
+
+    @property
+    def begin(self) -> ArmPlace:
+        """Where the whole path begins."""
+        return ArmPlace(at_set_point(self.state, self.arm).actual_q, self.options.cell)
+
+    def end_of(self, goal: Goal, place: ArmPlace) -> ArmPlace:
+        """
+        Return where the arm is at the end of a goal that begins in a place.
+
+        :raises GoalRefused: the goal cannot be executed from there.
+        """
+        T_flange_tcp = self.state.T_flange_tcp
+        # A travel leads to the goal, however far away that is.
+        options = replace(self.options, max_approach_distance=0.0, cell=place.cell)
+        state = state_at_rest(self.arm, place.q, T_flange_tcp)
+        rows = planning.plan(goal, state, self.arm, options).rows  # loads the planner when needed
+        cell = place.cell
+        for change in sorted(goal.part_changes, key=lambda each: each.waypoint):
+            row = int(np.searchsorted(rows.waypoints, change.waypoint, side='right')) - 1
+            q = vector6(rows.joints[row].tolist())
+            cell = changed(cell, change, self.arm, q, goal.T_flange_controlled or T_flange_tcp)
+        return ArmPlace(vector6(rows.joints[-1].tolist()), cell)
+
+
+@dataclass(frozen=True, slots=True)
+class ArmPlace:
+    """Where an arm is between two paths, in the cell as it then is."""
+
+    #: The joint positions [rad].
+    q: Joints
+    cell: Cell
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A motion of a travel."""
+
+    #: Where it ends, in the frame of the path.
+    pose: Pose
+    #: The joint positions there by name, for a joint motion; None = a line.
+    posture: dict[str, float] | None
+    #: The largest blend radius at its end [m].
+    blend: float
+
+
+@dataclass(frozen=True, slots=True)
+class PathBegin:
+    """Where a path begins, and the goal that it is."""
+
+    goal: Goal
+    #: The pose at which the path begins, in its frame.
+    pose: Pose
+
+    @property
+    def in_base(self) -> Pose:
+        """The pose in the robot's base."""
+        return self.goal.T_base_frame @ self.pose
+
+
+class Traveller:
+    """
+    An arm with the tool of one path, on its way to it.
+
+    :param place: where it comes from.
+    :param where: the beginning of refusals, such as ``The travel to path 2``.
+    """
+
+    def __init__(self, by: Travel, place: ArmPlace, there: PathBegin, where: str) -> None:
+        """Create the space of the joints."""
+        self._by, self._place, self._there, self._where = by, place, there, where
+        T_flange_tool = there.goal.T_flange_controlled or by.state.T_flange_tcp
+        self._kinematics = TcpKinematics(by.arm, T_flange_tool)
+        self.space = ArmSpace(self._kinematics, replace(by.options, cell=place.cell))
+
+    def runs(self) -> dict[Joints, ArmPlace]:
+        """
+        Return the joint positions in which the path can begin [rad], each with where it ends.
+
+        The turns of the joints are those nearest to where the arm comes from.
+
+        :raises GoalRefused: there are none; the refusal is that of the nearest.
+        """
+        found: dict[Joints, ArmPlace] = {}
+        refusal: GoalRefused | None = None
+        every = self.space.configurations(self._there.in_base, self._place.q)
+        are_free = self.space.free(np.array(every).reshape(-1, 6))
+        # If none is free, the first one tells why.
+        for q in [q for q, free in zip(every, are_free, strict=True) if free] or every[:1]:
+            try:
+                found[q] = self._by.end_of(self._there.goal, replace(self._place, q=q))
+            except GoalRefused as error:
+                refusal = refusal or error
+        if not found:
+            raise refusal or self._kinematics.no_solution_error(
+                self._there.in_base, f'{self._where}: its start'
+            )
+        return found
+
+    def legs(self, entries: Sequence[Joints]) -> tuple[list[Leg], Joints]:
+        """
+        Return the motions to the path, and the joint positions in which it then begins [rad].
+
+        :raises GoalRefused: no way was found.
+        """
+        q = self._place.q
+        for entry in entries:
+            if max_joint_change(q, entry) < _SAME:
+                return [], entry
+        found = find_transfer(self.space, q, entries, self._by, self._where)
+        poses = list(self._poses(q, found.waypoints))
+        lengths = [a.distance_to(b) for (a, _), (b, _) in pairwise(poses)]
+        radii = [
+            min(self._by.blend, _BLEND_SHARE * min(before, after))
+            for before, after in zip(lengths, [*lengths[1:], 0.0], strict=True)
+        ]
+        legs = [
+            Leg(pose, posture, radius if radius >= _MIN_BLEND else 0.0)
+            for (pose, posture), radius in zip(poses[1:], radii, strict=True)
+        ]
+        return legs, found.goal
+
+    def _poses(
+        self, q: Joints, waypoints: Floats
+    ) -> Iterator[tuple[Pose, dict[str, float] | None]]:
+        """Yield the beginning and the end of each motion, with a posture for joint motions."""
+        T_frame_base = self._there.goal.T_base_frame.inverse()
+        yield T_frame_base @ self.space.tcp(q), None
+        if self._by.retract:
+            yield T_frame_base @ self.space.tcp(vector6(waypoints[0].tolist())), None
+        names = [self._by.options.tf_prefix + name for name in JOINT_NAMES]
+        for before, row in pairwise(waypoints):
+            if np.abs(row - before).max() >= _SAME:
+                joints = vector6(row.tolist())
+                posture = dict(zip(names, joints, strict=True))
+                yield T_frame_base @ self.space.tcp(joints), posture
+        if self._by.approach:
+            yield self._there.pose, None
+
+
+def no_start(where: str) -> InvalidGoal:
+    """Return the refusal of a path without a start."""
+    return InvalidGoal(
+        where, 'leads to a path that does not say where it begins', 'write Path(start)'
+    )
