@@ -16,7 +16,7 @@ from ur_cartesian_driver.motion.cell.shapes import Box
 from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_columns import goal_table
-from ur_cartesian_driver.path import digital, DOWN, join, mm, Path, Pose, Travel
+from ur_cartesian_driver.path import AirTravel, digital, DOWN, join, mm, Path, Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.sim.simulator_config import HOME
@@ -24,7 +24,7 @@ from ur_cartesian_driver.sim.simulator_config import HOME
 ARM = Arm(robot_model('ur5e'))
 STATE = state_at_rest(ARM, HOME)
 TABLE = PlanningOptions(workspace_planes=('table 0 0 0 0 0 1',))
-BY = Travel(arm=ARM, state=STATE, options=TABLE, retract=mm(30), approach=mm(40))
+BY = AirTravel(arm=ARM, state=STATE, options=TABLE, retract=mm(30), approach=mm(40))
 SPEEDS = {'speed': 0.1, 'joint_speed': 0.6, 'blend': mm(5)}
 
 
@@ -145,7 +145,7 @@ def test_what_cannot_be_joined_is_said(make, problem):
 
 def test_a_blend_that_is_no_number_is_refused():
     with pytest.raises(ValueError, match='blend is nan m'):
-        Travel(arm=ARM, state=STATE, blend=float('nan'))
+        AirTravel(arm=ARM, state=STATE, blend=float('nan'))
 
 
 def test_the_other_path_is_not_changed():

@@ -12,7 +12,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot
-from ur_cartesian_driver.path import Frames, Path, Pose, StaticFrame
+from ur_cartesian_driver.path import AirTravel, Frames, Path, Pose, StaticFrame
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.ros import client
@@ -37,6 +37,9 @@ class PlanningDriver:
     def plan(self, path):
         return plan(path.goal(FRAMES, ArmSnapshot.of(STATE)), STATE, ARM, PlanningOptions())
 
+    def air_travel(self, **settings):
+        return AirTravel(arm=ARM, state=STATE, frames=FRAMES, **settings)
+
     def execute(self, path):
         return Outcome(code=ErrorCode.SUCCESSFUL, text='', report=self.plan(path).report)
 
@@ -57,7 +60,16 @@ def test_the_snippets_of_the_page_run(tmp_path, monkeypatch, capsys):
     assert 'point 3: LINEAR -> MOVEL' in printed
     assert Path.load(tmp_path / 'seam.yaml').goal(FRAMES) == names['goal']
     paths = {name: value for name, value in names.items() if isinstance(value, Path)}
-    assert set(paths) >= {'square', 'seam', 'timed', 'careful', 'streamed', 'strokes', 'bead'}
+    assert set(paths) >= {
+        'square',
+        'seam',
+        'timed',
+        'careful',
+        'streamed',
+        'strokes',
+        'bead',
+        'seams',
+    }
     for name in ('timed', 'careful', 'streamed', 'strokes', 'bead'):
         assert PlanningDriver().plan(paths[name]).duration > 0.0
     # A path that begins elsewhere needs a motion to there.

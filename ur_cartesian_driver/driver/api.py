@@ -16,6 +16,7 @@ import contextlib
 from dataclasses import replace
 import logging
 import threading
+from typing import Any
 
 from ur_cartesian_driver.driver.appender import Appender, encode_part
 from ur_cartesian_driver.driver.callbacks import LOG
@@ -72,7 +73,7 @@ from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.servo_report import ServoReport
 from ur_cartesian_driver.motion.twin.twin import ArmIdentity
-from ur_cartesian_driver.path import Path
+from ur_cartesian_driver.path import AirTravel, Path
 from ur_cartesian_driver.planning import plan, plan_joint_goal, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_first_part
 from ur_cartesian_driver.planning.preflight.clearance import self_collision_remark
@@ -281,6 +282,23 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
             else plan(goal, state, arm, options)
         )
         return ArmPlan.of(planned, arm, options)
+
+    def air_travel(self, **settings: Any) -> AirTravel:
+        """
+        Return what :meth:`.Path.travel_to` and :func:`.join` need: the arm, where it stands now.
+
+        :param settings: other fields of :class:`~.traveller.AirTravel`, such as ``retract`` [m].
+        :raises RobotNotReady: the robot does not report its state.
+        :raises ValueError: a number is out of its range.
+        """
+        state = self._require(self.rest_state)
+        return AirTravel(
+            arm=self.arm,
+            state=state,
+            options=self._options_for(state),
+            frames=self.frames,
+            **settings,
+        )
 
     def start(self, plan: Plan, on_progress: OnProgress | None = None) -> MotionHandle:
         """

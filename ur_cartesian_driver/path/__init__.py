@@ -44,12 +44,13 @@ from ur_cartesian_driver.path.outputs import (
 from ur_cartesian_driver.path.path_builder import Path
 from ur_cartesian_driver.path.path_motions import FREE
 from ur_cartesian_driver.path.resumption import resume, ResumedGoal
-from ur_cartesian_driver.path.travels.traveller import Travel
+from ur_cartesian_driver.path.travels.traveller import AirTravel
 from ur_cartesian_driver.path.units import deg, mm
 
 __all__ = [
     'DOWN',
     'FREE',
+    'AirTravel',
     'AnalogDomain',
     'ContactEnd',
     'ExecutionMode',
@@ -64,7 +65,6 @@ __all__ = [
     'StaleOffset',
     'StaticFrame',
     'Tolerance',
-    'Travel',
     'X',
     'Y',
     'Z',

@@ -15,12 +15,12 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.path.path_builder import Path
 from ur_cartesian_driver.path.path_points import is_same
 from ur_cartesian_driver.path.travels.travel_order import best_order, Runs
-from ur_cartesian_driver.path.travels.traveller import Travel, Traveller
+from ur_cartesian_driver.path.travels.traveller import AirTravel, Traveller
 
 Order = Literal['given', 'best']
 
 
-def join(seams: Sequence[Path], by: Travel, *, order: Order = 'given') -> Path:
+def join(seams: Sequence[Path], by: AirTravel, *, order: Order = 'given') -> Path:
     """
     Return paths one after the other, with a way through the air to each of them.
 
@@ -55,7 +55,7 @@ def _where(number: int) -> str:
     return f'The travel to path {number}'
 
 
-def _beginning(first: Path, by: Travel) -> Path:
+def _beginning(first: Path, by: AirTravel) -> Path:
     """Return a path without points that begins where the arm stands, with a path's speeds."""
     goal = first._begin(by, _where(0)).goal
     T_flange_tool = goal.T_flange_controlled or by.state.T_flange_tcp
@@ -64,7 +64,7 @@ def _beginning(first: Path, by: Travel) -> Path:
     return start._with_feed_of(first)
 
 
-def _in_best_order(seams: Sequence[Path], by: Travel) -> list[tuple[int, Path]]:
+def _in_best_order(seams: Sequence[Path], by: AirTravel) -> list[tuple[int, Path]]:
     """Return the paths with their numbers in the best order, some of them reversed."""
     weights = None
     runs: list[Runs] = []

@@ -78,12 +78,12 @@ from ur_cartesian_driver.path.path_points import (
 )
 from ur_cartesian_driver.path.resumption import APPROACH, OVERLAP, resume
 from ur_cartesian_driver.path.travels.traveller import (
-    ArmPlace,
+    AirTravel,
+    ArmStand,
     BLEND_FACTORS,
     Leg,
     no_start,
     PathBegin,
-    Travel,
     Traveller,
 )
 from ur_cartesian_driver.path.weave import strokes, woven
@@ -320,7 +320,7 @@ class Path(PathWithEvents):
             _settings=merged(self._settings, other._settings),
         )
 
-    def travel_to(self, other: Path, by: Travel) -> Path:
+    def travel_to(self, other: Path, by: AirTravel) -> Path:
         """
         Return this path, a way through the air, and another path.
 
@@ -338,8 +338,8 @@ class Path(PathWithEvents):
         return self._travelled(other, by, place, 'The travel')[0]
 
     def _travelled(
-        self, other: Path, by: Travel, place: ArmPlace, where: str
-    ) -> tuple[Path, ArmPlace]:
+        self, other: Path, by: AirTravel, place: ArmStand, where: str
+    ) -> tuple[Path, ArmStand]:
         """
         Return the path of :meth:`travel_to`, and where the arm is at its end.
 
@@ -382,7 +382,7 @@ class Path(PathWithEvents):
         """Return this path with the speeds that hold at the end of another one."""
         return self._with(_feed=other._feed)
 
-    def _begin(self, by: Travel, where: str) -> PathBegin:
+    def _begin(self, by: AirTravel, where: str) -> PathBegin:
         """
         Return where the path begins for an arm that travels to it.
 

@@ -43,7 +43,7 @@ _SAME = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Travel(TransferSettings):
+class AirTravel(TransferSettings):
     """
     The arm that travels from path to path, and how it travels.
 
@@ -72,11 +72,11 @@ class Travel(TransferSettings):
         return ArmSnapshot.of(self.state)
 
     @property
-    def begin(self) -> ArmPlace:
+    def begin(self) -> ArmStand:
         """Where the whole path begins."""
-        return ArmPlace(at_set_point(self.state, self.arm).actual_q, self.options.cell)
+        return ArmStand(at_set_point(self.state, self.arm).actual_q, self.options.cell)
 
-    def end_of(self, goal: Goal, place: ArmPlace) -> ArmPlace:
+    def end_of(self, goal: Goal, place: ArmStand) -> ArmStand:
         """
         Return where the arm is at the end of a goal that begins in a place.
 
@@ -92,11 +92,11 @@ class Travel(TransferSettings):
             row = int(np.searchsorted(rows.waypoints, change.waypoint, side='right')) - 1
             q = vector6(rows.joints[row].tolist())
             cell = changed(cell, change, self.arm, q, goal.T_flange_controlled or T_flange_tcp)
-        return ArmPlace(vector6(rows.joints[-1].tolist()), cell)
+        return ArmStand(vector6(rows.joints[-1].tolist()), cell)
 
 
 @dataclass(frozen=True, slots=True)
-class ArmPlace:
+class ArmStand:
     """Where an arm is between two paths, in the cell as it then is."""
 
     #: The joint positions [rad].
@@ -138,14 +138,14 @@ class Traveller:
     :param where: the beginning of refusals, such as ``The travel to path 2``.
     """
 
-    def __init__(self, by: Travel, place: ArmPlace, there: PathBegin, where: str) -> None:
+    def __init__(self, by: AirTravel, place: ArmStand, there: PathBegin, where: str) -> None:
         """Create the space of the joints."""
         self._by, self._place, self._there, self._where = by, place, there, where
         T_flange_tool = there.goal.T_flange_controlled or by.state.T_flange_tcp
         self._kinematics = TcpKinematics(by.arm, T_flange_tool)
         self.space = ArmSpace(self._kinematics, replace(by.options, cell=place.cell))
 
-    def runs(self) -> dict[Joints, ArmPlace]:
+    def runs(self) -> dict[Joints, ArmStand]:
         """
         Return the joint positions in which the path can begin [rad], each with where it ends.
 
@@ -153,7 +153,7 @@ class Traveller:
 
         :raises GoalRefused: there are none; the refusal is that of the nearest.
         """
-        found: dict[Joints, ArmPlace] = {}
+        found: dict[Joints, ArmStand] = {}
         refusal: GoalRefused | None = None
         every = self.space.configurations(self._there.in_base, self._place.q)
         are_free = self.space.free(np.array(every).reshape(-1, 6))
