@@ -3,6 +3,7 @@
 """The cell of a running driver: changed by its owner, by its goals, and while the arm moves."""
 
 import re
+from time import sleep
 from typing import Any
 
 import numpy as np
@@ -191,3 +192,25 @@ def test_points_that_were_appended_are_checked_too(driver, home):
     )
     driver.change_cell(remove=['wall'])
     driver.execute(Goal(waypoints=(Waypoint(pose=home()),)), timeout=20.0).raise_for_error()
+
+
+def test_live_targets_stop_before_a_body_that_has_come(driver, home):
+    session = driver.start_live_session(home(y=0.05))
+    wait_for(lambda: driver.state.actual_tcp_pose.position[1] > home(y=0.005).position[1], 10.0)
+    driver.change_cell([wall(home, 0.25)])
+    outcome = session.motion.result(10.0)
+    assert outcome.code is ErrorCode.PREEMPTED
+    assert 'a session in the changed cell took the place of this one' in outcome.text.lower()
+    motion = driver.send_live_target(home(y=0.3))
+
+    def rests():
+        assert driver.send_live_target(home(y=0.3)) is motion
+        sleep(0.02)
+        moved = driver.state.actual_tcp_pose.position[1] - home(y=0.05).position[1]
+        return moved > 0.02 and max(map(abs, driver.state.actual_qd)) < 1e-3
+
+    wait_for(rests, 20.0)
+    # The flange is 63 mm wide, the clearance 5 mm.
+    assert driver.state.actual_tcp_pose.position[1] < home(y=0.25 - 0.0315).position[1]
+    motion.cancel()
+    motion.result(10.0)

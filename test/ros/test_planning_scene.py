@@ -29,7 +29,7 @@ from ur_cartesian_driver.motion.cell.shapes import Box, Cylinder, HalfSpace, Mes
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.known_frames import Frames
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
-from ur_cartesian_driver.ros.messages.planning_scene import ArmPlace, Scene, updated_scene
+from ur_cartesian_driver.ros.messages.planning_scene import SceneArm, SceneBodies, updated_scene
 
 Q = (0.3, -1.2, 1.1, -1.5, -1.4, 0.2)
 TCP = Pose((0.0, 0.0, 0.1))
@@ -38,12 +38,12 @@ STATE = RobotState(
     timestamp=0.0, actual_q=Q, T_flange_tcp=TCP, actual_tcp_pose=ARM.forward(Q) @ TCP
 )
 OWN = CellBody(name='own', shapes=(PlacedShape(Sphere(0.1)),))
-EMPTY = Scene(cell=Cell(bodies=(OWN,)))
+EMPTY = SceneBodies(cell=Cell(bodies=(OWN,)))
 
 
 def after(*messages, before=EMPTY, state=STATE, prefix=''):
     for message in messages:
-        place = ArmPlace(arm=ARM, state=state, frames=Frames(prefix), prefix=prefix)
+        place = SceneArm(arm=ARM, state=state, frames=Frames(prefix), prefix=prefix)
         before = updated_scene(before, message, place)
     return before
 
@@ -151,7 +151,7 @@ def test_an_attached_object_has_its_place_on_the_link():
     # A state that is no difference says what is attached in all.
     other = scene()
     other.robot_state.is_diff = False
-    assert after(other, before=Scene(cell=cell, names=frozenset('ab'))).cell.names == {'own'}
+    assert after(other, before=SceneBodies(cell=cell, names=frozenset('ab'))).cell.names == {'own'}
 
 
 WRONG = [

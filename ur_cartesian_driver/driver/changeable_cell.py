@@ -18,7 +18,7 @@ import logging
 import threading
 
 from ur_cartesian_driver.driver.callbacks import run_callback
-from ur_cartesian_driver.driver.motion_handle import ActiveMotion
+from ur_cartesian_driver.driver.motion_handle import ActiveMotion, MotionHandle
 from ur_cartesian_driver.driver.running_motions import RunningMotions
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.cell.cell import Cell, CellBody, DEFAULT_CLEARANCE
@@ -57,6 +57,10 @@ class ChangeableCell(ABC):
     def state(self) -> RobotState | None:
         """The newest robot state."""
 
+    @abstractmethod
+    def _end_session_for(self, motion: MotionHandle, by: str) -> None:
+        """End a motion if it is a live session; ``by``: what takes its place."""
+
     @property
     def cell(self) -> Cell:
         """The bodies of the cell now, with those that the tool carries."""
@@ -78,7 +82,8 @@ class ChangeableCell(ABC):
         """
         Change the bodies of the cell; make all changes, or none.
 
-        A running goal of which the rest would touch now is stopped soon after, as COLLISION.
+        A running goal of which the rest would touch now is stopped soon after, as COLLISION. A
+        live session ends as PREEMPTED: the next target begins another one.
 
         :param bodies: bodies to add; those of the same names are replaced. The pairs of a cell
             that may touch, and its clearance for these bodies, come along.
@@ -172,6 +177,7 @@ class ChangeableCell(ABC):
             with self._cell_lock:
                 changes = self._cell_changes
             for active in self._running.active:
+                self._end_session_for(active.motion, 'a session in the changed cell')
                 if reason := self._touches(active):
                     active.motion.stop_before_collision(reason)
             with self._cell_lock:

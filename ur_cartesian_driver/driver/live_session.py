@@ -22,8 +22,9 @@ from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.live.live_targets import LiveSettings
 from ur_cartesian_driver.execution.live.online_trajectory import LiveLimits
 from ur_cartesian_driver.execution.live.workspace_guard import LiveWorkspace
+from ur_cartesian_driver.kinematics.cell_distances import missing_coal
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable, RobotNotReady
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes
@@ -128,6 +129,11 @@ class InteractiveMotions(ABC):
         self._live.set_target(T_base_tcp, age=age)
         return self._live.motion
 
+    def _end_session_for(self, motion: MotionHandle, by: str) -> None:
+        """End a motion if it is the live session: the next target begins another one."""
+        if self._live is not None and self._live.motion is motion:
+            motion.preempt(by)
+
     def start_freedrive(self, on_active: Callable[[], None] = lambda: None) -> MotionHandle:
         """
         Start freedrive: a person can guide the arm by hand until the returned motion is cancelled.
@@ -227,7 +233,10 @@ def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
     Return the settings of a live session.
 
     :param start: present joint positions [rad].
+    :raises NotAvailable: the cell has a mesh, and pinocchio is not installed.
     """
+    if problem := missing_coal(options.cell):
+        raise NotAvailable('cell_file', problem)
     max_speed = options.live_target_linear_velocity
     if options.max_tool_speed > 0.0:
         max_speed = min(max_speed, options.max_tool_speed)
@@ -250,6 +259,7 @@ def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
             # checked only if it also leads to the refusal of goals.
             min_clearance=options.min_clearance if options.self_collision == 'refuse' else None,
             tool_radius=options.tool_radius,
+            cell=options.cell,
         ),
     )
     return LiveSetup(

@@ -129,8 +129,10 @@ def _monitor(request: StartMotion, config: DriverConfig) -> GoalMonitor:
 
 
 def is_slow_to_make(request: StartMotion) -> bool:
-    """Return whether making the machine takes long, because it needs a calibrated arm."""
-    arm = request.arm
+    """Return whether making the machine takes long: for a calibrated arm, or among bodies."""
+    arm, live = request.arm, request.live
+    if live is not None and live.settings.limits.workspace.cell:
+        return True
     return arm is not None and arm.geometry != arm.model.geometry
 
 

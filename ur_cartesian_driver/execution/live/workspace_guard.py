@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Keep an arm that follows live targets away from workspace planes and from itself.
+Keep an arm that follows live targets away from planes, from bodies of the cell and from itself.
 
 A check takes longer than a control cycle, so it is left out while no part of the arm can reach a
 bound. A part moves at most by the sum of the joints' turns, times the largest distance of any part
@@ -15,13 +15,18 @@ from math import hypot, inf
 
 import numpy as np
 
+from ur_cartesian_driver.kinematics.cell_distances import CellDistances
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
+from ur_cartesian_driver.motion.cell.cell import Cell, EMPTY_CELL
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, ZERO6
 from ur_cartesian_driver.motion.geometry.workspace import Plane
 
+#: Pairs of bodies in the cell are measured exactly where they may be closer than this [m] to what
+#: they have to keep; elsewhere a bound is enough, which costs a tenth.
+_NEAR = 0.02
 #: More than the thickness of any link [m].
 _THICKNESS = 0.3
 #: Approaching a bound by less than this is taken for rounding [m].
@@ -37,10 +42,12 @@ class LiveWorkspace:
     min_clearance: float | None = None
     #: Radius of the tool between flange and TCP [m]; 0 = no tool.
     tool_radius: float = 0.0
+    #: The bodies around the arm and on it.
+    cell: Cell = EMPTY_CELL
 
     def __bool__(self) -> bool:
         """Return whether there is any bound."""
-        return bool(self.planes) or self.min_clearance is not None
+        return bool(self.planes) or self.min_clearance is not None or bool(self.cell)
 
 
 class WorkspaceGuard:
@@ -60,6 +67,8 @@ class WorkspaceGuard:
         )
         self._moving = [k for k, link in enumerate(bodies.links) if link != Link.BASE]
         self._names = [str(bodies.links[k]) for k in self._moving] + ['the TCP']
+        radius, cell = workspace.tool_radius, workspace.cell
+        self._cell = CellDistances(arm, T_flange_tcp, cell, radius) if cell else None
         # More than the distance of any part of the arm from an axis [m].
         self._max_lever_arm = (
             arm.model.max_reach
@@ -68,6 +77,9 @@ class WorkspaceGuard:
             + workspace.tool_radius
             + _THICKNESS
         )
+        if self._cell is not None:
+            reach = float(self._cell.reaches[1:].max())  # of what the arm carries
+            self._max_lever_arm = max(self._max_lever_arm, reach)
         #: The joint positions of the last check [rad], and the smallest slack found there [m].
         self._last_check: tuple[Joints, float] = ZERO6, 0.0
 
@@ -108,6 +120,16 @@ class WorkspaceGuard:
         if self._workspace.min_clearance is not None:
             link_slacks = self._bodies.distances(row)[0] - self._workspace.min_clearance
             slacks = np.concatenate([slacks, link_slacks])
+        if self._cell is not None:
+            slacks = np.concatenate([slacks, self._cell_slacks(self._cell, row)])
+        return slacks
+
+    def _cell_slacks(self, cell: CellDistances, row: Floats) -> Floats:
+        poses = cell.poses(row)
+        distances = cell.lower_bounds(poses)[0]
+        for column in np.flatnonzero(distances - cell.clearances < _NEAR).tolist():
+            distances[column] = cell.distances(column, poses, inf)[0]
+        slacks: Floats = distances - cell.clearances
         return slacks
 
     def _clause(self, index: int, slack: float) -> str:
@@ -121,8 +143,16 @@ class WorkspaceGuard:
                 near = f'go {-height:.4f} m beyond'
             margin = f', its margin is {plane.margin:.4f} m' if plane.margin else ''
             return f'{name} would {near} the workspace plane "{plane.name}"{margin}'
+        index -= len(planes) * len(self._names)
+        count = 0 if self._workspace.min_clearance is None else len(self._bodies.pairs)
+        if self._cell is not None and index >= count:
+            pair = self._cell.pairs[index - count]
+            return (
+                f'{pair.a} and {pair.b} would come within {max(0.0, pair.clearance + slack):.4f} '
+                f'm of each other, their clearance is {pair.clearance:.4f} m'
+            )
         clearance = self._workspace.min_clearance or 0.0
-        a, b = self._bodies.pairs[index - len(planes) * len(self._names)]
+        a, b = self._bodies.pairs[index]
         return (
             f'{a} and {b} would come within {max(0.0, clearance + slack):.4f} m of each other '
             f'(measured between cylinders), min_clearance is {clearance:.4f} m'

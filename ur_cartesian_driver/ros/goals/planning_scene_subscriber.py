@@ -17,7 +17,7 @@ from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.goal.known_frames import Frames
 from ur_cartesian_driver.ros.message_fields import class_of
-from ur_cartesian_driver.ros.messages.planning_scene import ArmPlace, Scene, updated_scene
+from ur_cartesian_driver.ros.messages.planning_scene import SceneArm, SceneBodies, updated_scene
 
 #: The type of the topic.
 TYPE = 'moveit_msgs/msg/PlanningScene'
@@ -56,13 +56,13 @@ class PlanningSceneSubscriber:
     def take(self, message: Any) -> None:
         """Take a message over, or log why not."""
         driver = self._driver
-        place = ArmPlace(
+        place = SceneArm(
             arm=driver.arm,
             state=driver.state,
             frames=self._frames,
             prefix=driver.options.tf_prefix,
         )
-        before = Scene(cell=driver.cell, names=self._names & driver.cell.names)
+        before = SceneBodies(cell=driver.cell, names=self._names & driver.cell.names)
         try:
             after = updated_scene(before, message, place)
             changed = [body for body in after.cell.bodies if body not in before.cell.bodies]

@@ -46,7 +46,7 @@ class _Operation(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scene:
+class SceneBodies:
     """A cell, and the names of its bodies that came as a planning scene."""
 
     cell: Cell
@@ -54,7 +54,7 @@ class Scene:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ArmPlace:
+class SceneArm:
     """Where the arm is, for objects in frames that move with it."""
 
     arm: Arm
@@ -64,7 +64,7 @@ class ArmPlace:
     prefix: str = ''
 
 
-def updated_scene(scene: Scene, message: Any, place: ArmPlace) -> Scene:
+def updated_scene(scene: SceneBodies, message: Any, place: SceneArm) -> SceneBodies:
     """
     Return a scene after a message of the type moveit_msgs/PlanningScene.
 
@@ -87,7 +87,7 @@ def updated_scene(scene: Scene, message: Any, place: ArmPlace) -> Scene:
 class _Update:
     """A scene that is being changed."""
 
-    def __init__(self, scene: Scene, place: ArmPlace) -> None:
+    def __init__(self, scene: SceneBodies, place: SceneArm) -> None:
         self.scene, self._place = scene, place
 
     def of(self, item: Any, change: Callable[[], None]) -> None:
@@ -172,10 +172,12 @@ class _Update:
         cell, names = self.scene.cell, self.scene.names
         if replaces and body.name in cell.names:
             cell = cell.without(body.name)  # with the pairs that may touch
-        self.scene = Scene(cell=cell.with_bodies([body]), names=names | {body.name})
+        self.scene = SceneBodies(cell=cell.with_bodies([body]), names=names | {body.name})
 
     def _remove(self, name: str) -> None:
-        self.scene = Scene(cell=self.scene.cell.without(name), names=self.scene.names - {name})
+        self.scene = SceneBodies(
+            cell=self.scene.cell.without(name), names=self.scene.names - {name}
+        )
 
     def _allow(self, name: str, links: Iterable[str]) -> None:
         """Let a body touch links, and other bodies; those that the cell does not have are left."""
