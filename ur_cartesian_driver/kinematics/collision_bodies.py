@@ -326,14 +326,27 @@ class CollisionBodies:
 
         A swept cylinder is drawn at both ends, and as a tube between them.
         """
+        for k, (link, radius, axes) in enumerate(self.hulls()):
+            for start, end in axes:
+                yield link, start, end, radius
+            if len(axes) > 1:
+                start, end = axes.mean(axis=1)
+                yield link, start, end, min(radius, float(self._insets[k, 0]))
+
+    def hulls(self) -> Iterator[tuple[Link, float, Floats]]:
+        """
+        Yield link, radius [m] and axes (k, 2, 3) [m] of cylinders, with all joints at 0.
+
+        The convex hull of one or two cylinders is a body: two are the ends of a swept cylinder.
+        """
+        ends = self.cylinder_ends(np.zeros((1, 6)))[0]
         halves = self._insets * self._skeletons(self._lines(np.zeros((1, 6))))[2][:, :, 0].T
-        for k, (start, end) in enumerate(self.cylinder_ends(np.zeros((1, 6)))[0]):
-            link, radius = self.links[k], float(self.radii[k])
+        for k, axis in enumerate(ends):
             if self._moves[k]:
-                for middle in (start, end):
-                    yield link, middle - halves[k], middle + halves[k], radius
-                radius = min(radius, float(self._insets[k, 0]))
-            yield link, start, end, radius
+                axes = np.stack([axis - halves[k], axis + halves[k]], axis=1)
+            else:
+                axes = axis[None]
+            yield self.links[k], float(self.radii[k]), axes
 
     def _lines(self, q: Floats) -> Floats:
         """Return a point on each axis and the axis's direction, as one array (2, 3, axes, n)."""

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Check the clearance of the arm from itself and from the workspace planes along its whole path.
+Check the clearance of the arm from itself, the workspace planes and the cell along its path.
 
 Cylinders are checked in every row. Where they come close, the distance of the meshes is measured,
 for models that have them (:mod:`~ur_cartesian_driver.kinematics.collision_meshes`). Whether a
@@ -21,17 +21,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ur_cartesian_driver.kinematics.cell_distances import CellDistances, missing_coal
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
 from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes, missing_meshes
 from ur_cartesian_driver.kinematics.link_shapes import mesh_model, MODELS_WITH_MESHES
-from ur_cartesian_driver.motion.errors import CollisionPredicted
+from ur_cartesian_driver.motion.cell.cell import Cell
+from ur_cartesian_driver.motion.errors import CollisionPredicted, NotAvailable
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int32s
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.geometry.vectors import Joints
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes, Plane
 from ur_cartesian_driver.motion.goal.goal import PartChange
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.cell_clearance import CellClearance
 from ur_cartesian_driver.planning.preflight.cell_stretches import cell_stretches
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
@@ -39,6 +42,8 @@ from ur_cartesian_driver.planning.request.goal_fields import point_field
 _BLOCK = 4096
 # A pair counts as separating while its distance shrinks by no more than this [m], by rounding.
 _RECEDING_TOLERANCE = 1e-4
+# Bodies that overlap by less than this [m] touch.
+_DEPTH_SHOWN = 1e-4
 # How far a tool that works on a plane without a margin may be beyond it, by rounding [m].
 _ON_PLANE = 1e-6
 
@@ -64,6 +69,23 @@ class Violation:
     text: str
     #: A clause: how to avoid the violation.
     remedy: str
+    #: The names of the two bodies.
+    bodies: tuple[str, ...] = ()
+    #: The joints at the violation [rad].
+    q: Joints | None = None
+
+
+class ClosestInCell(NamedTuple):
+    """The place of a path at which a pair of bodies in the cell is closest."""
+
+    #: The row, as an index of the checked configurations.
+    row: int
+    #: The names of both bodies.
+    bodies: tuple[str, str]
+    #: [m]
+    distance: float
+    #: What no pair of bodies falls below on the whole path [m].
+    at_least: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,6 +101,8 @@ class ClearanceResult:
     margin: float
     #: The pair with that distance, and the shapes between which it was measured.
     description: str
+    #: Where the arm or what it carries is closest to a body of the cell; None = nowhere.
+    in_cell: ClosestInCell | None = None
 
 
 class Clearance:
@@ -86,7 +110,8 @@ class Clearance:
     The clearance of one arm with one tool.
 
     :param T_flange_tcp: the TCP of the goal; the cylinder of the tool leads from the flange to it.
-    :param options: self_collision, min_clearance, tool_radius and workspace_planes are used.
+    :param options: self_collision, min_clearance, tool_radius, workspace_planes and cell are used.
+    :raises NotAvailable: the cell has a mesh, and pinocchio is not installed.
     """
 
     def __init__(self, arm: Arm, T_flange_tcp: Pose, options: PlanningOptions) -> None:
@@ -97,6 +122,7 @@ class Clearance:
             self._checkers.append(_SelfCollisionChecker(bodies, T_flange_tcp, options))
         if planes := parse_planes(options.workspace_planes):
             self._checkers.append(_PlaneChecker(bodies, arm, T_flange_tcp, planes))
+        self._cell = _cell_clearance(arm, T_flange_tcp, options.cell, options.tool_radius)
 
     def too_close(self, q: Floats) -> Flags:
         """Return whether each configuration (n, 6) [rad] is too close, regardless of the start."""
@@ -107,7 +133,24 @@ class Clearance:
                 rows = slice(begin, begin + _BLOCK)
                 _, distances = checker.measure(q[rows], exact)
                 close[rows] |= (distances < checker.bounds).any(axis=1)
+        if self._cell is not None:
+            rest = np.flatnonzero(~close)
+            close[rest] = self._cell.too_close(q[rest])
         return close
+
+    def closest(self, q: Floats) -> tuple[Floats, list[tuple[str, str]]]:
+        """
+        Return how close the bodies of the cell are to the arm and to what it carries.
+
+        :param q: (n, 6) [rad].
+        :returns: (n,) the smallest distance [m], infinite in an empty cell, and the pair that has
+            it.
+        """
+        if self._cell is None:
+            return np.full(len(q), inf), [('', '')] * len(q)
+        distances, numbers = self._cell.bodies.closest(q)
+        pairs = self._cell.bodies.pairs
+        return distances, [(pairs[k].a, pairs[k].b) for k in numbers.tolist()]
 
     def check(self, q: Floats, q_start: Joints) -> ClearanceResult:
         """
@@ -135,18 +178,64 @@ class Clearance:
                     found[checker.refuses] = min(one, other, key=lambda each: each.row)
             if True in found:
                 break
+        in_cell = None
+        if self._cell is not None:
+            of_cell, in_cell = self._check_cell(self._cell, q, q_start)
+            violations = [each for each in (found.get(True), of_cell) if each is not None]
+            if violations:
+                found[True] = min(violations, key=lambda each: each.row)
         return ClearanceResult(
             violation=found.get(True),
             warning=found.get(False),
             margin=margin,
             description=description,
+            in_cell=in_cell,
         )
+
+    @staticmethod
+    def _check_cell(
+        clearance: CellClearance, q: Floats, q_start: Joints
+    ) -> tuple[Violation | None, ClosestInCell | None]:
+        """Return the first violation in the cell, and the closest pair."""
+        result, pairs = clearance.check(q, q_start), clearance.bodies.pairs
+        closest = None
+        if result.closest is not None:
+            row, number, distance = result.closest
+            names = pairs[number].a, pairs[number].b
+            closest = ClosestInCell(row, names, distance, result.at_least)
+        if result.violation is None:
+            return None, closest
+        row, number, distance = result.violation
+        pair = pairs[number]
+        near = f'come within {distance:.4f} m of each other' if distance > 0.0 else 'touch'
+        if distance < -_DEPTH_SHOWN:
+            near = f'overlap by {-distance:.4f} m'
+        return Violation(
+            row=row,
+            text=f'{pair.a} and {pair.b} {near}, less than the clearance of '
+            f'{pair.clearance:.4f} m in the cell',
+            remedy='take another path or posture, change the cell, or list the pair in may_touch',
+            bodies=(pair.a, pair.b),
+            q=vector6(q[row].tolist()),
+        ), closest
 
 
 @lru_cache(maxsize=8)
 def _bodies(arm: Arm, T_flange_tcp: Pose, tool_radius: float) -> CollisionBodies:
     """Return the bodies of an arm; cached, because the same arm is planned for repeatedly."""
     return CollisionBodies(arm, T_flange_tcp, tool_radius)
+
+
+@lru_cache(maxsize=8)
+def _cell_clearance(
+    arm: Arm, T_flange_tcp: Pose, cell: Cell, tool_radius: float
+) -> CellClearance | None:
+    """Return the clearance from a cell; cached likewise. None = the cell is empty."""
+    if not cell:
+        return None
+    if problem := missing_coal(cell):
+        raise NotAvailable('cell_file', problem)
+    return CellClearance(CellDistances(arm, T_flange_tcp, cell, tool_radius))
 
 
 def clearance_remarks(clear: ClearanceResult, segment: Int32s, fraction: Floats) -> list[str]:
@@ -159,10 +248,12 @@ def clearance_remarks(clear: ClearanceResult, segment: Int32s, fraction: Floats)
     """
     if clear.violation is not None:
         row = clear.violation.row
-        raise CollisionPredicted(
+        error = CollisionPredicted(
             f'{point_field(int(segment[row]), "pose")}, at {100.0 * fraction[row]:.1f} % of its '
             f'segment: {clear.violation.text}; {clear.violation.remedy}.'
         )
+        error.bodies, error.q = clear.violation.bodies, clear.violation.q
+        raise error
     lines = []
     if clear.warning is not None:
         row = clear.warning.row
@@ -173,6 +264,12 @@ def clearance_remarks(clear: ClearanceResult, segment: Int32s, fraction: Floats)
     if clear.description:
         smallest_distance = f'at least {clear.margin:.3f} m' if clear.margin > 0.0 else 'none'
         lines.append(f'clearance: {smallest_distance} between {clear.description}')
+    if clear.in_cell is not None:
+        row, (a, b), distance, at_least = clear.in_cell
+        lines.append(
+            f'cell: {a} and {b} come closest, {distance:.4f} m, at {100.0 * fraction[row]:.0f} % '
+            f'of the segment to point {segment[row]}; at least {at_least:.4f} m everywhere'
+        )
     return lines
 
 
@@ -198,7 +295,11 @@ def clearance_lines(
         ):
             used = options if cell is options.cell else replace(options, cell=cell)
             clear = Clearance(arm, tip, used).check(path.q[rows], start)
-            lines += clearance_remarks(clear, path.segment[rows], path.fraction[rows])
+            try:
+                lines += clearance_remarks(clear, path.segment[rows], path.fraction[rows])
+            except CollisionPredicted as error:
+                error.cell = cell
+                raise
     return list(dict.fromkeys(lines))  # two tips often have the same line
 
 

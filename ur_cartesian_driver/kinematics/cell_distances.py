@@ -1,0 +1,383 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Distances between the arm, what it carries, and the bodies of its cell.
+
+Each link of the arm is measured twice: first by the convex bodies that contain it
+(:mod:`~.collision_bodies`), and where these are too close, by its meshes, for models that have
+them. A mesh of the cell is measured by its bounding box first. Before either, spheres that cover
+the one body are compared with the other: that is cheap enough for all pairs at once.
+
+Pairs: what moves, against what is fixed or carried by another link. The arm against itself is the
+part of :mod:`~.collision_meshes`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import product
+from math import pi
+from typing import NamedTuple
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.cell_poses import T_carrier_body
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
+from ur_cartesian_driver.kinematics.collision_meshes import missing_meshes
+from ur_cartesian_driver.kinematics.link_shapes import (
+    link_meshes,
+    LinkFrames,
+    LinkShape,
+    mesh_tolerance,
+    shortest_turn_of_z,
+)
+from ur_cartesian_driver.kinematics.solids import coal, distances, Frames, has_coal, Hull, Solid
+from ur_cartesian_driver.motion.cell.cell import Cell, LINK_NAMES
+from ur_cartesian_driver.motion.cell.shapes import Cylinder, HalfSpace, Mesh
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
+from ur_cartesian_driver.motion.geometry.pose import Pose
+
+# Corners of the polygon around each rim of a swept cylinder, which contains the rim.
+_RIM = 16
+# A mesh is convex if no vertex is farther than this beyond a triangle [m].
+_FLAT = 2e-5
+#: Of how many carriers there are frames: the base and six links.
+CARRIERS = 7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Body:
+    """A link of the arm, its tool, or a body of the cell."""
+
+    name: str
+    carrier: int
+    #: Convex solids and half-spaces that contain it.
+    coarse: tuple[Solid, ...]
+    #: What it really is; the same if nothing better is known.
+    exact: tuple[Solid, ...]
+    #: Distance to keep from it [m]; 0 for the arm, whose clearance is that of the other body.
+    clearance: float = 0.0
+    #: By how much the exact solids may be too small [m].
+    tolerance: float = 0.0
+
+
+def missing_coal(cell: Cell) -> str:
+    """Return a clause that says why a cell cannot be measured; '' if it can."""
+    meshes = [body.name for body in cell.bodies if body.has_mesh]
+    if not meshes or has_coal():
+        return ''
+    return (
+        f'has the mesh "{meshes[0]}", but pinocchio, which measures meshes, is not installed; the '
+        'extra `collision` brings it (boxes, cylinders, spheres and planes do not need it)'
+    )
+
+
+class Pair(NamedTuple):
+    """Two bodies, by name, and the distance that they keep [m]."""
+
+    a: str
+    b: str
+    clearance: float
+
+
+class CellDistances:
+    """
+    The distances of one arm, its tool and all bodies of a cell.
+
+    :param T_flange_tcp: the TCP, for the tool and for bodies in ``tool0_controller``.
+    :param tool_radius: radius of a cylinder from the flange to the TCP [m]; 0 = none.
+    :param cell: without meshes if :func:`missing_coal` says so.
+    """
+
+    def __init__(self, arm: Arm, T_flange_tcp: Pose, cell: Cell, tool_radius: float = 0.0) -> None:
+        """Place all bodies on their carriers."""
+        self._frames = LinkFrames(arm)
+        arm_bodies = _arm_bodies(arm, self._frames, T_flange_tcp, tool_radius)
+        self._bodies = [*arm_bodies, *_cell_bodies(cell, self._frames, T_flange_tcp)]
+        #: The numbers of the bodies of each pair, (pairs, 2); the first of them moves.
+        self._numbers = _pair_numbers(self._bodies, len(arm_bodies), cell)
+        #: The pairs that are measured; columns of distances have their order.
+        self.pairs = [
+            Pair(
+                self._bodies[a].name,
+                self._bodies[b].name,
+                max(self._bodies[a].clearance, self._bodies[b].clearance),
+            )
+            for a, b in self._numbers
+        ]
+        self.clearances = np.array([pair.clearance for pair in self.pairs])
+        self._covers = [_cover(body) for body in self._bodies]
+        #: By the second body of pairs: their columns, and their first bodies.
+        self._opponents: dict[int, tuple[Indices, tuple[int, ...]]] = {}
+        for second in np.unique(self._numbers[:, 1]).tolist():
+            columns = np.flatnonzero(self._numbers[:, 1] == second)
+            self._opponents[second] = columns, tuple(self._numbers[columns, 0].tolist())
+        self._boxes = [_carrier_box(self._bodies, carrier) for carrier in range(CARRIERS)]
+        #: How far from the base anything on each carrier can be, at most, (carriers,) [m].
+        self.reaches = _reaches(arm, self._boxes)
+        #: For each pair, the carriers of both bodies, (pairs, 2).
+        self.carriers = np.array(
+            [[self._bodies[a].carrier, self._bodies[b].carrier] for a, b in self._numbers],
+            dtype=np.intp,
+        ).reshape(-1, 2)
+        #: Whether the bodies of each pair are on links that are joined by a joint, (pairs,).
+        self.are_neighbours = (self.carriers > 0).all(axis=1) & (
+            np.abs(np.diff(self.carriers, axis=1)[:, 0]) == 1
+        )
+
+    def poses(self, q: Floats) -> Floats:
+        """Return the poses of all carriers, (n, 7 carriers, 7), at joints (n, 6) [rad]."""
+        return self._frames.poses(q)
+
+    def box_points(self, poses: Floats) -> Floats:
+        """
+        Return middle and half axes of the boxes around all that moves with each carrier.
+
+        Points of the box are sums of the middle and of parts -1..1 of the three half axes, so
+        none moves farther than these four vectors together.
+
+        :param poses: (n, carriers, 7).
+        :returns: (n, carriers, 4, 3) [m].
+        """
+        result = np.empty((*poses.shape[:2], 4, 3))
+        for carrier, (middle, half) in enumerate(self._boxes):
+            frames = Frames.of(poses[:, carrier])
+            result[:, carrier, 0] = frames.points(middle[None])[:, 0]
+            result[:, carrier, 1:] = (frames.rotation * half).transpose(0, 2, 1)
+        return result
+
+    def lower_bounds(self, poses: Floats) -> Floats:
+        """Return bounds (n, pairs) [m] that no distance is below; cheap, and often far below."""
+        frames = [Frames.of(poses[:, carrier]) for carrier in range(CARRIERS)]
+        covers = [
+            frames[body.carrier].points(centres)
+            for body, (centres, _) in zip(self._bodies, self._covers, strict=True)
+        ]
+        joined: dict[tuple[int, ...], Floats] = {}
+        result = np.empty((len(poses), len(self.pairs)))
+        for second, (columns, firsts) in self._opponents.items():
+            if firsts not in joined:
+                joined[firsts] = np.concatenate([covers[a] for a in firsts], axis=1)
+            body, points = self._bodies[second], joined[firsts]
+            if body.carrier:
+                points = frames[body.carrier].local(points)
+            depths = np.stack([solid.depths(points) for solid in body.coarse]).min(axis=0)
+            radii = [self._covers[a][1] for a in firsts]
+            depths -= np.concatenate(radii)
+            begins = np.cumsum([0, *(len(each) for each in radii[:-1])])
+            result[:, columns] = np.minimum.reduceat(depths, begins, axis=1)
+        return result
+
+    def distances(self, column: int, poses: Floats, enough: float) -> Floats:
+        """
+        Return the distances of one pair.
+
+        :param poses: (n, carriers, 7).
+        :param enough: distances from here on [m] may be replaced by smaller ones that are not
+            below this, which is faster.
+        :returns: (n,) [m]; at most 0 where the bodies touch.
+        """
+        a, b = (self._bodies[number] for number in self._numbers[column])
+        found = _between(a.coarse, a, b.coarse, b, poses)
+        if a.exact is a.coarse and b.exact is b.coarse:
+            return found
+        near = np.flatnonzero(found < enough)
+        if len(near):
+            exact = _between(a.exact, a, b.exact, b, poses[near]) - a.tolerance - b.tolerance
+            found[near] = np.maximum(found[near], exact)
+        return found
+
+    def pairs_below(self, q: Floats) -> list[tuple[str, str, float, float]]:
+        """
+        Return the pairs that are closer than their clearance at one configuration.
+
+        :param q: (6,) [rad].
+        :returns: names, distance [m] and clearance [m] of each pair, the deepest first.
+        """
+        poses = self.poses(np.asarray(q, dtype=np.float64)[None])
+        lower = self.lower_bounds(poses)[0]
+        found = []
+        for column in np.flatnonzero(lower < self.clearances).tolist():
+            pair = self.pairs[column]
+            distance = float(self.distances(column, poses, pair.clearance)[0])
+            if distance < pair.clearance:
+                found.append((pair.a, pair.b, distance, pair.clearance))
+        return sorted(found, key=lambda each: each[2] - each[3])
+
+    def closest(self, q: Floats) -> tuple[Floats, Indices]:
+        """
+        Return the smallest distance of all pairs at each configuration.
+
+        :param q: (n, 6) [rad].
+        :returns: (n,) [m], and the pair (n,) that has it, a number in :attr:`pairs`.
+        """
+        poses = self.poses(q)
+        lower = self.lower_bounds(poses)
+        best, columns = np.full(len(q), np.inf), np.zeros(len(q), dtype=np.intp)
+        # The pair that may be the closest in most rows first: it rules out most others.
+        for column in np.argsort(lower.min(axis=0)).tolist():
+            rows = np.flatnonzero(lower[:, column] < best)
+            if not len(rows):
+                continue
+            found = self.distances(column, poses[rows], np.inf)
+            nearer = rows[found < best[rows]]
+            best[nearer] = found[found < best[rows]]
+            columns[nearer] = column
+        return best, columns
+
+
+def _between(
+    solids_a: Sequence[Solid], a: _Body, solids_b: Sequence[Solid], b: _Body, poses: Floats
+) -> Floats:
+    """Return the smallest distances (n,) of the solids of two bodies [m]."""
+    frames_a, frames_b = (
+        Frames.of(poses[:, body.carrier] if body.carrier else poses[:1, 0]) for body in (a, b)
+    )
+    found = [
+        np.broadcast_to(distances(one, frames_a, other, frames_b), len(poses))
+        for one, other in product(solids_a, solids_b)
+    ]
+    return np.array(np.min(found, axis=0))
+
+
+def _arm_bodies(
+    arm: Arm, frames: LinkFrames, T_flange_tcp: Pose, tool_radius: float
+) -> list[_Body]:
+    """Return the links of the arm, and its tool if it has a radius."""
+    coarse: dict[Link, list[Solid]] = {}
+    for link, radius, axes in CollisionBodies(arm, T_flange_tcp, tool_radius).hulls():
+        carrier = min(link, Link.WRIST_3)
+        T_link_base = frames.at_zero[carrier].inverse()
+        coarse.setdefault(link, []).append(_hull_solid(radius, axes, T_link_base))
+    name, tolerance = arm.model.name, 0.0
+    exact: dict[Link, list[Solid]] = {}
+    if not missing_meshes(name) and has_coal():
+        tolerance = mesh_tolerance(name)
+        for shape in link_meshes(name, 'collision'):
+            exact.setdefault(shape.link, []).append(_link_solid(shape))
+        # The meshes of the base lack the connector.
+        exact[Link.BASE] += coarse[Link.BASE][1:2]
+    return [
+        _Body(
+            name=LINK_NAMES[link],
+            carrier=min(link, Link.WRIST_3),
+            coarse=(solids := tuple(coarse[link])),
+            exact=tuple(exact[link]) if link in exact else solids,
+            tolerance=tolerance if link in exact else 0.0,
+        )
+        for link in Link
+        if link in coarse
+    ]
+
+
+def _hull_solid(radius: float, axes: Floats, T_link_base: Pose) -> Solid:
+    """Return the convex hull of one or two cylinders in the frame of a link."""
+    if len(axes) == 1:
+        (start, end), *_ = axes
+        vector = end - start
+        length = float(np.linalg.norm(vector))
+        x, y, z = (0.5 * (start + end)).tolist()
+        T_base_middle = Pose((x, y, z), shortest_turn_of_z(*(vector / length).tolist()))
+        return Solid(Cylinder(radius, length), T_link_base @ T_base_middle)
+    direction = axes[0, 1] - axes[0, 0]
+    direction /= np.linalg.norm(direction)
+    across = np.linalg.svd(direction[None])[2][1:]
+    angles = 2.0 * pi / _RIM * np.arange(_RIM)
+    rim = np.stack([np.cos(angles), np.sin(angles)], axis=1) @ across
+    rim *= radius / np.cos(pi / _RIM)
+    points = (axes.reshape(-1, 1, 3) + rim).reshape(-1, 3)
+    return Solid(Hull(points), T_link_base)
+
+
+def _link_solid(shape: LinkShape) -> Solid:
+    """Return a mesh, or a cylinder, of a link; a convex mesh as its hull, which is faster."""
+    if shape.mesh is None:
+        return Solid(Cylinder(shape.radius, shape.length), shape.T_link_shape)
+    return Solid(_read_link_mesh(str(shape.mesh)), shape.T_link_shape)
+
+
+def _is_convex(mesh: Mesh) -> bool:
+    """Return whether no vertex of a mesh is beyond the plane of a triangle."""
+    corners = mesh.vertices[mesh.triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    heights = mesh.vertices @ normals.T - np.einsum('ni,ni->n', corners[:, 0], normals)
+    return bool(heights.max() < _FLAT)
+
+
+@lru_cache
+def _read_link_mesh(file: str) -> Mesh | Hull:
+    tree = coal().MeshLoader().load(file, np.ones(3))
+    triangles = [
+        [triangle[k] for k in range(3)]
+        for triangle in (tree.tri_indices(k) for k in range(tree.num_tris))
+    ]
+    mesh = Mesh(np.array(tree.vertices()), np.array(triangles), file)
+    return Hull(mesh.vertices) if _is_convex(mesh) else mesh
+
+
+def _cell_bodies(cell: Cell, frames: LinkFrames, T_flange_tcp: Pose) -> Iterator[_Body]:
+    for body in cell.bodies:
+        carrier, T_carrier = T_carrier_body(body, frames, T_flange_tcp)
+        exact = tuple(Solid(each.shape, T_carrier @ each.T_body_shape) for each in body.shapes)
+        coarse = tuple(solid.box if isinstance(solid.shape, Mesh) else solid for solid in exact)
+        yield _Body(
+            name=body.name,
+            carrier=carrier,
+            coarse=coarse,
+            exact=exact if body.has_mesh else coarse,
+            clearance=cell.clearance_of(body),
+        )
+
+
+def _pair_numbers(bodies: Sequence[_Body], arm_count: int, cell: Cell) -> Indices:
+    """Return the pairs of numbers of bodies that are measured, (pairs, 2)."""
+    pairs = []
+    for b in range(arm_count, len(bodies)):
+        for a in range(b):
+            first, second = bodies[a], bodies[b]
+            if first.carrier == second.carrier:
+                continue
+            if frozenset((first.name, second.name)) in cell.may_touch:
+                continue
+            # What moves comes first; half-spaces do not move.
+            pairs.append((a, b) if first.carrier else (b, a))
+    return np.array(pairs, dtype=np.intp).reshape(-1, 2)
+
+
+def _reaches(arm: Arm, boxes: Sequence[tuple[Floats, Floats]]) -> Floats:
+    geometry = arm.model.geometry
+    lengths = np.hypot(geometry.a, geometry.d)
+    return np.array(
+        [
+            lengths[:carrier].sum() + np.linalg.norm(np.abs(middle) + half)
+            for carrier, (middle, half) in enumerate(boxes)
+        ]
+    )
+
+
+def _cover(body: _Body) -> tuple[Floats, Floats]:
+    """Return centres (k, 3) in the carrier's frame and radii (k,) of spheres that cover a body."""
+    if any(isinstance(solid.shape, HalfSpace) for solid in body.coarse):
+        return np.empty((0, 3)), np.empty(0)
+    spheres = [solid.spheres() for solid in body.coarse]
+    return np.concatenate([c for c, _ in spheres]), np.concatenate([r for _, r in spheres])
+
+
+def _carrier_box(bodies: Sequence[_Body], carrier: int) -> tuple[Floats, Floats]:
+    """Return middle and half sides (3,) of the box around all bodies of a carrier [m]."""
+    corners = [
+        solid.corners()
+        for body in bodies
+        if body.carrier == carrier
+        for solid in body.coarse
+        if not isinstance(solid.shape, HalfSpace)
+    ]
+    if not corners:
+        return np.zeros(3), np.zeros(3)
+    points = np.concatenate(corners)
+    low, high = points.min(axis=0), points.max(axis=0)
+    return 0.5 * (low + high), 0.5 * (high - low)

@@ -1,0 +1,311 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Check the clearance of the arm, and of what it carries, from the bodies of the cell.
+
+The check is of the motion, not of its samples. Between two rows no body moves farther than the
+boxes around all that its carriers carry. So one distance, measured in the middle of a stretch of
+rows, proves the whole stretch if it is large enough; if not, the stretch is halved. Halving goes
+on between two rows, along the straight line between their poses, until the bodies move less than
+:data:`RESOLUTION`; how far the true motion may be from this line is bounded by the second
+differences of the rows, and by the turns of the joints.
+
+A pair that is too close at the start may separate, as for the arm itself
+(:mod:`~.clearance`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.cell_distances import CARRIERS, CellDistances
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
+from ur_cartesian_driver.motion.geometry.vectors import Joints
+
+#: Stretches in which bodies move less than this [m] are not halved any more.
+RESOLUTION = 2e-5
+# Rows of the longest stretch, and rows per block: blocks bound the memory.
+_STRETCH, _BLOCK = 64, 8192
+# A pair counts as separating while its distance shrinks by no more than this [m], by rounding.
+_RECEDING_TOLERANCE = 1e-4
+# Larger than any distance in a cell [m].
+_FAR = 1e3
+# The smallest distance of a path is found to this fraction of itself, or to this length [m].
+_CLOSEST_FRACTION, _CLOSEST_LENGTH = 0.25, 0.001
+
+
+class Place(NamedTuple):
+    """A place of a path at which two bodies are close."""
+
+    #: The first checked row that is not before the place.
+    row: int
+    #: The number of the pair in :attr:`CellDistances.pairs`.
+    pair: int
+    #: [m], at most 0 where the bodies touch.
+    distance: float
+
+
+class CellResult(NamedTuple):
+    """What was found along a path."""
+
+    #: The first place at which a pair is closer than its clearance; None = there is none.
+    violation: Place | None
+    #: The place at which a pair is closest; None = nothing is measured. Bodies on neighbouring
+    #: links do not count: they are always close.
+    closest: Place | None
+    #: A distance that no pair falls below anywhere [m].
+    at_least: float
+
+
+@dataclass(slots=True)
+class _Stretches:
+    """Stretches of consecutive rows of a block, by their ends; fractions are between two rows."""
+
+    begin: Floats
+    end: Floats
+
+    @property
+    def middle(self) -> Floats:
+        """The middle of each: a row, if the stretch has one inside."""
+        middle = 0.5 * (self.begin + self.end)
+        return np.where(self.end - self.begin > 1.0, np.floor(middle), middle)
+
+    def halves(self, which: Flags) -> _Stretches:
+        """Return the halves of some stretches, in order."""
+        middle = self.middle[which]
+        begin = np.stack([self.begin[which], middle], axis=1).ravel()
+        end = np.stack([middle, self.end[which]], axis=1).ravel()
+        return _Stretches(begin, end)
+
+
+class _Motion:
+    """Consecutive rows of joints, with a bound of how far bodies move between any two of them."""
+
+    def __init__(self, bodies: CellDistances, q: Floats) -> None:
+        self.poses = bodies.poses(q)
+        points = bodies.box_points(self.poses)
+        changes = np.diff(points, axis=0)
+        steps, bends = _lengths(changes), _lengths(np.diff(changes, axis=0))
+        # A curve leaves its chord by an eighth of its second difference; twice that is safe.
+        padded = np.pad(bends, ((1, 1), (0, 0)))
+        bends = 0.25 * np.maximum(padded[1:], padded[:-1])
+        # In a corner of the path this is too much: turns of the joints bend it no more than this.
+        turns = np.cumsum(np.abs(np.diff(q, axis=0)), axis=1)
+        turned = np.pad(turns, ((0, 0), (1, 0)))[:, :CARRIERS]
+        by_turns = 0.25 * turned**2 * bodies.reaches
+        #: (n - 1, carriers) how far the motion may be from the line between two rows [m].
+        self.bends = np.minimum(bends, by_turns) if len(q) > 2 else by_turns
+        #: (n, carriers) the way since the first row, at least [m].
+        self.ways = np.vstack([np.zeros(CARRIERS), np.cumsum(steps + 2.0 * self.bends, axis=0)])
+
+    def at(self, places: Floats) -> Floats:
+        """Return the poses of the carriers (k, carriers, 7) at places between rows."""
+        row = np.minimum(places.astype(np.intp), len(self.poses) - 1)
+        part = places - row
+        poses = self.poses[row]
+        between = np.flatnonzero(part)
+        if len(between):
+            some = poses[between]
+            after = self.poses[row[between] + 1].copy()
+            dots = np.einsum('nck,nck->nc', some[..., 3:], after[..., 3:])
+            after[..., 3:] *= np.where(dots < 0.0, -1.0, 1.0)[..., None]
+            some = some + part[between, None, None] * (after - some)
+            some[..., 3:] /= np.linalg.norm(some[..., 3:], axis=2, keepdims=True)
+            poses[between] = some
+        return poses
+
+    def ways_of(self, carriers: Indices) -> Floats:
+        """Return the way of the bodies on two carriers since the first row, together (n,) [m]."""
+        a, b = carriers.tolist()
+        return self.ways[:, a] + self.ways[:, b] if b else self.ways[:, a]
+
+    def bend(self, places: Floats, carriers: Indices) -> Floats:
+        """Return how far poses between two rows may be from the motion (k,) [m]; 0 in a row."""
+        row = np.minimum(places.astype(np.intp), len(self.bends) - 1)
+        return np.where(places == row, 0.0, self.bends[row][:, carriers].sum(axis=1))
+
+
+def _lengths(changes: Floats) -> Floats:
+    """Return the lengths of the four vectors of each carrier, together (n, carriers) [m]."""
+    lengths = np.sqrt(np.einsum('nckx,nckx->nck', changes, changes))
+    together: Floats = np.einsum('nck->nc', lengths)
+    return together
+
+
+def _at(ways: Floats, places: Floats) -> Floats:
+    """Return the ways at places between rows [m]."""
+    row = np.minimum(places.astype(np.intp), len(ways) - 2)
+    found: Floats = ways[row] + (places - row) * (ways[row + 1] - ways[row])
+    return found
+
+
+class CellClearance:
+    """The clearance of one arm from the bodies of its cell."""
+
+    def __init__(self, bodies: CellDistances) -> None:
+        self.bodies = bodies
+
+    def too_close(self, q: Floats) -> Flags:
+        """Return whether each configuration (n, 6) [rad] is closer to a body than allowed."""
+        close = np.zeros(len(q), dtype=np.bool_)
+        bodies = self.bodies
+        for begin in range(0, len(q), _BLOCK):
+            poses = bodies.poses(q[begin : begin + _BLOCK])
+            near = bodies.lower_bounds(poses) < bodies.clearances
+            of_block = close[begin : begin + _BLOCK]
+            for column in np.flatnonzero(near.any(axis=0)).tolist():
+                rows = np.flatnonzero(near[:, column] & ~of_block)
+                clearance = float(bodies.clearances[column])
+                if len(rows):
+                    found = bodies.distances(column, poses[rows], clearance)
+                    of_block[rows[found < clearance]] = True
+        return close
+
+    def check(self, q: Floats, q_start: Joints) -> CellResult:
+        """
+        Check a motion along rows of joints, and from the start to the first of them.
+
+        :param q: (n, 6) [rad], in order of time.
+        :param q_start: the start configuration; pairs that are too close there may separate.
+        """
+        search = _Search(self.bodies)
+        before = np.array([q_start])
+        for begin in range(0, len(q), _BLOCK):
+            rows = np.concatenate([before, q[begin : begin + _BLOCK]])
+            search.block(_Motion(self.bodies, rows), begin - 1, is_first=begin == 0)
+            if search.violation is not None:
+                break
+            before = rows[-1:]
+        return CellResult(search.violation, search.closest, search.at_least)
+
+
+class _Search:
+    """The search for the first violation and for the closest pair, block after block."""
+
+    def __init__(self, bodies: CellDistances) -> None:
+        self._bodies = bodies
+        self.violation: Place | None = None
+        self.closest: Place | None = None
+        #: The pairs that are too close since the start, with their distance so far.
+        self._pending: dict[int, float] = {}
+
+    @property
+    def at_least(self) -> float:
+        """The distance that is proved for all pairs so far [m]."""
+        if self.closest is None:
+            return inf
+        distance = self.closest.distance
+        return distance - max(_CLOSEST_LENGTH, _CLOSEST_FRACTION * distance)
+
+    def block(self, motion: _Motion, offset: int, *, is_first: bool) -> None:
+        """
+        Search the rows of a block.
+
+        :param offset: the number of the block's first row among all rows.
+        """
+        bodies, last = self._bodies, len(motion.poses) - 1
+        begins = np.arange(0, last, _STRETCH, dtype=np.float64)
+        stretches = _Stretches(begins, np.minimum(begins + _STRETCH, last))
+        middle = stretches.middle.astype(np.intp)
+        lower = bodies.lower_bounds(motion.poses[middle])
+        ways = motion.ways
+        reach = np.maximum(
+            ways[middle] - ways[begins.astype(np.intp)],
+            ways[stretches.end.astype(np.intp)] - ways[middle],
+        )[:, bodies.carriers].sum(axis=2)
+        if is_first:
+            self._find_pending(motion)
+        for column in np.argsort(lower.min(axis=0)).tolist():
+            if column in self._pending:
+                begin = self._leave(column, motion, offset)
+                if begin is not None and begin < last:
+                    rest = _Stretches(np.array([begin]), np.array([float(last)]))
+                    self._search_pair(column, motion, offset, rest)
+                continue
+            open_ = lower[:, column] < self._enough(column) + reach[:, column]
+            if open_.any():
+                of_pair = _Stretches(stretches.begin[open_], stretches.end[open_])
+                self._search_pair(column, motion, offset, of_pair)
+
+    def _enough(self, column: int) -> float:
+        """Return the distance that is of no interest if a pair keeps it everywhere [m]."""
+        clearance = float(self._bodies.clearances[column])
+        if self._bodies.are_neighbours[column]:
+            return clearance
+        return max(clearance, min(self.at_least, _FAR))
+
+    def _find_pending(self, motion: _Motion) -> None:
+        """Find the pairs that are too close in the first row."""
+        bodies, first = self._bodies, motion.poses[:1]
+        near = bodies.lower_bounds(first)[0] < bodies.clearances
+        for column in np.flatnonzero(near).tolist():
+            clearance = float(bodies.clearances[column])
+            distance = float(bodies.distances(column, first, inf)[0])
+            if distance < clearance:
+                self._pending[column] = distance
+
+    def _leave(self, column: int, motion: _Motion, offset: int) -> float | None:
+        """
+        Follow a pair that was too close at the start.
+
+        :returns: the row from which on it is clear; None = it stays close, or is violated.
+        """
+        clearance = float(self._bodies.clearances[column])
+        distances = self._bodies.distances(column, motion.poses[1:], inf)
+        reached = np.maximum.accumulate(np.append(self._pending[column], distances))
+        free = distances >= clearance
+        end = int(np.argmax(free)) if free.any() else len(free)
+        nearer = np.flatnonzero(distances[:end] < reached[:end] - _RECEDING_TOLERANCE)
+        if len(nearer):
+            row = int(nearer[0])
+            self._violate(Place(offset + 1 + row, column, float(distances[row])))
+            return None
+        self._pending[column] = float(reached[-1])
+        if not free.any():
+            return None
+        del self._pending[column]
+        return float(end + 1)
+
+    def _search_pair(
+        self, column: int, motion: _Motion, offset: int, stretches: _Stretches
+    ) -> None:
+        """Search stretches for one pair, by halving those that are not proved."""
+        bodies, carriers = self._bodies, self._bodies.carriers[column]
+        clearance, ways = float(bodies.clearances[column]), motion.ways_of(carriers)
+        while len(stretches.begin):
+            middle, enough = stretches.middle, self._enough(column)
+            way = _at(ways, middle)
+            reach = np.maximum(way - _at(ways, stretches.begin), _at(ways, stretches.end) - way)
+            bend = motion.bend(middle, carriers)
+            needed = enough + float(bend.max())
+            distances = bodies.distances(column, motion.at(middle), needed)
+            if not bodies.are_neighbours[column]:
+                self._remember(column, middle, distances, offset)
+            sure = distances - bend
+            open_ = (sure < enough + reach) & (reach > RESOLUTION)
+            bad = np.flatnonzero(sure < clearance)
+            if len(bad):
+                k = int(bad[0])
+                row = offset + int(np.ceil(middle[k]))
+                self._violate(Place(row, column, float(distances[k])))
+            if self.violation is not None:
+                open_ &= stretches.begin < self.violation.row - offset
+            stretches = stretches.halves(open_)
+
+    def _remember(self, column: int, places: Floats, distances: Floats, offset: int) -> None:
+        """Take the closest place if it is closer than all before."""
+        k = int(np.argmin(distances))
+        # Distances that are enough may be smaller than they really are.
+        if distances[k] < self._enough(column):
+            row = offset + int(np.ceil(places[k]))
+            self.closest = Place(max(row, 0), column, float(distances[k]))
+
+    def _violate(self, place: Place) -> None:
+        """Take a violation if it is the first one."""
+        place = place._replace(row=max(place.row, 0))
+        if self.violation is None or place.row < self.violation.row:
+            self.violation = place
