@@ -20,6 +20,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     OutputKind,
     PartAction,
     PartChange,
+    PathOffset,
     SafeOutput,
     Waypoint,
 )
@@ -192,6 +193,29 @@ def test_points_that_were_appended_are_checked_too(driver, home):
     )
     driver.change_cell(remove=['wall'])
     driver.execute(Goal(waypoints=(Waypoint(pose=home()),)), timeout=20.0).raise_for_error()
+
+
+@pytest.mark.parametrize('execution', ['PRIMITIVES', 'SERVO'])
+def test_a_body_beside_the_path_stops_a_goal_that_offsets_may_lead_there(driver, home, execution):
+    """The body is far enough from the path itself, and too near to the band of the offsets."""
+    x, y, z = home().position
+    shape = PlacedShape(Box((0.02, 0.3, 0.02)))
+    place = Pose((x + 0.0315 + 0.05, y + 0.15, z + 0.005))  # 40 mm beside the flange
+    body = CellBody(name='rail', shapes=(shape,), T_frame_body=place)
+    outcomes = []
+    wide = PathOffset(limits=(0.0, 0.045, 0.0), speed=0.05, acceleration=1.0)
+    for band in (PathOffset(), wide):
+        points = [Waypoint(pose=home(y=0.06 * k), time=1.5 * k) for k in (1, 2)]
+        goal = Goal(waypoints=points, execution=ExecutionMode[execution], path_offset=band)
+        motion = driver.start(driver.plan(goal))
+        wait_for(lambda: driver.progress is not None and driver.progress.fraction > 0.1, 10.0)
+        driver.change_cell([body])
+        outcomes.append(motion.result(20.0))
+        driver.change_cell(remove=['rail'])
+        driver.execute(Goal(waypoints=(Waypoint(pose=home()),)), timeout=20.0).raise_for_error()
+    assert outcomes[0].succeeded, outcomes[0]
+    assert outcomes[1].code is ErrorCode.COLLISION
+    assert 'With a path offset of' in outcomes[1].text
 
 
 def test_live_targets_stop_before_a_body_that_has_come(driver, home):

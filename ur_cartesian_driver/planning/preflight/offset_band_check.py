@@ -13,7 +13,7 @@ The corners of the band are checked along the whole path, as the path itself was
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import ceil, hypot
@@ -249,12 +249,28 @@ class OffsetBandCheck:
 
         :raises GoalRefused: a corner fails a check; the text names corner, point and bound.
         """
-        path, band = self.reference, self.band
         self._check_tool_speeds()
-        q, qd = self.q, self.qd
-        axes = np.array([band.axes_at(time) for time in path.time.tolist()])
-        joint_speeds = np.abs(qd) + self._joint_speeds_of_offsets(q, axes)
-        sides = ((-limit, limit) if limit else (0.0,) for limit in band.limits)
+        q, axes = self.q, self._axes()
+        joint_speeds = np.abs(self.qd) + self._joint_speeds_of_offsets(q, axes)
+        return self._at_corners(lambda corner: self._check_corner(corner, axes, q, joint_speeds))
+
+    def check_clearance(self) -> list[str]:
+        """
+        Check the clearance alone at all corners, and return the warnings about it.
+
+        :raises GoalRefused: a corner fails the check, or cannot be reached.
+        """
+        axes = self._axes()
+        return self._at_corners(
+            lambda corner: self._clearance(self._joints_at(corner, axes, self.q))
+        )
+
+    def _axes(self) -> Floats:
+        return np.array([self.band.axes_at(time) for time in self.reference.time.tolist()])
+
+    def _at_corners(self, check: Callable[[Vector3], list[str]]) -> list[str]:
+        """Make a check at all corners; the text of a refusal or a warning names the corner."""
+        sides = ((-limit, limit) if limit else (0.0,) for limit in self.band.limits)
         warnings: list[str] = []
         for corner in map(vector3, product(*sides)):
             where = ', '.join(
@@ -263,7 +279,7 @@ class OffsetBandCheck:
                 if value
             )
             try:
-                found = self._check_corner(corner, axes, q, joint_speeds)
+                found = check(corner)
             except GoalRefused as refusal:
                 raise refusal.reworded(f'With a path offset of {where}: {refusal}') from None
             warnings += (f'with a path offset of {where}: {warning}' for warning in found)
@@ -303,10 +319,14 @@ class OffsetBandCheck:
         self, corner: Vector3, axes: Floats, q: Floats, joint_speeds: Floats
     ) -> list[str]:
         """Check one corner, and return the warnings about its clearance."""
-        arm, path = self.kinematics.arm, self.reference
         there = self._joints_at(corner, axes, q)
         self._check_singularities(q, there)
         self._check_joint_speeds(q, there, joint_speeds)
+        return self._clearance(there)
+
+    def _clearance(self, there: Floats) -> list[str]:
+        """Check the clearance at joint positions along a corner, and return the warnings."""
+        arm, path, q = self.kinematics.arm, self.reference, self.q
         start, warnings = vector6(q[0].tolist()), []
         for T_flange_tip in self.tool_tips:
             # The tool takes and puts down parts on the path, whatever the offset.

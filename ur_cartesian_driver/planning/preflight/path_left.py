@@ -21,10 +21,15 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import PartChange
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.offset_band import OffsetBand
 from ur_cartesian_driver.motion.plan.plan import Plan, ReferencePath
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines, JointSamples
-from ur_cartesian_driver.planning.preflight.offset_band_check import dense_path, path_joints
+from ur_cartesian_driver.planning.preflight.offset_band_check import (
+    dense_path,
+    OffsetBandCheck,
+    path_joints,
+)
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.controlled_frame import tool_tips
 
@@ -38,6 +43,8 @@ class PathLeft:
     spline: JointSpline | None
     T_flange_tcp: Pose
     tool_tips: tuple[Pose, ...]
+    #: The band in which offsets may move the tool; None = offsets are not allowed.
+    band: OffsetBand | None = None
     #: Time from which another path is in effect [s].
     until: float = inf
 
@@ -49,6 +56,7 @@ class PathLeft:
             spline=spline,
             T_flange_tcp=plan.T_flange_tcp or plan.T_flange_active,
             tool_tips=tool_tips(plan.goal, plan.T_flange_active),
+            band=plan.offset_band,
         )
 
     @property
@@ -76,11 +84,10 @@ class PathLeft:
         path = self.reference.since(time)
         if len(path.time) < 2 or self.end <= time:
             return
-        path = dense_path(path)
+        path, kinematics = dense_path(path), TcpKinematics(arm, self.T_flange_tcp)
         if self.spline is not None:
             joints = self.spline.rows(path.time)[0]
         else:
-            kinematics = TcpKinematics(arm, self.T_flange_tcp)
             joints, _ = path_joints(path, kinematics, q)
         ahead = (path.time >= time) & (path.time <= self.until)
         samples = JointSamples(path.point[ahead], path.fraction[ahead], joints[ahead])
@@ -88,6 +95,17 @@ class PathLeft:
             # The arm itself and the planes are as they were when the path was planned.
             only_cell = replace(options, self_collision='off', workspace_planes=())
             clearance_lines(arm, self.tool_tips, only_cell, samples, q, part_changes)
+            if self.band is not None:
+                OffsetBandCheck(
+                    kinematics=kinematics,
+                    options=only_cell,
+                    band=self.band,
+                    reference=path,
+                    q=joints,
+                    qd=np.zeros_like(joints),
+                    tool_tips=self.tool_tips,
+                    part_changes=part_changes,
+                ).check_clearance()
 
 
 def joints_at(plan: Plan, waypoint: int) -> Joints:
