@@ -8,6 +8,7 @@ from typing import Any
 
 from ur_cartesian_driver.driver import Driver, DriverConfig, MotionHandle
 from ur_cartesian_driver.path import Frames, Path, Pose, StaticFrame
+from ur_cartesian_driver.planning import PlanningOptions
 
 
 def robot_options() -> argparse.ArgumentParser:
@@ -19,24 +20,32 @@ def robot_options() -> argparse.ArgumentParser:
 
 
 def run(
-    make: Callable[[Pose], Path],
+    make: Callable[..., Path],
     frames: Sequence[StaticFrame] = (),
     meanwhile: Callable[[MotionHandle, Pose], None] = lambda motion, start: None,
+    *,
+    cell_file: str = '',
+    air: dict[str, float] | None = None,
     **settings: Any,
 ) -> None:
-    """Make a path from where the tool of a robot is, print its plan, and carry it out."""
+    """
+    Make a path from where the tool of a robot is, print its plan, and carry it out.
+
+    :param air: how the arm travels from path to path; then ``make`` also takes the air travel.
+    """
     parser = robot_options()
     parser.add_argument('--plan', action='store_true', help='do not move')
     given = parser.parse_args()
     config = DriverConfig(
         robot_ip=given.robot_ip, ur_type=given.ur_type, headless_mode=True, **settings
     )
-    with Driver(config, frames=Frames(static_frames=frames)) as driver:
+    options = PlanningOptions(cell_file=cell_file)
+    with Driver(config, options, frames=Frames(static_frames=frames)) as driver:
         driver.wait_ready(timeout=10.0)
         state = driver.state
         assert state is not None
         start = state.actual_tcp_pose
-        path = make(start)
+        path = make(start) if air is None else make(start, driver.air_travel(**air))
         plan = driver.plan(path)
         print(*plan.report, sep='\n')
         if not given.plan:

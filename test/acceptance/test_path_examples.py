@@ -29,6 +29,8 @@ from ur_cartesian_driver.driver import ConnectionState, DriverConfig
 from ur_cartesian_driver.execution.monitoring import standstill
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.cell.cell import EMPTY_CELL
+from ur_cartesian_driver.motion.cell.cell_file import read_cell
 from ur_cartesian_driver.motion.errors import ErrorCode, RobotNotReady
 from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot
 from ur_cartesian_driver.path import DOWN, Frames, mm, Path
@@ -209,7 +211,11 @@ def established(controller):
 @pytest.mark.parametrize('name', NAMES)
 def test_an_example_is_carried_out_as_it_says(cell, name, over_ros):
     module = example(name)
-    path = getattr(module, name)(cell.go_home().actual_tcp_pose)
+    bodies = read_cell(module.CELL) if hasattr(module, 'CELL') else EMPTY_CELL
+    cell.driver.options = replace(cell.driver.options, cell=bodies)
+    start = cell.go_home().actual_tcp_pose
+    air = [cell.driver.air_travel(**module.AIR)] if hasattr(module, 'AIR') else []
+    path = getattr(module, name)(start, *air)
     frames = Frames(static_frames=getattr(module, 'FRAMES', ()))
     execute = cell.client.execute if over_ros else cell.driver.execute
     cell.robot.call(established)  # a welding source has its arc
