@@ -27,6 +27,8 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 # Directions that are tried without coal: the bound is then within a millimetre for most pairs.
 _ROUNDS = 60
 _TINY = 1e-300
+# Solids that touch overlap by this at least [m]: a clearance of 0 means that they do not.
+_TOUCH = 1e-9
 # A long solid is covered by spheres until each is this many times as long as wide.
 _STRETCH, _MAX_SPHERES = 1.5, 8
 
@@ -218,8 +220,8 @@ def distances(a: Solid, frames_a: Frames, b: Solid, frames_b: Frames) -> Floats:
     Return the distances of two solids.
 
     :param frames_a: n frames of the carrier, or one if it stands; the same for ``b``.
-    :returns: (n,) [m]; negative where convex solids overlap, at most 0 where meshes touch. Without
-        coal, a lower bound.
+    :returns: (n,) [m]; negative where solids overlap or meshes touch, but the depth is that of
+        convex solids only. Without coal, a lower bound.
     """
     own_a, own_b = a.frames(frames_a), b.frames(frames_b)
     for half_space, plane, other, place in ((a, own_a, b, own_b), (b, own_b, a, own_a)):
@@ -248,7 +250,8 @@ def _measured(a: Any, frames_a: Frames, b: Any, frames_b: Frames) -> Floats:
     for T_a, T_b in zip(*_transforms(frames_a, frames_b), strict=True):
         result.clear()
         found.append(measure(a, T_a, b, T_b, request, result))
-    return np.array(found)
+    # Of two meshes that pass through each other it is 0.
+    return np.where(np.array(found) > 0.0, found, np.minimum(found, -_TOUCH))
 
 
 def _transforms(frames_a: Frames, frames_b: Frames) -> Iterator[Sequence[Any]]:
@@ -272,10 +275,19 @@ def _separations(a: Solid, frames_a: Frames, b: Solid, frames_b: Frames) -> Floa
     gap = frames_a.origin - frames_b.origin
     gap = np.where(np.abs(gap).max(axis=1, keepdims=True) > 0.0, gap, (0.0, 0.0, 1e-9))
     bound = np.full(count, -np.inf)
-    for _ in range(_ROUNDS):
-        direction = gap / np.maximum(np.linalg.norm(gap, axis=1), _TINY)[:, None]
+    # Faces first: towards the wide face of a plate, the algorithm takes many rounds.
+    axes = np.concatenate([frames_a.rotation, frames_b.rotation], axis=2).transpose(2, 0, 1)
+    for axis in axes:
+        direction = np.where(np.einsum('ni,ni->n', axis, gap)[:, None] < 0.0, -axis, axis)
         corner = a.supports(-direction, frames_a) - b.supports(direction, frames_b)
         bound = np.maximum(bound, np.einsum('ni,ni->n', direction, corner))
+    for _ in range(_ROUNDS):
+        length = np.linalg.norm(gap, axis=1)
+        direction = gap / np.maximum(length, _TINY)[:, None]
+        corner = a.supports(-direction, frames_a) - b.supports(direction, frames_b)
+        # Without a length there is no direction, and the solids overlap.
+        separation = np.where(length > 0.0, np.einsum('ni,ni->n', direction, corner), -np.inf)
+        bound = np.maximum(bound, separation)
         step = gap - corner
         part = np.einsum('ni,ni->n', gap, step) / np.maximum(
             np.einsum('ni,ni->n', step, step), _TINY

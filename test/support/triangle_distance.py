@@ -1,0 +1,182 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Distances by brute force over triangles, with nothing but numpy: the judge of distances.
+
+A surface is an array (n, 3, 3) of the corners of its triangles [m].
+"""
+
+from itertools import chain, repeat
+
+import numpy as np
+from scipy.spatial import cKDTree, ConvexHull
+
+# Pairs of triangles that are measured at once: the nearest few first, which rule out most others.
+_CHUNKS = (128, 1024, 8192)
+_TINY = 1e-300
+
+
+def triangle_distance(one, other):
+    """
+    Return the smallest distance of two surfaces [m]; 0 where a triangle passes through another.
+
+    Only pairs whose boxes are nearer than the best pair so far are measured. The boxes are along
+    the axes: it is fastest in the frame in which long triangles are along these.
+    """
+    corners = cKDTree(other.reshape(-1, 3)).query(one.reshape(-1, 3))[0]
+    best = float(corners.min()) * (
+        1.0 + 1e-9
+    )  # of two points it is the distance, but for rounding
+    low, high = (_bounds(each) for each in (one, other))
+    one_near = _gaps(low, (high[0].min(axis=0), high[1].max(axis=0))) <= best
+    other_near = _gaps(high, (low[0].min(axis=0), low[1].max(axis=0))) <= best
+    a, b = one[one_near], other[other_near]
+    low, high = (_bounds(each) for each in (a, b))
+    gaps = np.concatenate(
+        [
+            _gaps((low[0][k : k + 64, None], low[1][k : k + 64, None]), high)
+            for k in range(0, len(a), 64)
+        ]
+    )
+    rows, columns = np.nonzero(gaps <= best)
+    gaps = gaps[rows, columns]
+    order = np.argsort(gaps)
+    begin = 0
+    for size in chain(_CHUNKS, repeat(_CHUNKS[-1])):
+        some = order[begin : begin + size]
+        begin += size
+        if not len(some) or gaps[some[0]] > best:
+            break
+        best = min(best, float(_pair_distances(a[rows[some]], b[columns[some]]).min()))
+        if best == 0.0:
+            break
+    return best
+
+
+def _bounds(triangles):
+    return triangles.min(axis=-2), triangles.max(axis=-2)
+
+
+def _gaps(a, b):
+    """Return the distances of boxes, each given by its lowest and its highest corner."""
+    apart = np.maximum(np.maximum(a[0] - b[1], b[0] - a[1]), 0.0)
+    return np.sqrt(np.einsum('...c,...c', apart, apart))
+
+
+def _pair_distances(p, q):
+    """Return the distances (n,) of pairs of triangles (n, 3, 3)."""
+    of_p, of_q = (each.ravel() for each in np.meshgrid(range(3), range(3)))
+    edges = p[:, of_p], p[:, of_p - 2], q[:, of_q], q[:, of_q - 2]
+    best = _segment_distances(*edges).min(axis=1)
+    for one, other in ((p, q), (q, p)):
+        normal = np.cross(other[:, 1] - other[:, 0], other[:, 2] - other[:, 0])
+        length = np.linalg.norm(normal, axis=1)
+        normal = normal / np.maximum(length, _TINY)[:, None]
+        heights = np.einsum('nkc,nc->nk', one - other[:, :1], normal)
+        heights[length < _TINY] = np.inf  # a point or a line has no face
+        for k in range(3):
+            above = _is_inside(one[:, k], other, normal)
+            best = np.where(above, np.minimum(best, np.abs(heights[:, k])), best)
+            start, end = heights[:, k], heights[:, k - 2]
+            crossing = np.flatnonzero(np.isfinite(start) & (start * end < 0.0))
+            part = (start[crossing] / (start[crossing] - end[crossing]))[:, None]
+            edge = one[crossing, k - 2] - one[crossing, k]
+            point = one[crossing, k] + part * edge
+            best[crossing[_is_inside(point, other[crossing], normal[crossing])]] = 0.0
+    return best
+
+
+def _is_inside(points, corners, normals):
+    """Whether points (n, 3) are above or below their triangles (n, 3, 3)."""
+    inside = np.linalg.norm(normals, axis=1) > 0.5
+    for k in range(3):
+        edge = corners[:, k - 2] - corners[:, k]
+        across = np.cross(edge, points - corners[:, k])
+        inside &= np.einsum('nc,nc->n', across, normals) >= 0.0
+    return inside
+
+
+def _segment_distances(a, a_end, b, b_end):
+    """Return the distances (...) of segments: between both lines, or at one of the four ends."""
+    u, v, r = a_end - a, b_end - b, a - b
+    uu, vv, uv, ur, vr = (
+        np.einsum('...c,...c', x, y) for x, y in ((u, u), (v, v), (u, v), (u, r), (v, r))
+    )
+
+    def apart(s, t):
+        between = r + s[..., None] * u - t[..., None] * v
+        return np.einsum('...c,...c', between, between)
+
+    zero, one = np.zeros_like(uu), np.ones_like(uu)
+    square = np.minimum.reduce(
+        [
+            apart(zero, np.clip(vr / np.maximum(vv, _TINY), 0.0, 1.0)),
+            apart(one, np.clip((vr + uv) / np.maximum(vv, _TINY), 0.0, 1.0)),
+            apart(np.clip(-ur / np.maximum(uu, _TINY), 0.0, 1.0), zero),
+            apart(np.clip((uv - ur) / np.maximum(uu, _TINY), 0.0, 1.0), one),
+        ]
+    )
+    cross = uu * vv - uv * uv
+    crosses = cross > 1e-12 * uu * vv
+    safe = np.where(crosses, cross, 1.0)
+    s, t = (uv * vr - ur * vv) / safe, (uu * vr - uv * ur) / safe
+    within = crosses & (s >= 0.0) & (s <= 1.0) & (t >= 0.0) & (t <= 1.0)
+    return np.sqrt(np.where(within, np.minimum(square, apart(s, t)), square))
+
+
+def encloses(surface, point):
+    """Whether a closed surface encloses a point: it fills the whole view (Van Oosterom)."""
+    a, b, c = (surface[:, k] - point for k in range(3))
+    x, y, z = (np.linalg.norm(each, axis=1) for each in (a, b, c))
+    volume = np.einsum('nc,nc->n', a, np.cross(b, c))
+    rest = (
+        x * y * z
+        + np.einsum('nc,nc->n', a, b) * z
+        + np.einsum('nc,nc->n', b, c) * x
+        + np.einsum('nc,nc->n', c, a) * y
+    )
+    return abs(np.arctan2(volume, rest).sum()) > np.pi
+
+
+def hull_surface(points):
+    """Return the surface of the convex hull of points (n, 3), its triangles turned outwards."""
+    hull = ConvexHull(points)
+    triangles = points[hull.simplices]
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    inward = np.einsum('nc,nc->n', normals, hull.equations[:, :3]) < 0.0
+    triangles[inward] = triangles[inward][:, ::-1]
+    return triangles
+
+
+def box_surface(size):
+    """Return the twelve triangles of a box around the origin."""
+    signs = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3)).reshape(3, -1).T
+    return hull_surface(signs * np.array(size))
+
+
+def cylinder_surfaces(radius, length, n=128):
+    """
+    Return two prisms about z: one that a cylinder contains, and one that contains it.
+
+    With 128 sides they are 0.06 % of the radius apart.
+    """
+    angle = 2.0 * np.pi / n * np.arange(n)
+    rim = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    found = []
+    for r in (radius, radius / np.cos(np.pi / n)):
+        low, high = (np.column_stack([r * rim, np.full(n, z)]) for z in (-length / 2, length / 2))
+        after = [np.roll(each, -1, axis=0) for each in (low, high)]
+        bottom, top = (np.tile(each.mean(axis=0), (n, 1)) for each in (low, high))
+        faces = (
+            (low, after[0], high),
+            (after[0], after[1], high),
+            (bottom, after[0], low),
+            (top, high, after[1]),
+        )
+        found.append(np.concatenate([np.stack(face, axis=1) for face in faces]))
+    return tuple(found)
+
+
+def moved(surface, T):
+    """Return a surface moved by a matrix (4, 4)."""
+    return surface @ T[:3, :3].T + T[:3, 3]
