@@ -35,8 +35,8 @@ from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 pytestmark = needs_checkout
 
 ERRORS = CHECKOUT / 'doc' / 'errors.md'
-#: Tutorials whose commands need each other: test_tutorials.py runs them.
-FOLLOWED = {'tutorial_file'}
+#: Pages whose commands need files of theirs: test_tutorials.py and test_cell_page.py run them.
+FOLLOWED = {'tutorial_file', 'cell'}
 #: Codes that no example of one goal and one robot can show.
 WITHOUT_EXAMPLE = {ErrorCode.PREEMPTED}
 
