@@ -32,6 +32,8 @@ RESOLUTION = 2e-5
 _STRETCH, _BLOCK = 64, 8192
 # A pair counts as separating while its distance shrinks by no more than this [m], by rounding.
 _RECEDING_TOLERANCE = 1e-4
+# How far bodies of such a pair move between two places where it is measured, at most [m].
+_LEAVING_STEP = 0.002
 # Larger than any distance in a cell [m].
 _FAR = 1e3
 # The smallest distance of a path is found to this fraction of itself, or to this length [m].
@@ -143,6 +145,15 @@ def _at(ways: Floats, places: Floats) -> Floats:
     return found
 
 
+def _dense_places(ways: Floats) -> Floats:
+    """Return all rows but the first, and places between rows that are close to each other."""
+    counts = np.maximum(1, np.ceil(np.diff(ways) / _LEAVING_STEP)).astype(np.intp)
+    row = np.repeat(np.arange(len(counts)), counts)
+    number = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+    places: Floats = row + (number + 1.0) / counts[row]
+    return places
+
+
 class CellClearance:
     """The clearance of one arm from the bodies of its cell."""
 
@@ -247,28 +258,34 @@ class _Search:
             distance = float(bodies.distances(column, first, inf)[0])
             if distance < clearance:
                 self._pending[column] = distance
+                self._remember(column, np.zeros(1), np.array([distance]), -1)
 
     def _leave(self, column: int, motion: _Motion, offset: int) -> float | None:
         """
         Follow a pair that was too close at the start.
 
-        :returns: the row from which on it is clear; None = it stays close, or is violated.
+        :returns: the place from which on it is clear; None = it stays close, or is violated.
         """
         clearance = float(self._bodies.clearances[column])
-        distances = self._bodies.distances(column, motion.poses[1:], inf)
-        reached = np.maximum.accumulate(np.append(self._pending[column], distances))
-        free = distances >= clearance
-        end = int(np.argmax(free)) if free.any() else len(free)
-        nearer = np.flatnonzero(distances[:end] < reached[:end] - _RECEDING_TOLERANCE)
-        if len(nearer):
-            row = int(nearer[0])
-            self._violate(Place(offset + 1 + row, column, float(distances[row])))
-            return None
-        self._pending[column] = float(reached[-1])
-        if not free.any():
-            return None
-        del self._pending[column]
-        return float(end + 1)
+        ways = motion.ways_of(self._bodies.carriers[column])
+        for begin in range(0, len(ways) - 1, _STRETCH):
+            places = begin + _dense_places(ways[begin : begin + _STRETCH + 1])
+            distances = self._bodies.distances(column, motion.at(places), inf)
+            reached = np.maximum.accumulate(np.append(self._pending[column], distances))
+            free = distances >= clearance
+            end = int(np.argmax(free)) if free.any() else len(free)
+            nearer = np.flatnonzero(distances[:end] < reached[:end] - _RECEDING_TOLERANCE)
+            if len(nearer):
+                k = int(nearer[0])
+                row = offset + int(np.ceil(places[k]))
+                self._violate(Place(row, column, float(distances[k])))
+                return None
+            self._remember(column, places[:end], distances[:end], offset)
+            self._pending[column] = float(reached[-1])
+            if end < len(free):
+                del self._pending[column]
+                return float(places[end])
+        return None
 
     def _search_pair(
         self, column: int, motion: _Motion, offset: int, stretches: _Stretches
@@ -283,8 +300,7 @@ class _Search:
             bend = motion.bend(middle, carriers)
             needed = enough + float(bend.max())
             distances = bodies.distances(column, motion.at(middle), needed)
-            if not bodies.are_neighbours[column]:
-                self._remember(column, middle, distances, offset)
+            self._remember(column, middle, distances, offset)
             sure = distances - bend
             open_ = (sure < enough + reach) & (reach > RESOLUTION)
             bad = np.flatnonzero(sure < clearance)
@@ -298,9 +314,12 @@ class _Search:
 
     def _remember(self, column: int, places: Floats, distances: Floats, offset: int) -> None:
         """Take the closest place if it is closer than all before."""
+        if self._bodies.are_neighbours[column] or not len(places):
+            return
         k = int(np.argmin(distances))
+        before = inf if self.closest is None else self.closest.distance
         # Distances that are enough may be smaller than they really are.
-        if distances[k] < self._enough(column):
+        if distances[k] < min(before, self._enough(column)):
             row = offset + int(np.ceil(places[k]))
             self.closest = Place(max(row, 0), column, float(distances[k]))
 
