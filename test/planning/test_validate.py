@@ -311,6 +311,12 @@ REFUSALS = [
         InvalidGoal,
         'only points of a goal with keep_open can',
     ),
+    # a travel at the beginning
+    (
+        replace(PLAIN, allow_travel=True, keep_open=True),
+        NotAvailable,
+        'allow_travel is set, but points of a goal with keep_open are planned one by one',
+    ),
     (replace(PLAIN, age=nan), InvalidGoal, 'trajectory.header.stamp contains nan'),
     # quaternions
     (
