@@ -77,7 +77,8 @@ from ur_cartesian_driver.path import AirTravel, Path
 from ur_cartesian_driver.planning import plan, plan_joint_goal, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_first_part
 from ur_cartesian_driver.planning.preflight.clearance import self_collision_remark
-from ur_cartesian_driver.planning.stop_prediction import predict_stop
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_change
+from ur_cartesian_driver.planning.stop_prediction import at_set_point, predict_stop
 from ur_cartesian_driver.preview import ArmPlan
 from ur_cartesian_driver.program.render import has_feature
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_plan
@@ -95,6 +96,8 @@ LOOP_LOST = 'The robot loop ended unexpectedly, or hangs; the robot program stop
 
 #: Longest time from the cancel of a motion to its outcome [s], whatever the robot does.
 CANCEL_TIMEOUT = 2.0 * STOP_TIMEOUT + 1.0
+# An arm whose joints have turned by no more than this has not moved: a mm at the tool [rad].
+_SAME_JOINTS = 1e-3
 
 
 class Driver(RobotServices, InteractiveMotions, ChangeableCell):
@@ -283,6 +286,20 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         )
         return ArmPlan.of(planned, arm, options)
 
+    def renewed(self, plan: Plan) -> Plan:
+        """
+        Return a plan, made again if it begins with a travel and the arm has moved since.
+
+        :raises GoalRefused: the goal fails a check from where the arm stands now.
+        :raises RobotNotReady: the robot does not report its state.
+        """
+        if plan.travelled_goal is None:
+            return plan
+        q = at_set_point(self._require(self.rest_state), self.arm).actual_q
+        if max_joint_change(plan.start, q) <= _SAME_JOINTS:
+            return plan
+        return self.plan(plan.travelled_goal)
+
     def air_travel(self, **settings: Any) -> AirTravel:
         """
         Return what :meth:`.Path.travel_to` and :func:`.join` need: the arm, where it stands now.
@@ -304,9 +321,12 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         """
         Execute a plan and return at once.
 
+        A plan that begins with a travel is made again first if the arm has moved since.
+
         :raises RobotNotReady: the robot program is not connected, a motion is running, or the plan
             was made for another robot program.
-        :raises GoalRefused: the cell has changed since the plan was made, and it would touch.
+        :raises GoalRefused: the cell has changed since the plan was made, and it would touch; or
+            the plan was made again, as :meth:`renewed` does, and the goal is refused.
         :raises LocalProtocolError: a value of the plan does not fit into a message.
         """
         if plan.older_program != self.config.dialect.older_program:
@@ -314,6 +334,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
                 'The plan was made for another robot program than the one that runs; make it with '
                 'Driver.plan().'
             )
+        plan = self.renewed(plan)
         planned_in = plan.options.cell if isinstance(plan, ArmPlan) else None
         cell = self._check_cell_of(plan, planned_in)
         if plan.goal.keep_open:
@@ -451,7 +472,8 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
                 f'is {1e3 * distance:.1f} mm and {angle:.3f} rad away from the tool (allowed are '
                 f'{1e3 * options.start_tolerance_position:g} mm and '
                 f'{options.start_tolerance_angle:g} rad)',
-                'begin the path with a joint motion to there, or where the tool stands',
+                'begin the path with a joint motion to there, or where the tool stands, or use '
+                'allow_travel()',
             )
         return goal
 

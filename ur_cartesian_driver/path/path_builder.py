@@ -80,7 +80,6 @@ from ur_cartesian_driver.path.resumption import APPROACH, OVERLAP, resume
 from ur_cartesian_driver.path.travels.traveller import (
     AirTravel,
     ArmStand,
-    BLEND_FACTORS,
     Leg,
     no_start,
     PathBegin,
@@ -89,6 +88,7 @@ from ur_cartesian_driver.path.travels.traveller import (
 from ur_cartesian_driver.path.weave import strokes, woven
 from ur_cartesian_driver.planning.request.goal_fields import is_rounded
 from ur_cartesian_driver.planning.request.validate import check
+from ur_cartesian_driver.planning.travel.travel_to_goal import BLEND_FACTORS
 
 
 @dataclass(frozen=True, slots=True, init=False, repr=False)
@@ -259,6 +259,20 @@ class Path(PathWithEvents):
         :raises InvalidGoal: the horizon is out of its range.
         """
         return self._with_settings('keep_open()', keep_open=True, replace_horizon=replace_horizon)
+
+    def allow_travel(self) -> Path:
+        """
+        Let the arm travel to the path if it stands far away, or the direct way is refused.
+
+        The driver finds the way when it plans the path (PRIMITIVES without durations). A start
+        becomes the first point of the path, to which the arm goes on a line where the direct way
+        is free.
+        """
+        path = self._with_settings('allow_travel()', allow_travel=True)
+        if self._start is None:
+            return path
+        begin = self._with(_start=None, _points=()).line(self._start.pose, blend=0.0)
+        return path._with(_start=None, _points=(*begin._points, *self._points))
 
     def safe(self, output: Output, value: float, *, restore: bool = False) -> Path:
         """

@@ -100,6 +100,7 @@ from ur_cartesian_driver.planning.spline.spline_planner import (
     stretch_times,
 )
 from ur_cartesian_driver.planning.stop_prediction import at_set_point
+from ur_cartesian_driver.planning.travel.travel_to_goal import plan_with_travel
 
 #: Static error of the TCP of a CB3 arm at full reach [m]: about 0.3 mm, from the 0.2 to 0.4 mrad
 #: that were recorded on the joints of a UR10.
@@ -130,6 +131,19 @@ def plan(
     """
     if options.twin is not None and not options.robot.model:
         options = replace(options, robot=replace(options.robot, model=arm.model.name))
+    if goal.allow_travel and running is None:
+        return plan_with_travel(goal, state, arm, options, _plan_direct)
+    return _plan_direct(goal, state, arm, options, running)
+
+
+def _plan_direct(
+    goal: Goal,
+    state: RobotState,
+    arm: Arm,
+    options: PlanningOptions,
+    running: PlannedSegment | None = None,
+) -> Plan:
+    """Return the plan of a goal whose first motion begins where the arm stands."""
     table = check_for_arm(goal, state.T_flange_tcp, arm, options)
     if table.segments.free_axes.any():
         return _plan_free(table, state, arm, options)

@@ -9,6 +9,8 @@ times are predictions for full speed; the robot uses its own speed profile.
 
 from __future__ import annotations
 
+from bisect import bisect_left
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -25,6 +27,9 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6, ZERO6
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import MoveJ, OptimoveJ, OptimoveL, Spline, Stop
+
+# Times that differ by less than this [s] are the same.
+_INSTANT = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -162,12 +167,12 @@ def _joints(
     singularities where branches meet, it is the solution nearest to the straight joint line.
     """
     lines = _joint_moves(plan)
-    point = plan.reference.point
+    firsts = [line.first for line in lines]
     rows = np.full((len(poses), 6), np.nan)
     q = plan.start
-    for k, pose in enumerate(poses):
-        line = lines.get(int(point[min(ceil(row_position[k]), len(point) - 1)]))
-        q_near = q if line is None else line.at(float(row_position[k]))
+    for k, (pose, position) in enumerate(zip(poses, row_position.tolist(), strict=True)):
+        line = lines[bisect_left(firsts, position) - 1] if lines else None
+        q_near = line.at(position) if line and line.first < position <= line.last else q
         found = nearest(arm, pose @ T_tcp_flange, q_near)
         if found is not None:
             rows[k] = q = found
@@ -188,16 +193,23 @@ class _JointMove:
         return vector6(x + u * (y - x) for x, y in zip(self.q_start, self.q_end, strict=True))
 
 
-def _joint_moves(plan: Plan) -> dict[int, _JointMove]:
-    """Return the joint moves, by the point to which each leads."""
-    point = plan.reference.point
-    lines = {}
+def _joint_moves(plan: Plan) -> list[_JointMove]:
+    """Return the joint moves in order."""
+    reference, planned = plan.reference, plan.rows
+    ends = np.cumsum(planned.durations)
+    # A travel has several motions to the same point; their rows are told apart by their times.
+    shared = Counter(planned.waypoints.tolist())
+    lines = []
     q = plan.start
-    for segment in plan.segments:
+    for segment, end in zip(plan.segments, ends.tolist(), strict=True):
         if isinstance(segment.primitive, MoveJ | OptimoveJ):
-            first, last = np.searchsorted(point, [segment.waypoint, segment.waypoint + 1])
-            lines[segment.waypoint] = _JointMove(
-                q, segment.joints, max(0, int(first) - 1), int(last) - 1
+            first, last = np.searchsorted(
+                reference.point, [segment.waypoint, segment.waypoint + 1]
             )
+            if shared[segment.waypoint] > 1:
+                times = [end - segment.duration + _INSTANT, end + _INSTANT]
+                begin, stop = np.searchsorted(reference.time, times)
+                first, last = max(first, begin), min(last, stop)
+            lines.append(_JointMove(q, segment.joints, max(0, int(first) - 1), int(last) - 1))
         q = segment.joints
     return lines

@@ -595,3 +595,6 @@ class Goal:
     feed_override: FeedOverride = FeedOverride()
     pulses: tuple[PulseTrain, ...] = ()
     part_changes: tuple[PartChange, ...] = ()
+    #: Whether the arm may go to the first point by a way that the driver finds, if that point is
+    #: far away or the way there is blocked.
+    allow_travel: bool = False

@@ -267,13 +267,14 @@ class PlannedRows(Rows[PlannedSegment]):
         """
         The name of the class of the motion to each point, by the index of the point.
 
-        A point that is passed within a motion has the class of that motion.
+        A point that is passed within a motion has the class of that motion; the point at the end
+        of a travel that of the last motion.
         """
         found: dict[int, str] = {}
         passed = 0
         for waypoint, kind in zip(self.waypoints.tolist(), classes(self.primitives), strict=True):
             if not issubclass(kind, Stop):
-                found |= dict.fromkeys(range(passed, waypoint + 1), kind.__name__)
+                found |= dict.fromkeys(range(min(passed, waypoint), waypoint + 1), kind.__name__)
                 passed = waypoint + 1
         return found
 
@@ -323,6 +324,9 @@ class Plan:
     offset_band: OffsetBand | None = None
     #: The tolerances of a joint goal; None if the goal is Cartesian.
     joint_tolerances: JointTolerances | None = None
+    #: The goal as it was asked for, if the plan begins with a travel from where the arm stood; if
+    #: it stands elsewhere when the motion starts, this goal is planned again.
+    travelled_goal: Goal | None = None
     #: Lines of the report about ignored, slowed or changed requests, or about the whole goal.
     remarks: tuple[str, ...] = field(default=())
     #: Finds the slow stretches; called only on demand, because long goals have many.

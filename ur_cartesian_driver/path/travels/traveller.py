@@ -33,13 +33,7 @@ from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_chan
 from ur_cartesian_driver.planning.stop_prediction import at_set_point, state_at_rest
 from ur_cartesian_driver.planning.travel.arm_space import ArmSpace
 from ur_cartesian_driver.planning.travel.transfer import find_transfer, TransferSettings
-
-#: The largest fraction of a motion that a blend takes at each end, and the least radius [m].
-_BLEND_SHARE, _MIN_BLEND = 0.4, 1e-3
-#: Fractions of these radii that are tried, until the blended path passes all checks.
-BLEND_FACTORS = (1.0, 0.5, 0.25, 0.1, 0.0)
-#: Configurations that differ by less than this [rad] are the same.
-_SAME = 1e-6
+from ur_cartesian_driver.planning.travel.travel_to_goal import blend_radii, MAX_BLEND, SAME_JOINTS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +52,7 @@ class AirTravel(TransferSettings):
     #: The frames that the paths can name.
     frames: Frames = field(default_factory=Frames)
     #: Largest blend radius of the motions through the air [m]; smaller where it does not fit.
-    blend: float = 0.05
+    blend: float = MAX_BLEND
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -177,17 +171,13 @@ class Traveller:
         """
         q = self._place.q
         for entry in entries:
-            if max_joint_change(q, entry) < _SAME:
+            if max_joint_change(q, entry) < SAME_JOINTS:
                 return [], entry
         found = find_transfer(self.space, q, entries, self._by, self._where)
         poses = list(self._poses(q, found.waypoints))
-        lengths = [a.distance_to(b) for (a, _), (b, _) in pairwise(poses)]
-        radii = [
-            min(self._by.blend, _BLEND_SHARE * min(before, after))
-            for before, after in zip(lengths, [*lengths[1:], 0.0], strict=True)
-        ]
+        radii = blend_radii([pose for pose, _ in poses], self._by.blend)
         legs = [
-            Leg(pose, posture, radius if radius >= _MIN_BLEND else 0.0)
+            Leg(pose, posture, radius)
             for (pose, posture), radius in zip(poses[1:], radii, strict=True)
         ]
         return legs, found.goal
@@ -202,7 +192,7 @@ class Traveller:
             yield T_frame_base @ self.space.tcp(vector6(waypoints[0].tolist())), None
         names = [self._by.options.tf_prefix + name for name in JOINT_NAMES]
         for before, row in pairwise(waypoints):
-            if np.abs(row - before).max() >= _SAME:
+            if np.abs(row - before).max() >= SAME_JOINTS:
                 joints = vector6(row.tolist())
                 posture = dict(zip(names, joints, strict=True))
                 yield T_frame_base @ self.space.tcp(joints), posture

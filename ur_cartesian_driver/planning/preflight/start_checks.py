@@ -41,7 +41,7 @@ def check_approach(state: RobotState, target: Pose, options: PlanningOptions) ->
             point_field(0, 'pose.position'),
             f'is {distance:.4g} m away from the tool, more '
             f'than max_approach_distance = {bound:g} m',
-            'move closer first, add points in between, or raise the parameter',
+            'move closer first, add points in between, set allow_travel, or raise the parameter',
         )
 
 

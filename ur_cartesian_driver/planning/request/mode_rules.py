@@ -55,6 +55,13 @@ GOAL_RULES = {
             'belongs to people and would stay lowered if the driver died',
             ', with times or a corner_deviation',
         ),
+        ModeRule(
+            'allow_travel',
+            lambda traits: not traits.is_spline,
+            'is set, but a travel is made of motions of the robot, and the goal is executed as '
+            '{mode}',
+            ', or lead there by a goal of its own, such as that of Path.travel_to()',
+        ),
     )
 }
 

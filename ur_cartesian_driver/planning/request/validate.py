@@ -160,6 +160,28 @@ def _keep_open(goal: GoalTable, options: PlanningOptions) -> None:
     check_mode(goal, GOAL_RULES['replace_horizon'])
 
 
+def _travel(goal: GoalTable, options: PlanningOptions) -> None:
+    """Refuse fields that exclude allow_travel if it is set."""
+    check_mode(goal, GOAL_RULES['allow_travel'])
+    if not goal.allow_travel:
+        return
+    problem = ''
+    if is_timed(goal):
+        problem = 'but the points have times, and how long a travel takes is found out later'
+    elif goal.keep_open:
+        problem = 'but points of a goal with keep_open are planned one by one'
+    elif goal.path_offset:
+        problem = 'but the path gives way to offsets (path_offset), which a travel must not'
+    elif IS_ARC[goal.motions.types[0]]:
+        problem = 'but the first segment is CIRCULAR, an arc from where the arm stands'
+    if problem:
+        raise NotAvailable(
+            'allow_travel',
+            f'is set, {problem}',
+            'lead to the first point by a goal of its own with allow_travel',
+        )
+
+
 def _supported(goal: GoalTable, options: PlanningOptions) -> None:
     check_mode(goal, GOAL_RULES['on_path_tolerance'])
     if goal.on_path_tolerance == OnPathTolerance.STALL:
@@ -274,6 +296,7 @@ RULES: tuple[Rule, ...] = (
     _joint_points,
     check_frames,
     _keep_open,
+    _travel,
     _measurable_tolerances,
     _stamp,
     _supported,

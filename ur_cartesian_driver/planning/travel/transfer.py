@@ -11,6 +11,7 @@ is for the planner to check.
 from __future__ import annotations
 
 from collections.abc import Sequence
+import contextlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,8 @@ from ur_cartesian_driver.planning.travel.joint_path_search import search_joint_p
 
 #: The largest retract and approach [m]; more must be millimetres by mistake.
 MAX_RETRACT = 1.0
+#: The fractions of a length that are tried where it may be shorter.
+_SHORTER = (1.0, 0.4, 0.0)
 #: The largest number of samples.
 MAX_SAMPLES = 1_000_000
 
@@ -44,6 +47,8 @@ class TransferSettings:
     max_samples: int = 2000
     #: Another seed finds another way; the same seed finds the same way again.
     seed: int = 0
+    #: Whether retract and approach may be shorter, down to none, where they are not possible.
+    shorten: bool = False
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -69,6 +74,8 @@ class Transfer:
     goal: Joints
     #: The number of samples that the search took.
     samples: int
+    #: Whether the tool is retracted first.
+    retracts: bool
 
 
 def find_transfer(
@@ -89,7 +96,7 @@ def find_transfer(
     """
     if (touching := space.touching(q_start)) is not None:
         raise _collision(where, 'cannot begin', touching, q_start)
-    left = _along_tool(space, q_start, -settings.retract, f'{where}: the retract', 'retract')
+    left = _line_end(space, q_start, settings, f'{where}: the retract', 'retract')
     arrivals: dict[bytes, Joints] = {}
     refusal: GoalRefused | None = None
     for goal in goals:
@@ -97,7 +104,7 @@ def find_transfer(
             if (touching := space.touching(goal)) is not None:
                 raise _collision(where, 'cannot end', touching, goal)
             what = f'{where}: the approach'
-            begin = _along_tool(space, goal, -settings.approach, what, 'approach')
+            begin = _line_end(space, goal, settings, what, 'approach')
             arrivals[begin.tobytes()] = goal
         except GoalRefused as error:
             refusal = refusal or error
@@ -113,7 +120,19 @@ def find_transfer(
             'ask for another posture, or look at the bodies between, and at their clearance.'
         )
     end = found.waypoints[-1].tobytes()
-    return Transfer(found.waypoints, arrivals[end], found.samples)
+    retracts = bool(np.any(left != np.array(q_start)))
+    return Transfer(found.waypoints, arrivals[end], found.samples, retracts)
+
+
+def _line_end(
+    space: ArmSpace, q: Joints, settings: TransferSettings, what: str, setting: str
+) -> Floats:
+    """Return the configuration (6,) in which the retract ends, or the approach begins."""
+    length: float = getattr(settings, setting)
+    for fraction in _SHORTER if settings.shorten else ():
+        with contextlib.suppress(GoalRefused):
+            return _along_tool(space, q, -fraction * length, what, setting)
+    return _along_tool(space, q, -length, what, setting)
 
 
 def _along_tool(space: ArmSpace, q: Joints, distance: float, what: str, setting: str) -> Floats:

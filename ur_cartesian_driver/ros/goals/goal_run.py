@@ -256,6 +256,8 @@ class GoalRun:
             )
 
     def _execute(self, plan: Plan) -> Outcome:
+        # Feedback and pictures are of the plan that is executed.
+        plan = self._context.driver.renewed(plan)
         motion = self._context.driver.start(plan, self._feedback_publisher(plan))
         with self._lock:
             self._motion = motion
