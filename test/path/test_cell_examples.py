@@ -13,8 +13,8 @@ from tracked_files import tracked_files
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.cell.cell_file import read_cell
-from ur_cartesian_driver.motion.errors import CollisionPredicted
-from ur_cartesian_driver.motion.goal.goal import FreeAxis
+from ur_cartesian_driver.motion.errors import CollisionPredicted, InvalidGoal
+from ur_cartesian_driver.motion.goal.goal import FreeAxis, SegmentType
 from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot
 from ur_cartesian_driver.path import AirTravel, Frames, join, Path
 from ur_cartesian_driver.planning import plan, PlanningOptions
@@ -80,7 +80,7 @@ def test_every_cell_is_one_that_an_example_uses(file):
 @pytest.mark.parametrize(
     ('name', 'closest'),
     [
-        ('channel', 'cell: nozzle and channel come closest'),
+        pytest.param('channel', 'cell: nozzle and channel come closest', marks=pytest.mark.slow),
         ('torch_cable', 'cell: forearm_link and cable_loop come closest'),
         ('held_plank', 'cell: plank and post come closest'),
     ],
@@ -90,6 +90,7 @@ def test_the_report_names_the_closest_pair(name, closest):
     assert any(line.startswith(closest) for line in example.plan(example.goal).report)
 
 
+@pytest.mark.slow
 def test_the_nozzle_fits_into_the_channel_only_where_its_mesh_is_open():
     example = Example('channel')
     cell = example.options.cell
@@ -135,6 +136,22 @@ def test_the_best_order_of_the_seams_has_less_travel_than_the_one_given(monkeypa
     best = turns()
     monkeypatch.setattr(example.module, 'join', lambda seams, air, order: join(seams, air))
     assert best < 0.9 * turns()
+
+
+@pytest.mark.slow
+def test_a_start_far_away_needs_a_travel_and_the_partition_is_in_the_way():
+    example = Example('far_start')
+    report = example.plan(example.goal).report
+    assert any(line.startswith('travel: ') and 'partition' in line for line in report)
+    direct = replace(example.goal, allow_travel=False)
+    with pytest.raises(InvalidGoal, match='max_approach_distance'):
+        example.plan(direct)
+    joint = replace(direct.segments[0], type=SegmentType.JOINT)
+    direct = replace(direct, segments=(joint, *direct.segments[1:]))
+    example.options = replace(example.options, max_approach_distance=0.0)
+    with pytest.raises(CollisionPredicted) as refusal:
+        example.plan(direct)
+    assert 'partition' in refusal.value.bodies
 
 
 def test_the_nozzle_that_hits_the_channel_is_refused_with_both_bodies():
