@@ -34,7 +34,15 @@ from ur_cartesian_driver.kinematics.link_shapes import (
     mesh_tolerance,
     shortest_turn_of_z,
 )
-from ur_cartesian_driver.kinematics.solids import coal, distances, Frames, has_coal, Hull, Solid
+from ur_cartesian_driver.kinematics.solids import (
+    coal,
+    Depths,
+    distances,
+    Frames,
+    has_coal,
+    Hull,
+    Solid,
+)
 from ur_cartesian_driver.motion.cell.cell import Cell, LINK_NAMES
 from ur_cartesian_driver.motion.cell.shapes import Cylinder, HalfSpace, Mesh
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
@@ -44,6 +52,8 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 _RIM = 16
 # A mesh is convex if no vertex is farther than this beyond a triangle [m].
 _FLAT = 2e-5
+# Rows that are bounded at a time, in memory that the processor has at hand.
+_ROWS = 256
 #: Of how many carriers there are frames: the base and six links.
 CARRIERS = 7
 
@@ -62,6 +72,21 @@ class _Body:
     clearance: float = 0.0
     #: By how much the exact solids may be too small [m].
     tolerance: float = 0.0
+
+
+class _Opponents(NamedTuple):
+    """Pairs of the same first bodies with bodies on the same carrier."""
+
+    #: The pair of each first body with each second one, (firsts, seconds).
+    columns: Indices
+    #: The carrier of the second bodies, and the depths of points in them.
+    carrier: int
+    depths: Depths
+    #: The spheres that cover the first bodies, one body after the other: their numbers and radii
+    #: (k,) [m], and where those of each body begin.
+    points: Indices
+    radii: Floats
+    begins: Indices
 
 
 def missing_coal(cell: Cell) -> str:
@@ -109,15 +134,17 @@ class CellDistances:
             for a, b in self._numbers
         ]
         self.clearances = np.array([pair.clearance for pair in self.pairs])
-        self._covers = [_cover(body) for body in self._bodies]
-        #: By the second body of pairs: their columns, and their first bodies.
-        self._opponents: dict[int, tuple[Indices, tuple[int, ...]]] = {}
-        for second in np.unique(self._numbers[:, 1]).tolist():
-            columns = np.flatnonzero(self._numbers[:, 1] == second)
-            self._opponents[second] = columns, tuple(self._numbers[columns, 0].tolist())
-        self._boxes = [_carrier_box(self._bodies, carrier) for carrier in range(CARRIERS)]
+        covers = [_cover(body) for body in self._bodies]
+        #: Centres (k, 3) of spheres that cover the bodies, in the frames of their carriers (k,).
+        self._centres = np.concatenate([centres for centres, _ in covers])
+        counts = [len(centres) for centres, _ in covers]
+        self._carriers_of_centres = np.repeat([body.carrier for body in self._bodies], counts)
+        self._opponents = _opponents(self._bodies, self._numbers, covers)
+        boxes = [_carrier_box(self._bodies, carrier) for carrier in range(CARRIERS)]
+        #: Middles and half sides of the boxes around all that moves with a carrier, (carriers, 3).
+        self._middles, self._halves = (np.array(each) for each in zip(*boxes, strict=True))
         #: How far from the base anything on each carrier can be, at most, (carriers,) [m].
-        self.reaches = _reaches(arm, self._boxes)
+        self.reaches = _reaches(arm, boxes)
         #: For each pair, the carriers of both bodies, (pairs, 2).
         self.carriers = np.array(
             [[self._bodies[a].carrier, self._bodies[b].carrier] for a, b in self._numbers],
@@ -142,34 +169,34 @@ class CellDistances:
         :param poses: (n, carriers, 7).
         :returns: (n, carriers, 4, 3) [m].
         """
+        rotation, origin = _carrier_frames(poses)
         result = np.empty((*poses.shape[:2], 4, 3))
-        for carrier, (middle, half) in enumerate(self._boxes):
-            frames = Frames.of(poses[:, carrier])
-            result[:, carrier, 0] = frames.points(middle[None])[:, 0]
-            result[:, carrier, 1:] = (frames.rotation * half).transpose(0, 2, 1)
+        result[:, :, 0] = np.einsum('ncij,cj->nci', rotation, self._middles) + origin
+        result[:, :, 1:] = (rotation * self._halves[:, None]).swapaxes(2, 3)
         return result
 
     def lower_bounds(self, poses: Floats) -> Floats:
         """Return bounds (n, pairs) [m] that no distance is below; cheap, and often far below."""
-        frames = [Frames.of(poses[:, carrier]) for carrier in range(CARRIERS)]
-        covers = [
-            frames[body.carrier].points(centres)
-            for body, (centres, _) in zip(self._bodies, self._covers, strict=True)
-        ]
-        joined: dict[tuple[int, ...], Floats] = {}
         result = np.empty((len(poses), len(self.pairs)))
-        for second, (columns, firsts) in self._opponents.items():
-            if firsts not in joined:
-                joined[firsts] = np.concatenate([covers[a] for a in firsts], axis=1)
-            body, points = self._bodies[second], joined[firsts]
-            if body.carrier:
-                points = frames[body.carrier].local(points)
-            depths = np.stack([solid.depths(points) for solid in body.coarse]).min(axis=0)
-            radii = [self._covers[a][1] for a in firsts]
-            depths -= np.concatenate(radii)
-            begins = np.cumsum([0, *(len(each) for each in radii[:-1])])
-            result[:, columns] = np.minimum.reduceat(depths, begins, axis=1)
+        for begin in range(0, len(poses), _ROWS):
+            rows = slice(begin, begin + _ROWS)
+            self._bound(poses[rows], result[rows])
         return result
+
+    def _bound(self, poses: Floats, result: Floats) -> None:
+        """Write the bounds of some rows."""
+        rotation, origin = _carrier_frames(poses)
+        carriers = self._carriers_of_centres
+        points = np.einsum('nkij,kj->nki', rotation[:, carriers], self._centres)
+        points += origin[:, carriers]
+        for each in self._opponents:
+            of_firsts = points[:, each.points]
+            if each.carrier:
+                frames = Frames(rotation[:, each.carrier], origin[:, each.carrier])
+                of_firsts = frames.local(of_firsts)
+            depths = each.depths.of(of_firsts)
+            depths -= each.radii[:, None]
+            result[:, each.columns] = np.minimum.reduceat(depths, each.begins, axis=1)
 
     def distances(self, column: int, poses: Floats, enough: float) -> Floats:
         """
@@ -227,6 +254,37 @@ class CellDistances:
             best[nearer] = found[found < best[rows]]
             columns[nearer] = column
         return best, columns
+
+
+def _carrier_frames(poses: Floats) -> tuple[Floats, Floats]:
+    """Return rotations (n, carriers, 3, 3) and origins (n, carriers, 3) of poses."""
+    rotation, origin = Frames.of(poses.reshape(-1, 7))
+    shape = poses.shape[:2]
+    return rotation.reshape(*shape, 3, 3), origin.reshape(*shape, 3)
+
+
+def _opponents(
+    bodies: Sequence[_Body], numbers: Indices, covers: Sequence[tuple[Floats, Floats]]
+) -> list[_Opponents]:
+    """Return the pairs in groups whose bounds are found together."""
+    groups: dict[tuple[int, tuple[int, ...]], list[tuple[int, Indices]]] = {}
+    for second in np.unique(numbers[:, 1]).tolist():
+        columns = np.flatnonzero(numbers[:, 1] == second)
+        key = bodies[second].carrier, tuple(numbers[columns, 0].tolist())
+        groups.setdefault(key, []).append((second, columns))
+    counts = [len(centres) for centres, _ in covers]
+    firsts_at = np.cumsum([0, *counts])
+    return [
+        _Opponents(
+            columns=np.stack([columns for _, columns in group], axis=1),
+            carrier=carrier,
+            depths=Depths([bodies[second].coarse for second, _ in group]),
+            points=np.concatenate([np.arange(firsts_at[a], firsts_at[a + 1]) for a in firsts]),
+            radii=np.concatenate([covers[a][1] for a in firsts]),
+            begins=np.cumsum([0, *(counts[a] for a in firsts[:-1])]),
+        )
+        for (carrier, firsts), group in groups.items()
+    ]
 
 
 def _between(

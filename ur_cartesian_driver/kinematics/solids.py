@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from ur_cartesian_driver.motion.cell.shapes import Box, Cylinder, HalfSpace, Mesh, Shape, Sphere
-from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose import Pose
 
 # Directions that are tried without coal: the bound is then within a millimetre for most pairs.
@@ -142,37 +142,6 @@ class Solid:
         radius = 0.5 * float(np.hypot(part, across))
         return centres @ self._rotation.T + self._position, np.full(count, radius)
 
-    def depths(self, points: Floats) -> Floats:
-        """
-        Return a lower bound of the signed distance of points from the solid.
-
-        :param points: (..., 3) in the carrier's frame [m].
-        :returns: (...) [m]; exact for boxes, cylinders, spheres and half-spaces, else that of the
-            bounding box.
-        """
-        shape, inside = self.shape, self.local(points)
-        if isinstance(shape, HalfSpace):
-            heights: Floats = inside[..., 2]
-            return heights
-        if isinstance(shape, Sphere):
-            heights = np.sqrt(np.einsum('...i,...i', inside, inside)) - shape.radius
-            return heights
-        if isinstance(shape, Cylinder):
-            beyond = np.stack(
-                [
-                    np.hypot(inside[..., 0], inside[..., 1]) - shape.radius,
-                    np.abs(inside[..., 2]) - 0.5 * shape.length,
-                ],
-                axis=-1,
-            )
-        else:
-            low, high = shape.bounds
-            beyond = np.abs(inside - 0.5 * (low + high)) - 0.5 * (high - low)
-        outside = np.maximum(beyond, 0.0)
-        distances: Floats = np.sqrt(np.einsum('...i,...i', outside, outside))
-        distances += np.minimum(beyond.max(axis=-1), 0.0)
-        return distances
-
     def supports(self, directions: Floats, frames: Frames) -> Floats:
         """Return the farthest points (n, 3) along unit vectors (n, 3), given its own frames."""
         along = np.einsum('nji,nj->ni', frames.rotation, directions)
@@ -213,6 +182,79 @@ class Solid:
             return coal().ConvexBase.convexHull(_vectors(shape.points), False, '')
         assert isinstance(shape, Mesh)
         return _tree(shape)
+
+
+class Depths:
+    """
+    The depths of points in bodies on one carrier, for all bodies at once.
+
+    :param bodies: one or more solids of each body.
+    """
+
+    def __init__(self, bodies: Sequence[Sequence[Solid]]) -> None:
+        solids = [solid for body in bodies for solid in body]
+        shapes = [solid.shape for solid in solids]
+        self._begins = np.cumsum([0, *(len(body) for body in bodies[:-1])])
+        self._rotation = np.concatenate([solid._rotation for solid in solids], axis=1)
+        #: The middle of each solid in its own frame, as far as the frame is turned.
+        self._middles = np.array([solid._position @ solid._rotation for solid in solids])
+        self._planes = _indices(shapes, HalfSpace)
+        self._spheres = _indices(shapes, Sphere)
+        self._cylinders = _indices(shapes, Cylinder)
+        rest = np.setdiff1d(
+            np.arange(len(shapes)), [*self._planes, *self._spheres, *self._cylinders]
+        )
+        self._boxes = rest.astype(np.intp)
+        self._radii = np.array([getattr(shape, 'radius', 0.0) for shape in shapes])
+        #: Half sides of the bounding boxes; of cylinders, only the height is used.
+        self._halves = np.zeros((len(shapes), 3))
+        for k in (*self._boxes.tolist(), *self._cylinders.tolist()):
+            low, high = shapes[k].bounds
+            self._halves[k] = 0.5 * (high - low)
+            self._middles[k] += 0.5 * (low + high)
+
+    def of(self, points: Floats) -> Floats:
+        """
+        Return lower bounds of the signed distances of points from the bodies.
+
+        :param points: (n, k, 3) in the frame of the carrier [m].
+        :returns: (n, k, bodies) [m]; exact for boxes, cylinders, spheres and half-spaces, else
+            that of the bounding box.
+        """
+        shape = (*points.shape[:2], len(self._middles))
+        inside = (points @ self._rotation).reshape(*shape, 3) - self._middles
+        depths: Floats = np.empty(shape)
+        if len(planes := self._planes):
+            depths[..., planes] = inside[..., planes, 2]
+        if len(spheres := self._spheres):
+            depths[..., spheres] = _norms(inside[..., spheres, :]) - self._radii[spheres]
+        if len(cylinders := self._cylinders):
+            part = inside[..., cylinders, :]
+            across = np.hypot(part[..., 0], part[..., 1]) - self._radii[cylinders]
+            along = np.abs(part[..., 2]) - self._halves[cylinders, 2]
+            depths[..., cylinders] = _signed(np.stack([across, along], axis=-1))
+        if len(boxes := self._boxes):
+            depths[..., boxes] = _signed(np.abs(inside[..., boxes, :]) - self._halves[boxes])
+        if len(self._begins) < len(self._middles):
+            depths = np.minimum.reduceat(depths, self._begins, axis=2)
+        return depths
+
+
+def _indices(shapes: Sequence[SolidShape], kind: type) -> Indices:
+    found = [k for k, shape in enumerate(shapes) if isinstance(shape, kind)]
+    return np.array(found, dtype=np.intp)
+
+
+def _norms(vectors: Floats) -> Floats:
+    norms: Floats = np.sqrt(np.einsum('...i,...i', vectors, vectors))
+    return norms
+
+
+def _signed(beyond: Floats) -> Floats:
+    """Return signed distances from how far points are beyond each pair of parallel sides."""
+    distances = _norms(np.maximum(beyond, 0.0))
+    distances += np.minimum(beyond.max(axis=-1), 0.0)
+    return distances
 
 
 def distances(a: Solid, frames_a: Frames, b: Solid, frames_b: Frames) -> Floats:

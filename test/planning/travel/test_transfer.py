@@ -120,7 +120,9 @@ def test_lines_along_the_tool_that_are_not_free_are_refused():
 
 def test_an_arm_that_touches_something_everywhere_is_told():
     here = space('low 0 0 -2 0 0 -1')
-    with pytest.raises(CollisionPredicted, match=r'^The travel cannot begin: the arm is too'):
+    with pytest.raises(
+        CollisionPredicted, match=r'^The travel cannot begin: upper arm is .* plane "low"; stay'
+    ):
         find_transfer(here, HOME, [HOME], SETTINGS, 'The travel')
 
 

@@ -176,14 +176,15 @@ class CellClearance:
                     of_block[rows[found < clearance]] = True
         return close
 
-    def check(self, q: Floats, q_start: Joints) -> CellResult:
+    def check(self, q: Floats, q_start: Joints, *, closest: bool = True) -> CellResult:
         """
         Check a motion along rows of joints, and from the start to the first of them.
 
         :param q: (n, 6) [rad], in order of time.
         :param q_start: the start configuration; pairs that are too close there may separate.
+        :param closest: whether the closest pair is searched, too, which takes longer.
         """
-        search = _Search(self.bodies)
+        search = _Search(self.bodies, closest)
         before = np.array([q_start])
         for begin in range(0, len(q), _BLOCK):
             rows = np.concatenate([before, q[begin : begin + _BLOCK]])
@@ -197,8 +198,8 @@ class CellClearance:
 class _Search:
     """The search for the first violation and for the closest pair, block after block."""
 
-    def __init__(self, bodies: CellDistances) -> None:
-        self._bodies = bodies
+    def __init__(self, bodies: CellDistances, seeks_closest: bool) -> None:
+        self._bodies, self._seeks_closest = bodies, seeks_closest
         self.violation: Place | None = None
         self.closest: Place | None = None
         #: The pairs that are too close since the start, with their distance so far.
@@ -222,14 +223,18 @@ class _Search:
         begins = np.arange(0, last, _STRETCH, dtype=np.float64)
         stretches = _Stretches(begins, np.minimum(begins + _STRETCH, last))
         middle = stretches.middle.astype(np.intp)
-        lower = bodies.lower_bounds(motion.poses[middle])
+        # The first row, too, in the same call: calls cost more than rows.
+        first, *_ = lower = bodies.lower_bounds(motion.poses[np.append(0, middle)])
+        lower = lower[1:]
         ways = motion.ways
         reach = np.maximum(
             ways[middle] - ways[begins.astype(np.intp)],
             ways[stretches.end.astype(np.intp)] - ways[middle],
         )[:, bodies.carriers].sum(axis=2)
+        proved = lower - reach
+        nearest = proved.min(axis=0).tolist()
         if is_first:
-            self._find_pending(motion)
+            self._find_pending(motion, first)
         for column in np.argsort(lower.min(axis=0)).tolist():
             if column in self._pending:
                 begin = self._leave(column, motion, offset)
@@ -237,22 +242,22 @@ class _Search:
                     rest = _Stretches(np.array([begin]), np.array([float(last)]))
                     self._search_pair(column, motion, offset, rest)
                 continue
-            open_ = lower[:, column] < self._enough(column) + reach[:, column]
-            if open_.any():
+            if nearest[column] < (enough := self._enough(column)):
+                open_ = proved[:, column] < enough
                 of_pair = _Stretches(stretches.begin[open_], stretches.end[open_])
                 self._search_pair(column, motion, offset, of_pair)
 
     def _enough(self, column: int) -> float:
         """Return the distance that is of no interest if a pair keeps it everywhere [m]."""
         clearance = float(self._bodies.clearances[column])
-        if self._bodies.are_neighbours[column]:
+        if not self._seeks_closest or self._bodies.are_neighbours[column]:
             return clearance
         return max(clearance, min(self.at_least, _FAR))
 
-    def _find_pending(self, motion: _Motion) -> None:
-        """Find the pairs that are too close in the first row."""
+    def _find_pending(self, motion: _Motion, lower: Floats) -> None:
+        """Find the pairs that are too close in the first row; ``lower``: bounds there."""
         bodies, first = self._bodies, motion.poses[:1]
-        near = bodies.lower_bounds(first)[0] < bodies.clearances
+        near = lower < bodies.clearances
         for column in np.flatnonzero(near).tolist():
             clearance = float(bodies.clearances[column])
             distance = float(bodies.distances(column, first, inf)[0])
@@ -314,7 +319,7 @@ class _Search:
 
     def _remember(self, column: int, places: Floats, distances: Floats, offset: int) -> None:
         """Take the closest place if it is closer than all before."""
-        if self._bodies.are_neighbours[column] or not len(places):
+        if not (self._seeks_closest and len(places)) or self._bodies.are_neighbours[column]:
             return
         k = int(np.argmin(distances))
         before = inf if self.closest is None else self.closest.distance

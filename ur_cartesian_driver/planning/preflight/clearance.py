@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.cell_distances import CellDistances, missing_coal
+from ur_cartesian_driver.kinematics.cell_distances import CellDistances, missing_coal, Pair
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
 from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes, missing_meshes
@@ -138,6 +138,19 @@ class Clearance:
             close[rest] = self._cell.too_close(q[rest])
         return close
 
+    def violation_at(self, q: Joints) -> Violation | None:
+        """Return what is too close in a configuration [rad], regardless of the start."""
+        row = np.array([q])
+        for checker in self._checkers:
+            _, distances = checker.measure(row, np.ones(len(checker.bounds), dtype=np.bool_))
+            found = _first(checker, distances < checker.bounds, distances, row, 0)
+            if found is not None:
+                return found
+        if self._cell is not None and (pairs := self._cell.bodies.pairs_below(row[0])):
+            a, b, distance, clearance = pairs[0]
+            return _violation_in_cell(Pair(a, b, clearance), distance, 0, q)
+        return None
+
     def closest(self, q: Floats) -> tuple[Floats, list[tuple[str, str]]]:
         """
         Return how close the bodies of the cell are to the arm and to what it carries.
@@ -152,12 +165,13 @@ class Clearance:
         pairs = self._cell.bodies.pairs
         return distances, [(pairs[k].a, pairs[k].b) for k in numbers.tolist()]
 
-    def check(self, q: Floats, q_start: Joints) -> ClearanceResult:
+    def check(self, q: Floats, q_start: Joints, *, closest: bool = True) -> ClearanceResult:
         """
         Return the first violation, the first warning and the smallest distance.
 
         :param q: (n, 6) [rad], all configurations of a goal, in order of time.
         :param q_start: the start configuration; pairs that are too close there may separate.
+        :param closest: whether the closest pair in the cell is searched, too, which takes longer.
         """
         #: The first violation by whether its checker refuses (True) or only warns (False).
         found: dict[bool, Violation] = {}
@@ -180,7 +194,7 @@ class Clearance:
                 break
         in_cell = None
         if self._cell is not None:
-            of_cell, in_cell = self._check_cell(self._cell, q, q_start)
+            of_cell, in_cell = self._check_cell(self._cell, q, q_start, closest)
             violations = [each for each in (found.get(True), of_cell) if each is not None]
             if violations:
                 found[True] = min(violations, key=lambda each: each.row)
@@ -194,11 +208,11 @@ class Clearance:
 
     @staticmethod
     def _check_cell(
-        clearance: CellClearance, q: Floats, q_start: Joints
+        clearance: CellClearance, q: Floats, q_start: Joints, seeks_closest: bool
     ) -> tuple[Violation | None, ClosestInCell | None]:
         """Return the first violation in the cell, and the closest pair."""
-        result, pairs = clearance.check(q, q_start), clearance.bodies.pairs
-        closest = None
+        result = clearance.check(q, q_start, closest=seeks_closest)
+        pairs, closest = clearance.bodies.pairs, None
         if result.closest is not None:
             row, number, distance = result.closest
             names = pairs[number].a, pairs[number].b
@@ -206,18 +220,22 @@ class Clearance:
         if result.violation is None:
             return None, closest
         row, number, distance = result.violation
-        pair = pairs[number]
-        near = f'come within {distance:.4f} m of each other' if distance > 0.0 else 'touch'
-        if distance < -_DEPTH_SHOWN:
-            near = f'overlap by {-distance:.4f} m'
-        return Violation(
-            row=row,
-            text=f'{pair.a} and {pair.b} {near}, less than the clearance of '
-            f'{pair.clearance:.4f} m in the cell',
-            remedy='take another path or posture, change the cell, or list the pair in may_touch',
-            bodies=(pair.a, pair.b),
-            q=vector6(q[row].tolist()),
-        ), closest
+        return _violation_in_cell(pairs[number], distance, row, vector6(q[row].tolist())), closest
+
+
+def _violation_in_cell(pair: Pair, distance: float, row: int, q: Joints) -> Violation:
+    """Return the violation of a pair that is closer than its clearance [m], in a row."""
+    near = f'come within {distance:.4f} m of each other' if distance > 0.0 else 'touch'
+    if distance < -_DEPTH_SHOWN:
+        near = f'overlap by {-distance:.4f} m'
+    return Violation(
+        row=row,
+        text=f'{pair.a} and {pair.b} {near}, less than the clearance of {pair.clearance:.4f} m in '
+        'the cell',
+        remedy='take another path or posture, change the cell, or list the pair in may_touch',
+        bodies=(pair.a, pair.b),
+        q=q,
+    )
 
 
 @lru_cache(maxsize=8)

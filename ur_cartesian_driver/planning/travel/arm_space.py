@@ -10,7 +10,6 @@ from math import ceil, radians, tau
 import numpy as np
 
 from ur_cartesian_driver.kinematics.inverse import solutions
-from ur_cartesian_driver.motion.cell.cell import EMPTY_CELL
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
@@ -27,8 +26,6 @@ _FIRST_STRIDE = 8
 _LINE_STEP, _MAX_TURN = 0.002, 0.2
 #: The least weight of a joint [m]: wrist 3 turns a tool without length about its own axis.
 _MIN_WEIGHT = 0.05
-#: Configurations among which one is looked for that is clear of everything.
-_CLEAR_CANDIDATES = 256
 
 
 class ArmSpace:
@@ -45,7 +42,8 @@ class ArmSpace:
         model = kinematics.arm.model
         arm, T_flange_tcp = kinematics.arm, kinematics.T_flange_tcp
         self._clearance = Clearance(arm, T_flange_tcp, options)
-        self._without_cell = Clearance(arm, T_flange_tcp, replace(options, cell=EMPTY_CELL))
+        only_cell = replace(options, self_collision='off', workspace_planes=())
+        self._cell = Clearance(arm, T_flange_tcp, only_cell)
         #: Lowest and highest position of each joint, (2, 6) [rad].
         self.limits: Floats = np.array(model.position_limits).T
         # A length along the axis of a joint moves nothing, one across it, and all that follow, do.
@@ -70,12 +68,17 @@ class ArmSpace:
         )
 
     def is_free(self, a: Floats, b: Floats) -> bool:
-        """Return whether a straight joint motion is accepted, if its beginning is clear."""
-        return self.violation(_rows(a, b), vector6(a.tolist())) is None
+        """
+        Return whether a straight joint motion that seems free is accepted.
+
+        The arm itself and the planes are checked in rows only, which have been looked at.
+        """
+        start = vector6(a.tolist())
+        return self._cell.check(_rows(a, b), start, closest=False).violation is None
 
     def violation(self, q: Floats, q_start: Joints) -> Violation | None:
         """Return the first violation in configurations (n, 6) [rad] on the way from a start."""
-        return self._clearance.check(q, q_start).violation
+        return self._clearance.check(q, q_start, closest=False).violation
 
     def touching(self, q: Joints) -> Violation | None:
         """
@@ -83,23 +86,7 @@ class ArmSpace:
 
         A travel keeps clear also of what the planner only warns of.
         """
-        row = np.array([q])
-        if self.free(row)[0]:
-            return None
-        alone = self._without_cell
-        low, high = np.maximum(self.limits[0], -tau), np.minimum(self.limits[1], tau)
-        others = np.random.default_rng(0).uniform(low, high, (_CLEAR_CANDIDATES, 6))
-        # What is close at the start of a check is excused, so the start has to be clear.
-        clear = others[~alone.too_close(others)]
-        if len(clear):
-            found = alone.check(row, vector6(clear[0].tolist()))
-            if (violation := found.violation or found.warning) is not None:
-                return violation
-        distances, [bodies] = self._clearance.closest(row)
-        near, remedy = 'is too close to something', 'look at the planes and bodies of the cell'
-        if all(bodies):
-            near = f'is too close: {bodies[0]} and {bodies[1]} are {distances[0]:.4f} m apart'
-        return Violation(row=0, text=f'the arm {near}', remedy=remedy, bodies=bodies, q=q)
+        return self._clearance.violation_at(q)
 
     def along_tool(self, q: Joints, distance: float) -> Floats | None:
         """
