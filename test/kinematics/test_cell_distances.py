@@ -32,7 +32,7 @@ from ur_cartesian_driver.kinematics.cell_distances import CellDistances
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.link_shapes import mesh_tolerance
 from ur_cartesian_driver.kinematics.robot_models import MODELS
-from ur_cartesian_driver.kinematics.solids import Frames, Solid
+from ur_cartesian_driver.kinematics.solids import CarrierFrames, Solid
 from ur_cartesian_driver.motion.cell.cell import Cell, CellBody, LINK_NAMES, PlacedShape
 from ur_cartesian_driver.motion.cell.shapes import Box, Cylinder, HalfSpace, Mesh, Sphere
 from ur_cartesian_driver.motion.errors import NotAvailable
@@ -100,7 +100,7 @@ class Scene:
         self.q = rng.uniform(-pi, pi, (3, 6))
         empty = CellJudge(self.arm, self.tcp, Cell())
         places = np.concatenate([empty.frames(q)[2:, :3, 3] for q in self.q])
-        self.cell = random_cell(rng, self.arm, places, meshes=meshes)
+        self.cell = random_cell(rng, places, meshes=meshes)
         self.judge = CellJudge(self.arm, self.tcp, self.cell)
         self.bodies = CellDistances(self.arm, self.tcp, self.cell)
         self.poses = self.bodies.poses(self.q)
@@ -170,7 +170,7 @@ def test_without_coal_plain_bodies_are_never_farther(no_coal):
 
 def solids_apart(a, T_a, b, T_b):
     """Return the distance of two shapes by the package [m]."""
-    stands = Frames(np.eye(3)[None], np.zeros((1, 3)))
+    stands = CarrierFrames(np.eye(3)[None], np.zeros((1, 3)))
     return float(solids.distances(Solid(a, T_a), stands, Solid(b, T_b), stands)[0])
 
 

@@ -35,10 +35,10 @@ from ur_cartesian_driver.kinematics.link_shapes import (
     shortest_turn_of_z,
 )
 from ur_cartesian_driver.kinematics.solids import (
+    CarrierFrames,
     coal,
     Depths,
     distances,
-    Frames,
     has_coal,
     Hull,
     Solid,
@@ -192,7 +192,7 @@ class CellDistances:
         for each in self._opponents:
             of_firsts = points[:, each.points]
             if each.carrier:
-                frames = Frames(rotation[:, each.carrier], origin[:, each.carrier])
+                frames = CarrierFrames(rotation[:, each.carrier], origin[:, each.carrier])
                 of_firsts = frames.local(of_firsts)
             depths = each.depths.of(of_firsts)
             depths -= each.radii[:, None]
@@ -258,7 +258,7 @@ class CellDistances:
 
 def _carrier_frames(poses: Floats) -> tuple[Floats, Floats]:
     """Return rotations (n, carriers, 3, 3) and origins (n, carriers, 3) of poses."""
-    rotation, origin = Frames.of(poses.reshape(-1, 7))
+    rotation, origin = CarrierFrames.of(poses.reshape(-1, 7))
     shape = poses.shape[:2]
     return rotation.reshape(*shape, 3, 3), origin.reshape(*shape, 3)
 
@@ -292,7 +292,8 @@ def _between(
 ) -> Floats:
     """Return the smallest distances (n,) of the solids of two bodies [m]."""
     frames_a, frames_b = (
-        Frames.of(poses[:, body.carrier] if body.carrier else poses[:1, 0]) for body in (a, b)
+        CarrierFrames.of(poses[:, body.carrier] if body.carrier else poses[:1, 0])
+        for body in (a, b)
     )
     found = [
         np.broadcast_to(distances(one, frames_a, other, frames_b), len(poses))

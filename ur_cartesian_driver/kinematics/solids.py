@@ -48,14 +48,14 @@ class Hull:
 SolidShape: TypeAlias = Shape | Hull
 
 
-class Frames(NamedTuple):
+class CarrierFrames(NamedTuple):
     """Rotation matrices (n, 3, 3) and origins (n, 3) [m] of a carrier; one row = it stands."""
 
     rotation: Floats
     origin: Floats
 
     @classmethod
-    def of(cls, poses: Floats) -> Frames:
+    def of(cls, poses: Floats) -> CarrierFrames:
         """Return the frames of poses (n, 7)."""
         x, y, z, w = poses[:, 3:].T
         rotation = np.empty((len(poses), 3, 3))
@@ -95,9 +95,9 @@ class Solid:
         """Whether the solid is convex and has an end."""
         return not isinstance(self.shape, Mesh | HalfSpace)
 
-    def frames(self, carrier: Frames) -> Frames:
+    def frames(self, carrier: CarrierFrames) -> CarrierFrames:
         """Return the frames of the shape in base."""
-        return Frames(
+        return CarrierFrames(
             carrier.rotation @ self._rotation,
             carrier.rotation @ self._position + carrier.origin,
         )
@@ -142,7 +142,7 @@ class Solid:
         radius = 0.5 * float(np.hypot(part, across))
         return centres @ self._rotation.T + self._position, np.full(count, radius)
 
-    def supports(self, directions: Floats, frames: Frames) -> Floats:
+    def supports(self, directions: Floats, frames: CarrierFrames) -> Floats:
         """Return the farthest points (n, 3) along unit vectors (n, 3), given its own frames."""
         along = np.einsum('nji,nj->ni', frames.rotation, directions)
         shape = self.shape
@@ -257,7 +257,7 @@ def _signed(beyond: Floats) -> Floats:
     return distances
 
 
-def distances(a: Solid, frames_a: Frames, b: Solid, frames_b: Frames) -> Floats:
+def distances(a: Solid, frames_a: CarrierFrames, b: Solid, frames_b: CarrierFrames) -> Floats:
     """
     Return the distances of two solids.
 
@@ -274,7 +274,7 @@ def distances(a: Solid, frames_a: Frames, b: Solid, frames_b: Frames) -> Floats:
     return _separations(a, own_a, b, own_b)
 
 
-def _heights(plane: Frames, other: Solid, place: Frames) -> Floats:
+def _heights(plane: CarrierFrames, other: Solid, place: CarrierFrames) -> Floats:
     """Return the heights (n,) of a solid's lowest points above a half-space."""
     rotation, origin, *_ = np.broadcast_arrays(
         plane.rotation, plane.origin[:, None], place.rotation
@@ -285,7 +285,7 @@ def _heights(plane: Frames, other: Solid, place: Frames) -> Floats:
     return heights
 
 
-def _measured(a: Any, frames_a: Frames, b: Any, frames_b: Frames) -> Floats:
+def _measured(a: Any, frames_a: CarrierFrames, b: Any, frames_b: CarrierFrames) -> Floats:
     request, result = coal().DistanceRequest(), coal().DistanceResult()
     measure = coal().distance
     found = []
@@ -296,7 +296,7 @@ def _measured(a: Any, frames_a: Frames, b: Any, frames_b: Frames) -> Floats:
     return np.where(np.array(found) > 0.0, found, np.minimum(found, -_TOUCH))
 
 
-def _transforms(frames_a: Frames, frames_b: Frames) -> Iterator[Sequence[Any]]:
+def _transforms(frames_a: CarrierFrames, frames_b: CarrierFrames) -> Iterator[Sequence[Any]]:
     """Yield the transforms of both solids as objects of coal, equally many of each."""
     count = max(len(frames_a.origin), len(frames_b.origin))
     for frames in (frames_a, frames_b):
@@ -304,11 +304,11 @@ def _transforms(frames_a: Frames, frames_b: Frames) -> Iterator[Sequence[Any]]:
         yield rows if len(rows) == count else rows * count
 
 
-def _separations(a: Solid, frames_a: Frames, b: Solid, frames_b: Frames) -> Floats:
+def _separations(a: Solid, frames_a: CarrierFrames, b: Solid, frames_b: CarrierFrames) -> Floats:
     """Return lower bounds (n,) of the distances of two convex solids."""
     count = max(len(frames_a.origin), len(frames_b.origin))
     frames_a, frames_b = (
-        Frames(
+        CarrierFrames(
             np.broadcast_to(each.rotation, (count, 3, 3)),
             np.broadcast_to(each.origin, (count, 3)),
         )

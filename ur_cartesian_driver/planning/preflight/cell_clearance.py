@@ -91,7 +91,7 @@ class _Motion:
         self.poses = bodies.poses(q)
         points = bodies.box_points(self.poses)
         changes = np.diff(points, axis=0)
-        steps, bends = _lengths(changes), _lengths(np.diff(changes, axis=0))
+        steps, bends = _summed_lengths(changes), _summed_lengths(np.diff(changes, axis=0))
         # A curve leaves its chord by an eighth of its second difference; twice that is safe.
         padded = np.pad(bends, ((1, 1), (0, 0)))
         bends = 0.25 * np.maximum(padded[1:], padded[:-1])
@@ -101,8 +101,8 @@ class _Motion:
         by_turns = 0.25 * turned**2 * bodies.reaches
         #: (n - 1, carriers) how far the motion may be from the line between two rows [m].
         self.bends = np.minimum(bends, by_turns) if len(q) > 2 else by_turns
-        #: (n, carriers) the way since the first row, at least [m].
-        self.ways = np.vstack([np.zeros(CARRIERS), np.cumsum(steps + 2.0 * self.bends, axis=0)])
+        #: (n, carriers) how far bodies have moved since the first row, at most [m].
+        self.moved = np.vstack([np.zeros(CARRIERS), np.cumsum(steps + 2.0 * self.bends, axis=0)])
 
     def at(self, places: Floats) -> Floats:
         """Return the poses of the carriers (k, carriers, 7) at places between rows."""
@@ -120,10 +120,10 @@ class _Motion:
             poses[between] = some
         return poses
 
-    def ways_of(self, carriers: Indices) -> Floats:
-        """Return the way of the bodies on two carriers since the first row, together (n,) [m]."""
+    def moved_of(self, carriers: Indices) -> Floats:
+        """Return how far bodies on two carriers have moved in each row, together (n,) [m]."""
         a, b = carriers.tolist()
-        return self.ways[:, a] + self.ways[:, b] if b else self.ways[:, a]
+        return self.moved[:, a] + self.moved[:, b] if b else self.moved[:, a]
 
     def bend(self, places: Floats, carriers: Indices) -> Floats:
         """Return how far poses between two rows may be from the motion (k,) [m]; 0 in a row."""
@@ -131,23 +131,23 @@ class _Motion:
         return np.where(places == row, 0.0, self.bends[row][:, carriers].sum(axis=1))
 
 
-def _lengths(changes: Floats) -> Floats:
+def _summed_lengths(changes: Floats) -> Floats:
     """Return the lengths of the four vectors of each carrier, together (n, carriers) [m]."""
     lengths = np.sqrt(np.einsum('nckx,nckx->nck', changes, changes))
     together: Floats = np.einsum('nck->nc', lengths)
     return together
 
 
-def _at(ways: Floats, places: Floats) -> Floats:
-    """Return the ways at places between rows [m]."""
-    row = np.minimum(places.astype(np.intp), len(ways) - 2)
-    found: Floats = ways[row] + (places - row) * (ways[row + 1] - ways[row])
+def _at(moved: Floats, places: Floats) -> Floats:
+    """Return how far bodies have moved at places between rows [m]."""
+    row = np.minimum(places.astype(np.intp), len(moved) - 2)
+    found: Floats = moved[row] + (places - row) * (moved[row + 1] - moved[row])
     return found
 
 
-def _dense_places(ways: Floats) -> Floats:
+def _dense_places(moved: Floats) -> Floats:
     """Return all rows but the first, and places between rows that are close to each other."""
-    counts = np.maximum(1, np.ceil(np.diff(ways) / _LEAVING_STEP)).astype(np.intp)
+    counts = np.maximum(1, np.ceil(np.diff(moved) / _LEAVING_STEP)).astype(np.intp)
     row = np.repeat(np.arange(len(counts)), counts)
     number = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
     places: Floats = row + (number + 1.0) / counts[row]
@@ -226,10 +226,10 @@ class _Search:
         # The first row, too, in the same call: calls cost more than rows.
         first, *_ = lower = bodies.lower_bounds(motion.poses[np.append(0, middle)])
         lower = lower[1:]
-        ways = motion.ways
+        moved = motion.moved
         reach = np.maximum(
-            ways[middle] - ways[begins.astype(np.intp)],
-            ways[stretches.end.astype(np.intp)] - ways[middle],
+            moved[middle] - moved[begins.astype(np.intp)],
+            moved[stretches.end.astype(np.intp)] - moved[middle],
         )[:, bodies.carriers].sum(axis=2)
         proved = lower - reach
         nearest = proved.min(axis=0).tolist()
@@ -272,9 +272,9 @@ class _Search:
         :returns: the place from which on it is clear; None = it stays close, or is violated.
         """
         clearance = float(self._bodies.clearances[column])
-        ways = motion.ways_of(self._bodies.carriers[column])
-        for begin in range(0, len(ways) - 1, _STRETCH):
-            places = begin + _dense_places(ways[begin : begin + _STRETCH + 1])
+        moved = motion.moved_of(self._bodies.carriers[column])
+        for begin in range(0, len(moved) - 1, _STRETCH):
+            places = begin + _dense_places(moved[begin : begin + _STRETCH + 1])
             distances = self._bodies.distances(column, motion.at(places), inf)
             reached = np.maximum.accumulate(np.append(self._pending[column], distances))
             free = distances >= clearance
@@ -297,11 +297,13 @@ class _Search:
     ) -> None:
         """Search stretches for one pair, by halving those that are not proved."""
         bodies, carriers = self._bodies, self._bodies.carriers[column]
-        clearance, ways = float(bodies.clearances[column]), motion.ways_of(carriers)
+        clearance, moved = float(bodies.clearances[column]), motion.moved_of(carriers)
         while len(stretches.begin):
             middle, enough = stretches.middle, self._enough(column)
-            way = _at(ways, middle)
-            reach = np.maximum(way - _at(ways, stretches.begin), _at(ways, stretches.end) - way)
+            here = _at(moved, middle)
+            reach = np.maximum(
+                here - _at(moved, stretches.begin), _at(moved, stretches.end) - here
+            )
             bend = motion.bend(middle, carriers)
             needed = enough + float(bend.max())
             distances = bodies.distances(column, motion.at(middle), needed)
