@@ -211,7 +211,9 @@ class _Search:
         if self.closest is None:
             return inf
         distance = self.closest.distance
-        return distance - max(_CLOSEST_LENGTH, _CLOSEST_FRACTION * distance)
+        proved = distance - max(_CLOSEST_LENGTH, _CLOSEST_FRACTION * distance)
+        # All pairs keep their clearances, unless one is too close since the start.
+        return max(proved, min(distance, float(self._bodies.clearances.min())))
 
     def block(self, motion: _Motion, offset: int, *, is_first: bool) -> None:
         """
@@ -314,7 +316,7 @@ class _Search:
             if len(bad):
                 k = int(bad[0])
                 row = offset + int(np.ceil(middle[k]))
-                self._violate(Place(row, column, float(distances[k])))
+                self._violate(Place(row, column, float(sure[k])))
             if self.violation is not None:
                 open_ &= stretches.begin < self.violation.row - offset
             stretches = stretches.halves(open_)

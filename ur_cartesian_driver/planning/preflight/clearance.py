@@ -25,6 +25,7 @@ from ur_cartesian_driver.kinematics.cell_distances import CellDistances, missing
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
 from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes, missing_meshes
+from ur_cartesian_driver.kinematics.inverse import format_distinct
 from ur_cartesian_driver.kinematics.link_shapes import mesh_model, MODELS_WITH_MESHES
 from ur_cartesian_driver.motion.cell.cell import Cell
 from ur_cartesian_driver.motion.errors import CollisionPredicted, NotAvailable
@@ -225,13 +226,13 @@ class Clearance:
 
 def _violation_in_cell(pair: Pair, distance: float, row: int, q: Joints) -> Violation:
     """Return the violation of a pair that is closer than its clearance [m], in a row."""
-    near = f'come within {distance:.4f} m of each other' if distance > 0.0 else 'touch'
+    found, bound = format_distinct(distance, pair.clearance)
+    near = f'come within {found} m of each other' if distance > 0.0 else 'touch'
     if distance < -_DEPTH_SHOWN:
         near = f'overlap by {-distance:.4f} m'
     return Violation(
         row=row,
-        text=f'{pair.a} and {pair.b} {near}, less than the clearance of {pair.clearance:.4f} m in '
-        'the cell',
+        text=f'{pair.a} and {pair.b} {near}, less than the clearance of {bound} m in the cell',
         remedy='take another path or posture, change the cell, or list the pair in may_touch',
         bodies=(pair.a, pair.b),
         q=q,
