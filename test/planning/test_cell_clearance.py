@@ -38,7 +38,7 @@ class Motion:
         self._straight, self._bow = rng.uniform(0.02, 0.4) * rng.normal(size=(2, 6))
         judge = CellJudge(self.arm, tcp, Cell())
         places = np.concatenate([judge.frames(q)[2:, :3, 3] for q in self.at([0.2, 0.5, 0.8])])
-        cell = random_cell(rng, self.arm, places)
+        cell = random_cell(rng, places)
         # Plates that only a part of the motion between two rows touches.
         plates = tuple(
             CellBody(

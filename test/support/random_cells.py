@@ -119,20 +119,22 @@ def random_shape(rng, meshes=True, largest=0.4):
     return (plate, ring, loose_triangles)[kind - 3](rng)
 
 
-def random_cell(rng, arm, places, *, carried=True, meshes=True):
+def random_cell(rng, places, *, carried=True, meshes=True, spread=0.3, largest=0.4):
     """
     Return a cell of up to ten bodies, most of them near places (n, 3) where the arm may be.
 
     :param carried: whether links and tool carry some of them.
+    :param spread: how far they are from the places [m].
+    :param largest: how large boxes, cylinders and spheres are [m].
     """
     bodies = []
     for k in range(int(rng.integers(1, 7))):
         count = 1 if rng.random() < 0.7 else int(rng.integers(2, 4))
         placed = tuple(
-            PlacedShape(random_shape(rng, meshes), random_pose(rng)) for _ in range(count)
+            PlacedShape(random_shape(rng, meshes, largest), random_pose(rng)) for _ in range(count)
         )
         middle = places[rng.integers(len(places))]
-        pose = random_pose(rng, middle, 0.3)
+        pose = random_pose(rng, middle, spread)
         if rng.random() < 0.1:
             placed = (PlacedShape(HalfSpace(), random_pose(rng)),)
             pose = random_pose(rng, 1.5 * np.array(middle))
@@ -191,6 +193,15 @@ class Part:
     #: Whether the inside of the surface belongs to the solid.
     is_solid: bool = True
     is_half_space: bool = False
+
+
+def box_of(part):
+    """Return the corners of the box around a part, in its frame (1, 8, 3)."""
+    low, high = (
+        part.outer.min(axis=(0, 1)) - part.radius,
+        part.outer.max(axis=(0, 1)) + part.radius,
+    )
+    return np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T[None]
 
 
 def exact(surface, T, **more):

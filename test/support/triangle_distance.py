@@ -6,13 +6,15 @@ Distances by brute force over triangles, with nothing but numpy: the judge of di
 A surface is an array (n, 3, 3) of the corners of its triangles [m].
 """
 
-from itertools import chain, repeat
+from itertools import chain, product, repeat
 
 import numpy as np
 from scipy.spatial import cKDTree, ConvexHull
 
 # Pairs of triangles that are measured at once: the nearest few first, which rule out most others.
 _CHUNKS = (128, 1024, 8192)
+# Directions along which triangles are compared, beside that of the nearest corners.
+_DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if d > (0.0, 0.0, 1.0)])
 _TINY = 1e-300
 
 
@@ -20,37 +22,52 @@ def triangle_distance(one, other):
     """
     Return the smallest distance of two surfaces [m]; 0 where a triangle passes through another.
 
-    Only pairs whose boxes are nearer than the best pair so far are measured. The boxes are along
-    the axes: it is fastest in the frame in which long triangles are along these.
+    Only pairs of triangles that may be nearer than the best pair so far are measured: by their
+    boxes along the axes, then by their separation along some other directions.
     """
-    corners = cKDTree(other.reshape(-1, 3)).query(one.reshape(-1, 3))[0]
-    best = float(corners.min()) * (
-        1.0 + 1e-9
-    )  # of two points it is the distance, but for rounding
-    low, high = (_bounds(each) for each in (one, other))
-    one_near = _gaps(low, (high[0].min(axis=0), high[1].max(axis=0))) <= best
-    other_near = _gaps(high, (low[0].min(axis=0), low[1].max(axis=0))) <= best
-    a, b = one[one_near], other[other_near]
-    low, high = (_bounds(each) for each in (a, b))
-    gaps = np.concatenate(
-        [
-            _gaps((low[0][k : k + 64, None], low[1][k : k + 64, None]), high)
-            for k in range(0, len(a), 64)
-        ]
-    )
-    rows, columns = np.nonzero(gaps <= best)
-    gaps = gaps[rows, columns]
-    order = np.argsort(gaps)
-    begin = 0
+    a, b = one.reshape(-1, 3), other.reshape(-1, 3)
+    corners, numbers = cKDTree(b).query(a)
+    k = int(np.argmin(corners))
+    # Of two points it is the distance, but for rounding.
+    best = float(corners[k]) * (1.0 + 1e-9)
+    rows, columns, gaps = _near_pairs(one, other, best)
+    directions = np.vstack([_DIRECTIONS, b[numbers[k]] - a[k]])
+    directions /= np.maximum(np.linalg.norm(directions, axis=1), _TINY)[:, None]
+    (a_low, a_high), (b_low, b_high) = (_bounds(each @ directions.T) for each in (one, other))
+    for k in range(len(directions)):
+        apart = b_low[columns, k] - a_high[rows, k], a_low[rows, k] - b_high[columns, k]
+        gaps = np.maximum(gaps, np.maximum(*apart))
+        near = gaps <= best
+        rows, columns, gaps = rows[near], columns[near], gaps[near]
+    order, begin = np.argsort(gaps), 0
     for size in chain(_CHUNKS, repeat(_CHUNKS[-1])):
         some = order[begin : begin + size]
         begin += size
         if not len(some) or gaps[some[0]] > best:
             break
-        best = min(best, float(_pair_distances(a[rows[some]], b[columns[some]]).min()))
+        best = min(best, float(_pair_distances(one[rows[some]], other[columns[some]]).min()))
         if best == 0.0:
             break
     return best
+
+
+def _near_pairs(one, other, best):
+    """Return the pairs of triangles whose boxes are within a distance, and that of the boxes."""
+    (low, high), (other_low, other_high) = _bounds(one), _bounds(other)
+    rows = np.flatnonzero(
+        _gaps((low, high), (other_low.min(axis=0), other_high.max(axis=0))) <= best
+    )
+    columns = np.flatnonzero(
+        _gaps((other_low, other_high), (low.min(axis=0), high.max(axis=0))) <= best
+    )
+    gaps = np.concatenate(
+        [
+            _gaps((low[some, None], high[some, None]), (other_low[columns], other_high[columns]))
+            for some in np.array_split(rows, 1 + len(rows) // 64)
+        ]
+    )
+    near = np.nonzero(gaps <= best)
+    return rows[near[0]], columns[near[1]], gaps[near]
 
 
 def _bounds(triangles):
