@@ -115,7 +115,7 @@ def test_events_and_texts_keep_the_numbers_of_the_client():
     assert len(records) == 1
     assert made.goal.io_commands == FAR.io_commands
     [remark] = [line for line in made.remarks if line.startswith('travel: ')][:1]
-    assert re.search(r'motions through the air, 0\.\d+ m .* found with 0 samples', remark)
+    assert re.search(r'by \d motions, 0\.\d+ m .* found with 0 samples', remark)
     assert 'refused: trajectory.points[0].pose.position is 0.' in remark
     deep = FAR_PATH.by(dz=-0.2).allow_travel().goal()
     with pytest.raises(CollisionPredicted, match=r'^trajectory.points\[3\].pose, at '):

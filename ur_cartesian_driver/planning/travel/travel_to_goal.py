@@ -136,9 +136,9 @@ class _Travel:
                 raise refusal or error from None
             entries.remove(found.goal)
             try:
-                way, begin = self._way(found), self._state
-                if way is not None:
-                    q = vector6(way.rows.joints[-1].tolist())
+                travel, begin = self._travel(found), self._state
+                if travel is not None:
+                    q = vector6(travel.rows.joints[-1].tolist())
                     begin = state_at_rest(self._arm, q, self._state.T_flange_tcp)
                 rest = self._plan(self._goal, begin, self._arm, self._options)
             except GoalRefused as error:
@@ -147,9 +147,9 @@ class _Travel:
                     # The goal takes less time to plan than another search.
                     entries = [q for q in entries if self._can_begin(q)]
             else:
-                if way is None:
+                if travel is None:
                     return rest
-                return _joined(way, rest, _remark(way, found, reason))
+                return _joined(travel, rest, _remark(travel, found, reason))
         assert refusal is not None
         raise refusal
 
@@ -181,11 +181,11 @@ class _Travel:
             return False
         return True
 
-    def _way(self, found: Transfer) -> Plan | None:
+    def _travel(self, found: Transfer) -> Plan | None:
         """
         Return the plan of the way through the air, with the largest blends that pass.
 
-        :returns: None if the arm stands at the end of the way.
+        :returns: None if the arm stands at the end of the travel.
         """
         stops = list(self._stops(found))
         if not stops:
@@ -242,28 +242,28 @@ def _goal_like(goal: Goal, waypoints: Sequence[Waypoint], segments: Sequence[Seg
     )
 
 
-def _remark(way: Plan, found: Transfer, reason: str) -> str:
-    rows = way.rows
+def _remark(travel: Plan, found: Transfer, reason: str) -> str:
+    why = reason.partition(';')[0].rstrip('.')
     return (
-        f'travel: {len(rows)} motions through the air, {float(rows.lengths.sum()):.3f} m of the '
-        f'tool in {way.duration:.3f} s, found with {found.samples} samples, lead to the approach '
-        f'of point 0, because the direct way is refused: {reason.partition(";")[0].rstrip(".")}'
+        f'travel: through the air to the approach of point 0 by {len(travel.rows)} motions, '
+        f'{float(travel.rows.lengths.sum()):.3f} m of the tool in {travel.duration:.3f} s, found '
+        f'with {found.samples} samples, because the direct way is refused: {why}'
     )
 
 
-def _joined(way: Plan, rest: Plan, remark: str) -> Plan:
+def _joined(travel: Plan, rest: Plan, remark: str) -> Plan:
     """Return the plan of a goal after the plan of the way to it."""
-    before, after = way.rows, rest.rows
-    path = replace(way.reference, point=np.zeros_like(way.reference.point))
-    path = replace(path, fraction=np.zeros_like(way.reference.fraction))
+    before, after = travel.rows, rest.rows
+    path = replace(travel.reference, point=np.zeros_like(travel.reference.point))
+    path = replace(path, fraction=np.zeros_like(travel.reference.fraction))
     goes_on = replace(rest.reference, time=rest.reference.time + path.time[-1])
-    of_way = {f'travel: {line}': None for line in way.remarks if line not in rest.remarks}
+    of_travel = {f'travel: {line}': None for line in travel.remarks if line not in rest.remarks}
     return replace(
         rest,
         segments=_labelled(before) + replace(after, primitives=tuple(after.primitives)),
         reference=path + goes_on,
-        start=way.start,
-        remarks=(remark, *of_way, *rest.remarks),
+        start=travel.start,
+        remarks=(remark, *of_travel, *rest.remarks),
     )
 
 
