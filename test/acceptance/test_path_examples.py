@@ -221,7 +221,8 @@ def test_an_example_is_carried_out_as_it_says(cell, name, over_ros):
     cell.robot.call(established)  # a welding source has its arc
     outcome, wrong = cell.judged(path, execute, frames)
     outcome.raise_for_error()
-    if name == 'far_start':  # the way to its point 0 is a travel; test_travelled_goals.py judges it
+    if name == 'far_start':
+        # Its travel to point 0 is judged by test_travelled_goals.py.
         wrong = [(kind, text) for kind, text in wrong if 'to point 0 ' not in text]
     assert wrong == []
 
