@@ -30,6 +30,8 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints
 RESOLUTION = 2e-5
 # Rows of the longest stretch, and rows per block: blocks bound the memory.
 _STRETCH, _BLOCK = 64, 8192
+# A motion has so many stretches at least: to bound one more costs less than to halve it.
+_PARTS = 8
 # A pair counts as separating while its distance shrinks by no more than this [m], by rounding.
 _RECEDING_TOLERANCE = 1e-4
 # How far bodies of such a pair move between two places where it is measured, at most [m].
@@ -222,8 +224,9 @@ class _Search:
         :param offset: the number of the block's first row among all rows.
         """
         bodies, last = self._bodies, len(motion.poses) - 1
-        begins = np.arange(0, last, _STRETCH, dtype=np.float64)
-        stretches = _Stretches(begins, np.minimum(begins + _STRETCH, last))
+        length = min(_STRETCH, max(1, last // _PARTS))
+        begins = np.arange(0, last, length, dtype=np.float64)
+        stretches = _Stretches(begins, np.minimum(begins + length, last))
         middle = stretches.middle.astype(np.intp)
         # The first row, too, in the same call: calls cost more than rows.
         first, *_ = lower = bodies.lower_bounds(motion.poses[np.append(0, middle)])
