@@ -25,6 +25,9 @@ class EagerDriver:
     def plan(self, goal):
         return goal
 
+    def renewed(self, plan):
+        return plan
+
     def start(self, plan, on_progress):
         reader = threading.Thread(target=on_progress, args=(0.0,))
         reader.start()
@@ -93,3 +96,12 @@ def test_a_goal_that_fails_while_the_arm_moves_ends_when_the_arm_is_at_rest():
     assert events[:-1] == ['cancelled', 'at rest']
     assert events[-1].code is ErrorCode.EXECUTION_FAILED
     assert 'OSError: no memory' in events[-1].text
+
+
+def test_what_is_shown_is_the_plan_that_was_made_again():
+    driver, shown, outcomes = EagerDriver(), [], []
+    driver.renewed = lambda plan: f'{plan}, planned again'  # type: ignore[method-assign]
+    run = make_run(driver, outcomes, show=shown.append)
+    run.thread.start()
+    run.thread.join()
+    assert shown == ['goal, planned again']
