@@ -15,6 +15,7 @@ from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
 from ur_cartesian_driver.motion.cell.cell import Cell, CellBody, PlacedShape
 from ur_cartesian_driver.motion.cell.shapes import Box
 from ur_cartesian_driver.motion.errors import CollisionPredicted, GoalRefused, InvalidGoal
+from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import (
     IOCommand,
@@ -215,3 +216,14 @@ def test_goals_that_cannot_begin_with_a_travel_say_what_to_do(goal, problem):
     with pytest.raises(GoalRefused, match=problem) as refused:
         planned(goal)
     assert str(refused.value).startswith('allow_travel is set, but ')
+
+
+@pytest.mark.parametrize(('point', 'fraction'), [(0, 0.0), (1, 0.5), (2, 0.3)])
+def test_what_is_left_of_a_stopped_goal_may_begin_with_a_travel_too(point, fraction):
+    left = Path.from_goal(FAR).resumed(PathPlace(point=point, fraction=fraction)).goal()
+    assert left.allow_travel
+    made = planned(left)
+    assert len(travel_lines(made)) >= 2
+    assert made.rows.waypoints[-1] == len(left.waypoints) - 1
+    end = tcp(made.rows.joints[-1])[:3, 3]
+    assert end == pytest.approx(FAR.waypoints[-1].pose.position, abs=CLOSE)
