@@ -35,6 +35,7 @@ MODULES = (
     'replaced_tails',
     RTDE_RATE,
     'planning',
+    'cell',
     'travels',
     'rounded_corners',
     'sliced',

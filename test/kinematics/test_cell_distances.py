@@ -129,6 +129,7 @@ class Scene:
 
 
 @pytest.mark.random
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize('name', MODEL_NAMES)
 def test_distances_are_those_of_brute_force(name, coal):
     """Never larger; smaller by the tolerance of the arm's meshes at most."""
@@ -144,10 +145,12 @@ def test_distances_are_those_of_brute_force(name, coal):
             where = f'{number}: {pair.a} and {pair.b}'
             assert max(found[row], 0.0) <= max(high, 0.0) + ROUNDING, where
             assert max(found[row], 0.0) >= low - scene.bounds(column), where
-            assert (least[:, column] <= found + ROUNDING).all(), where
+            # How deep bodies overlap is another matter.
+            assert (least[:, column] <= np.maximum(found, 0.0) + ROUNDING).all(), where
 
 
 @pytest.mark.random
+@pytest.mark.timeout(1200)
 def test_without_coal_plain_bodies_are_never_farther(no_coal):
     smaller = []
     for number in range(cases(400)):

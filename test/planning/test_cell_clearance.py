@@ -88,6 +88,7 @@ class Motion:
 
 
 @pytest.mark.random
+@pytest.mark.timeout(1200)
 def test_the_first_violation_and_the_closest_pair_are_those_of_a_dense_look():
     counts = {'clear': 0, 'violated': 0, 'between rows only': 0}
     for number in range(cases(200)):

@@ -94,6 +94,7 @@ class Drawn:
 
 
 @pytest.mark.random
+@pytest.mark.timeout(3600)
 @pytest.mark.parametrize('kind', KINDS)
 def test_goals_keep_their_clearance_on_the_robot(robots, kind):
     """And what is refused would come too close, at the place that is named."""

@@ -345,7 +345,8 @@ def _mesh_parts(arm):
         if shape.mesh is None:
             found[shape.link].append(part_of(Cylinder(shape.radius, shape.length), T))
         else:
-            found[shape.link].append(exact(file_surface(shape.mesh), T))
+            # What is wholly inside a link does not touch its surface.
+            found[shape.link].append(exact(file_surface(shape.mesh), T, is_solid=False))
     found[0].append(_connector(arm))
     return found
 

@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
-from math import pi
+from math import inf, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -54,6 +54,8 @@ _RIM = 16
 _FLAT = 2e-5
 # Rows that are bounded at a time, in memory that the processor has at hand.
 _ROWS = 256
+# So that a bound minus a tolerance is not below the bound [m].
+_ROUNDING = 1e-9
 #: Of how many carriers there are frames: the base and six links.
 CARRIERS = 7
 
@@ -176,7 +178,11 @@ class CellDistances:
         return result
 
     def lower_bounds(self, poses: Floats) -> Floats:
-        """Return bounds (n, pairs) [m] that no distance is below; cheap, and often far below."""
+        """
+        Return bounds (n, pairs) [m] that no distance is below; cheap, and often far below.
+
+        Bodies that overlap may do so more deeply than their bound, which is below 0 then.
+        """
         result = np.empty((len(poses), len(self.pairs)))
         for begin in range(0, len(poses), _ROWS):
             rows = slice(begin, begin + _ROWS)
@@ -198,13 +204,16 @@ class CellDistances:
             depths -= each.radii[:, None]
             result[:, each.columns] = np.minimum.reduceat(depths, each.begins, axis=1)
 
-    def distances(self, column: int, poses: Floats, enough: float) -> Floats:
+    def distances(
+        self, column: int, poses: Floats, enough: float, most: Floats | None = None
+    ) -> Floats:
         """
         Return the distances of one pair.
 
         :param poses: (n, carriers, 7).
         :param enough: distances from here on [m] may be replaced by smaller ones that are not
             below this, which is faster.
+        :param most: no distance need be larger, which is faster, too (n,) [m]; None = ``enough``.
         :returns: (n,) [m]; at most 0 where the bodies touch.
         """
         a, b = (self._bodies[number] for number in self._numbers[column])
@@ -213,7 +222,9 @@ class CellDistances:
             return found
         near = np.flatnonzero(found < enough)
         if len(near):
-            exact = _between(a.exact, a, b.exact, b, poses[near]) - a.tolerance - b.tolerance
+            tolerance = a.tolerance + b.tolerance
+            bound = (enough if most is None else most[near]) + (tolerance + _ROUNDING)
+            exact = _between(a.exact, a, b.exact, b, poses[near], bound) - tolerance
             found[near] = np.maximum(found[near], exact)
         return found
 
@@ -249,7 +260,7 @@ class CellDistances:
             rows = np.flatnonzero(lower[:, column] < best)
             if not len(rows):
                 continue
-            found = self.distances(column, poses[rows], np.inf)
+            found = self.distances(column, poses[rows], float(best[rows].max()))
             nearer = rows[found < best[rows]]
             best[nearer] = found[found < best[rows]]
             columns[nearer] = column
@@ -288,15 +299,20 @@ def _opponents(
 
 
 def _between(
-    solids_a: Sequence[Solid], a: _Body, solids_b: Sequence[Solid], b: _Body, poses: Floats
+    solids_a: Sequence[Solid],
+    a: _Body,
+    solids_b: Sequence[Solid],
+    b: _Body,
+    poses: Floats,
+    most: Floats | float = inf,
 ) -> Floats:
-    """Return the smallest distances (n,) of the solids of two bodies [m]."""
+    """Return the smallest distances (n,) of the solids of two bodies, at most ``most`` [m]."""
     frames_a, frames_b = (
         CarrierFrames.of(poses[:, body.carrier] if body.carrier else poses[:1, 0])
         for body in (a, b)
     )
     found = [
-        np.broadcast_to(distances(one, frames_a, other, frames_b), len(poses))
+        np.broadcast_to(distances(one, frames_a, other, frames_b, most), len(poses))
         for one, other in product(solids_a, solids_b)
     ]
     return np.array(np.min(found, axis=0))

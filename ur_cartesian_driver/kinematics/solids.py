@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from math import ceil
+from math import ceil, inf
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -29,6 +29,8 @@ _ROUNDS = 60
 _TINY = 1e-300
 # Solids that touch overlap by this at least [m]: a clearance of 0 means that they do not.
 _TOUCH = 1e-9
+# With a smaller bound coal would not look at what may touch [m].
+_LEAST_BOUND = 0.001
 # A long solid is covered by spheres until each is this many times as long as wide.
 _STRETCH, _MAX_SPHERES = 1.5, 8
 
@@ -257,11 +259,19 @@ def _signed(beyond: Floats) -> Floats:
     return distances
 
 
-def distances(a: Solid, frames_a: CarrierFrames, b: Solid, frames_b: CarrierFrames) -> Floats:
+def distances(
+    a: Solid,
+    frames_a: CarrierFrames,
+    b: Solid,
+    frames_b: CarrierFrames,
+    most: Floats | float = inf,
+) -> Floats:
     """
     Return the distances of two solids.
 
     :param frames_a: n frames of the carrier, or one if it stands; the same for ``b``.
+    :param most: larger distances may be replaced by this one (n,) [m]; far from a mesh, that is a
+        thousand times as fast.
     :returns: (n,) [m]; negative where solids overlap or meshes touch, but the depth is that of
         convex solids only. Without coal, a lower bound.
     """
@@ -270,7 +280,7 @@ def distances(a: Solid, frames_a: CarrierFrames, b: Solid, frames_b: CarrierFram
         if isinstance(half_space.shape, HalfSpace):
             return _heights(plane, other, place)
     if has_coal():
-        return _measured(a.geometry, own_a, b.geometry, own_b)
+        return _measured(a.geometry, own_a, b.geometry, own_b, most)
     return _separations(a, own_a, b, own_b)
 
 
@@ -285,12 +295,18 @@ def _heights(plane: CarrierFrames, other: Solid, place: CarrierFrames) -> Floats
     return heights
 
 
-def _measured(a: Any, frames_a: CarrierFrames, b: Any, frames_b: CarrierFrames) -> Floats:
+def _measured(
+    a: Any, frames_a: CarrierFrames, b: Any, frames_b: CarrierFrames, most: Floats | float
+) -> Floats:
     request, result = coal().DistanceRequest(), coal().DistanceResult()
     measure = coal().distance
     found = []
-    for T_a, T_b in zip(*_transforms(frames_a, frames_b), strict=True):
+    rows, other_rows = _transforms(frames_a, frames_b)
+    # Parts of a mesh that are no nearer than the least distance so far are left out.
+    bounds = np.broadcast_to(np.clip(most, _LEAST_BOUND, result.min_distance), len(rows))
+    for T_a, T_b, bound in zip(rows, other_rows, bounds.tolist(), strict=True):
         result.clear()
+        result.min_distance = bound
         found.append(measure(a, T_a, b, T_b, request, result))
     # Of two meshes that pass through each other it is 0.
     return np.where(np.array(found) > 0.0, found, np.minimum(found, -_TOUCH))

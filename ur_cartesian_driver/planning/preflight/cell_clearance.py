@@ -311,7 +311,8 @@ class _Search:
             )
             bend = motion.bend(middle, carriers)
             needed = enough + float(bend.max())
-            distances = bodies.distances(column, motion.at(middle), needed)
+            proof = enough + reach + bend
+            distances = bodies.distances(column, motion.at(middle), needed, proof)
             self._remember(column, middle, distances, offset)
             sure = distances - bend
             open_ = (sure < enough + reach) & (reach > RESOLUTION)
