@@ -240,6 +240,7 @@ class _Search:
         nearest = proved.min(axis=0).tolist()
         if is_first:
             self._find_pending(motion, first)
+        self._look_where_close(motion, middle, lower, offset)
         for column in np.argsort(lower.min(axis=0)).tolist():
             if column in self._pending:
                 begin = self._leave(column, motion, offset)
@@ -251,6 +252,18 @@ class _Search:
                 open_ = proved[:, column] < enough
                 of_pair = _Stretches(stretches.begin[open_], stretches.end[open_])
                 self._search_pair(column, motion, offset, of_pair)
+
+    def _look_where_close(
+        self, motion: _Motion, rows: Indices, lower: Floats, offset: int
+    ) -> None:
+        """Measure the pair and row that are likely to be closest, before all others have to be."""
+        if not (self._seeks_closest and lower.size):
+            return
+        far = np.where(self._bodies.are_neighbours, inf, lower)
+        k, column = np.unravel_index(int(np.argmin(far)), far.shape)
+        some = rows[k : k + 1]
+        distance = self._bodies.distances(int(column), motion.poses[some], _FAR)
+        self._remember(int(column), some.astype(np.float64), distance, offset)
 
     def _enough(self, column: int) -> float:
         """Return the distance that is of no interest if a pair keeps it everywhere [m]."""
