@@ -22,6 +22,9 @@ pytest.importorskip('pinocchio')
 
 #: What is measured between samples and what is proved differ by this at most [m].
 AGREE = 1e-4
+#: How far the motion may be beside the line between two rows 1 degree apart [m]: such places are
+#: refused, too.
+BEND = 2e-3
 HOME = (0.3, -1.4, 1.5, -1.6, -1.5, 0.2)
 
 
@@ -104,7 +107,7 @@ def test_the_first_violation_and_the_closest_pair_are_those_of_a_dense_look():
         if result.violation is None:
             assert first == inf, number
             assert result.closest is not None
-            assert result.at_least <= least + 1e-6, number
+            assert result.at_least <= least + AGREE, number
             distance = result.closest.distance
             assert least - AGREE < distance < least + max(0.001, 0.34 * least) + AGREE, number
             counts['clear'] += 1
@@ -115,7 +118,7 @@ def test_the_first_violation_and_the_closest_pair_are_those_of_a_dense_look():
         begin, end = motion.t[row], motion.t[row + 1]
         near = bodies.poses(motion.at(np.linspace(begin, end, 200)))
         true = bodies.distances(column, near, inf).min()
-        assert true < clearances[column] + AGREE, number
+        assert true < clearances[column] + BEND, number
         assert abs(distance - true) < 0.02, number
         counts['violated'] += 1
         at_rows = bodies.distances(column, bodies.poses(rows[1:]), inf)

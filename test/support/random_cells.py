@@ -190,8 +190,9 @@ class Part:
     outer: np.ndarray
     T: np.ndarray
     radius: float = 0.0
-    #: Whether the inside of the surface belongs to the solid.
+    #: Whether the inside of the surface belongs to the solid, and whether it may count as such.
     is_solid: bool = True
+    may_be_solid: bool = True
     is_half_space: bool = False
 
 
@@ -221,7 +222,7 @@ def part_of(shape, T):
         inner, outer = _prisms(shape.radius, shape.length)
         return Part(inner, outer, T)
     assert isinstance(shape, Mesh)
-    return exact(shape.vertices[shape.triangles], T, is_solid=False)
+    return exact(shape.vertices[shape.triangles], T, is_solid=False, may_be_solid=False)
 
 
 _prisms = lru_cache(cylinder_surfaces)
@@ -236,17 +237,17 @@ def part_distances(a, T_a, b, T_b):
         heights = [moved(each, T)[..., 2].min() - a.radius for each in (a.outer, a.inner)]
         return tuple(heights)
     found = []
-    for one, other in ((a.outer, b.outer), (a.inner, b.inner)):
+    for k, (one, other) in enumerate(((a.outer, b.outer), (a.inner, b.inner))):
         one = moved(one, T)
-        distance = triangle_distance(one, other)
-        if (b.is_solid and len(other) > 1 and encloses(other, one[0, 0])) or (
-            a.is_solid and len(one) > 1 and encloses(one, other[0, 0])
-        ):
-            distance = 0.0
+        if k == 0 or not (a.inner is a.outer and b.inner is b.outer):
+            apart = triangle_distance(one, other)
+        distance = apart
+        for part, surface, point in ((a, one, other[0, 0]), (b, other, one[0, 0])):
+            counts = part.is_solid if k else part.may_be_solid
+            if counts and len(surface) > 1 and encloses(surface, point):
+                distance = 0.0
         found.append(distance - a.radius - b.radius)
-        if a.inner is a.outer and b.inner is b.outer:
-            return found[0], found[0]
-    return tuple(found)
+    return found[0], found[1]
 
 
 class CellJudge:
@@ -345,7 +346,7 @@ def _mesh_parts(arm):
         if shape.mesh is None:
             found[shape.link].append(part_of(Cylinder(shape.radius, shape.length), T))
         else:
-            # What is wholly inside a link does not touch its surface.
+            # What is wholly inside a link does not touch its surface, but its convex hull.
             found[shape.link].append(exact(file_surface(shape.mesh), T, is_solid=False))
     found[0].append(_connector(arm))
     return found
