@@ -30,7 +30,7 @@ _TINY = 1e-300
 # Solids that touch overlap by this at least [m]: a clearance of 0 means that they do not.
 _TOUCH = 1e-9
 # With a smaller bound coal would not look at what may touch [m].
-_LEAST_BOUND = 0.001
+_MIN_BOUND = 0.001
 # A long solid is covered by spheres until each is this many times as long as wide.
 _STRETCH, _MAX_SPHERES = 1.5, 8
 
@@ -303,7 +303,7 @@ def _measured(
     found = []
     rows, other_rows = _transforms(frames_a, frames_b)
     # Parts of a mesh that are no nearer than the least distance so far are left out.
-    bounds = np.broadcast_to(np.clip(most, _LEAST_BOUND, result.min_distance), len(rows))
+    bounds = np.broadcast_to(np.clip(most, _MIN_BOUND, result.min_distance), len(rows))
     for T_a, T_b, bound in zip(rows, other_rows, bounds.tolist(), strict=True):
         result.clear()
         result.min_distance = bound
