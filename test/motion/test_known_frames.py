@@ -10,6 +10,7 @@ from ur_cartesian_driver.motion.geometry.pose import (
     Pose,
     quaternion_from_rotation_vector,
 )
+from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.goal.known_frames import (
     ArmSnapshot,
     Frames,
@@ -27,6 +28,7 @@ TOOLS = [
     StaticFrame.parse('drop tool0_controller 0 0 0.005 0 0 0 1'),
     StaticFrame.parse('table base_link 1 0 0 0 0 0 1'),
 ]
+GOAL = Goal(waypoints=(Waypoint(pose=IDENTITY),))
 T_FLANGE_TIP = T_TOOL0_FLANGE @ Pose((0.1, 0.0, 0.02))
 
 
@@ -169,3 +171,45 @@ def test_flange_has_the_axes_of_rep_103():
     # x of flange is z of tool0, the direction that the tool points in; z of flange is its y.
     assert T_TOOL0_FLANGE.apply((1.0, 0.0, 0.0)) == pytest.approx((0.0, 0.0, 1.0))
     assert T_TOOL0_FLANGE.apply((0.0, 0.0, 1.0)) == pytest.approx((0.0, 1.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ('frame', 'T_flange_frame'),
+    [('tip', T_FLANGE_TIP), ('tool0', IDENTITY), ('drop', T_FLANGE_TCP @ Pose((0.0, 0.0, 0.005)))],
+)
+def test_a_frame_in_the_hand_before_a_tool_in_the_cell_moves(frame, T_flange_frame):
+    goal = Frames('', TOOLS).resolve(GOAL, frame, 'table', SNAPSHOT)
+    assert_same(goal.moving_frame.T_flange_frame, T_flange_frame)
+    assert_same(goal.moving_frame.T_base_tool, Pose((-1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0)))
+    assert goal.T_base_frame == IDENTITY
+    assert goal.T_flange_controlled is None
+    assert goal.controlled_frame == 'table'
+    # What was so before is so again.
+    fixed = Frames('', TOOLS).resolve(goal, 'table', 'tip', SNAPSHOT)
+    assert fixed.moving_frame is None
+    assert_same(fixed.T_flange_controlled, T_FLANGE_TIP)
+    taken_once = Frames('', TOOLS).resolve(goal, 'tip', '', SNAPSHOT)
+    assert taken_once.moving_frame is None
+    assert_same(taken_once.T_base_frame, T_BASE_FLANGE @ T_FLANGE_TIP)
+
+
+def test_a_part_behind_a_tcp_that_nobody_knows_is_waited_for():
+    with pytest.raises(RobotNotReady, match='frame_id is "drop"'):
+        Frames('', TOOLS).resolve(GOAL, 'drop', 'table')
+
+
+@pytest.mark.parametrize('frame', ['', 'base', 'table'])
+def test_a_tool_and_a_frame_that_both_stand_are_refused(frame):
+    text = (
+        r'controlled_frame is "table", which does not move with the arm, and neither does '
+        rf'trajectory.header.frame_id "{frame or "base"}"; for a part in the hand, name its frame '
+        r'in trajectory.header.frame_id \(nozzle, tip\); for a tool in the hand, leave '
+        r'controlled_frame empty'
+    )
+    with pytest.raises(InvalidGoal, match=text):
+        Frames('', TOOLS).resolve(GOAL, frame, 'table', SNAPSHOT)
+
+
+def test_the_base_is_no_tool():
+    with pytest.raises(InvalidGoal, match='is "base", which does not move with the arm'):
+        Frames('', TOOLS).resolve(GOAL, 'tip', 'base', SNAPSHOT)

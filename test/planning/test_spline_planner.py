@@ -39,6 +39,7 @@ from ur_cartesian_driver.motion.twin.twin import ArmIdentity, Twin
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.spline.joint_polynomials import ANGLE_TOLERANCE_RADIUS
 from ur_cartesian_driver.planning.spline.spline_planner import (
     end_state,
@@ -85,7 +86,9 @@ def joints_of(made):
 
 
 def curve_of(cell, goal, arm=None):
-    start = SplineState(q=cell.state.actual_q).tool(arm or cell.arm, cell.T_flange_tcp)
+    start = SplineState(q=cell.state.actual_q).tool(
+        TcpKinematics(arm or cell.arm, cell.T_flange_tcp)
+    )
     return ToolSpline.through(tool_points(goal_table(goal), start))
 
 
@@ -667,12 +670,15 @@ def test_a_motion_in_two_parts_is_the_motion_in_one(cell, accelerations):
     whole = plan(goal, cell.state, cell.arm, OPTIONS)
     first, second = parts_of(goal, 3)
     begun = plan_spline(
-        SplineState(q=cell.state.actual_q), goal_table(first), cell.arm, cell.T_flange_tcp, OPTIONS
+        SplineState(q=cell.state.actual_q),
+        goal_table(first),
+        TcpKinematics(cell.arm, cell.T_flange_tcp),
+        OPTIONS,
     )
     assert begun.end.is_moving
     assert begun.end.time == pytest.approx(goal.waypoints[2].time)
     rest = plan_spline(
-        begun.end, goal_table(second), cell.arm, cell.T_flange_tcp, OPTIONS, first=3
+        begun.end, goal_table(second), TcpKinematics(cell.arm, cell.T_flange_tcp), OPTIONS, first=3
     )
     assert not rest.end.is_moving
     assert [s.waypoint for s in rest.segments][0 :: len(rest.segments) - 1] == [3, 5]
@@ -688,7 +694,10 @@ def test_a_motion_in_two_parts_is_the_motion_in_one(cell, accelerations):
 def test_an_open_goal_may_be_planned_to_end_moving(cell):
     goal = goal_of(cell, 15, keep_open=True)
     part = plan_spline(
-        SplineState(q=cell.state.actual_q), goal_table(goal), cell.arm, cell.T_flange_tcp, OPTIONS
+        SplineState(q=cell.state.actual_q),
+        goal_table(goal),
+        TcpKinematics(cell.arm, cell.T_flange_tcp),
+        OPTIONS,
     )
     q, qd, qdd = part.end.rows()
     assert tool_rates(cell.arm, cell.T_flange_tcp, q, qd, qdd)[0][0] == pytest.approx(
@@ -712,7 +721,7 @@ def test_what_is_planned_in_parts_is_not_slowed(cell):
     fast = replace(goal, waypoints=(replace(goal.waypoints[0], time=0.1),))
     text = r'multiply all times by \d+\.\d+ \(and adapt twists and accelerations\)\.$'
     with pytest.raises(TooFast, match=text):
-        plan_spline(start, goal_table(fast), cell.arm, cell.T_flange_tcp, slow)
+        plan_spline(start, goal_table(fast), TcpKinematics(cell.arm, cell.T_flange_tcp), slow)
     with pytest.raises(TooFast, match=text):
         plan(replace(fast, keep_open=True, execution=SPLINE), cell.state, cell.arm, slow)
 
@@ -814,12 +823,11 @@ def test_the_way_to_rest_behind_an_open_end_is_checked_too(cell):
     options = replace(OPTIONS, workspace_planes=(f'table 0 0 {low} 0 0 1',))
     start = SplineState(q=cell.state.actual_q)
     with pytest.raises(CollisionPredicted, match='"table"'):
-        plan_spline(start, goal_table(goal), cell.arm, cell.T_flange_tcp, options)
+        plan_spline(start, goal_table(goal), TcpKinematics(cell.arm, cell.T_flange_tcp), options)
     plan_spline(
         start,
         goal_table(replace(goal, waypoints=(replace(goal.waypoints[0], twist=(0.0,) * 6),))),
-        cell.arm,
-        cell.T_flange_tcp,
+        TcpKinematics(cell.arm, cell.T_flange_tcp),
         options,
     )
 

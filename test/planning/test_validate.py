@@ -43,6 +43,7 @@ from ur_cartesian_driver.motion.goal.goal import (
 )
 from ur_cartesian_driver.motion.goal.goal_columns import goal_table
 from ur_cartesian_driver.motion.goal.leads import Lead
+from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
 from ur_cartesian_driver.planning import check, PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
 from ur_cartesian_driver.planning.request.validate import FIELD_RULES, RULES
@@ -68,6 +69,7 @@ GLUE = SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=3, value=0.0)
 VALVE = IOCommand(waypoint=0, offset=0.0, output=OutputKind.STANDARD_DIGITAL, pin=3, value=1.0)
 BEAD = ProportionalOutput(first_waypoint=0, last_waypoint=2, pin=1, gain=2.0)
 BURNING = InputWait(waypoint=1, input=InputKind.STANDARD_DIGITAL, pin=3, value=1.0, timeout=2.0)
+HELD = MovingFrame(T_flange_frame=Pose((0.0, 0.0, 0.1)), T_base_tool=Pose((0.5, 0.0, 0.3)))
 GRIND = Press(first_waypoint=0, last_waypoint=1, axes=('z',), forces=(20.0,))
 PLAIN = Goal(waypoints=(at(0.1), at(0.2), at(0.3)))
 TIMED = Goal(waypoints=(at(0.1, time=1.0), at(0.2, time=2.0), at(0.3, time=3.0)))
@@ -343,6 +345,37 @@ REFUSALS = [
     # stamps
     (replace(PLAIN, age=1.5), OldHeaderTimestamp, 'header.stamp is 1.500 s old'),
     (replace(PLAIN, age=-61.0), InvalidGoal, 'trajectory.header.stamp is 61.0 s in the future'),
+    # a part in the hand
+    (
+        replace(PLAIN, moving_frame=HELD),
+        NotAvailable,
+        'header.frame_id is on a part that the arm holds, but the moves of the controller, which '
+        'PRIMITIVES sends, are straight in base, and curves on a part that turns; set execution '
+        'to SPLINE or SERVO, with times or a corner_deviation.',
+    ),
+    (
+        replace(
+            PLAIN,
+            moving_frame=HELD,
+            presses=(GRIND,),
+        ),
+        NotAvailable,
+        'presses is not empty, but the path is on a part that the arm holds',
+    ),
+    (
+        replace(
+            PLAIN,
+            moving_frame=HELD,
+            segments=(Segment(free_axis=FreeAxis.Z),) * len(PLAIN.waypoints),
+        ),
+        NotAvailable,
+        'segments[0].free_axis is Z, but on a part that the arm holds rotations are not chosen',
+    ),
+    (
+        replace(PLAIN, moving_frame=replace(HELD, T_base_tool=Pose((nan, 0.0, 0.0)))),
+        InvalidGoal,
+        'the pose of trajectory.controlled_frame contains nan',
+    ),
     # not there yet
     (
         replace(TIMED, keep_open=True, replace_horizon=0.15, execution=ExecutionMode.PRIMITIVES),

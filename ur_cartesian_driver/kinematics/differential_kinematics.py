@@ -9,13 +9,15 @@ acceleration of the TCP at constant joint velocities; it is summed up along the 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm, ChainFramesOf, jacobian_at
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
 # Added to Jacobians; far below the smallest singular value at which the arm is allowed to move.
 _MIN_SINGULAR_VALUE = 1e-12
@@ -23,6 +25,13 @@ _MIN_SINGULAR_VALUE = 1e-12
 # Rows per block, so that the intermediate arrays stay in the CPU cache.
 _BLOCK = 1024
 _TRAVEL_AND_TURN = slice(0, 3), slice(3, 6)
+
+
+@dataclass(frozen=True, slots=True)
+class StandingPoint:
+    """A point that stands in the base, in place of a TCP: the motion of the flange there."""
+
+    position: Vector3
 
 
 class _Jacobians(NamedTuple):
@@ -33,8 +42,12 @@ class _Jacobians(NamedTuple):
     tcp: Floats
 
 
+#: The TCP in the flange, or a standing point: where twists and accelerations are meant.
+ReferencePoint: TypeAlias = Pose | StandingPoint
+
+
 def joint_rates(
-    arm: Arm, T_flange_tcp: Pose, q: Floats, twist: Floats, acceleration: Floats
+    arm: Arm, T_flange_tcp: ReferencePoint, q: Floats, twist: Floats, acceleration: Floats
 ) -> tuple[Floats, Floats]:
     """
     Return the joint velocities [rad/s] and accelerations [rad/s^2] (n, 6) of a TCP motion.
@@ -57,7 +70,7 @@ def joint_rates(
 
 def largest_joint_rates(
     arm: Arm,
-    T_flange_tcp: Pose,
+    T_flange_tcp: ReferencePoint,
     q: Floats,
     rates: tuple[float, float],
     accelerations: tuple[float, float],
@@ -81,7 +94,7 @@ def largest_joint_rates(
 
 
 def tool_rates(
-    arm: Arm, T_flange_tcp: Pose, q: Floats, qd: Floats, qdd: Floats
+    arm: Arm, T_flange_tcp: ReferencePoint, q: Floats, qd: Floats, qdd: Floats
 ) -> tuple[Floats, Floats]:
     """Return twist and acceleration (n, 6) of the TCP; the inverse of :func:`joint_rates`."""
     at = _jacobians(arm, T_flange_tcp, q)
@@ -97,9 +110,13 @@ def _solved(matrices: Floats, rows: Floats) -> Floats:
     return found
 
 
-def _jacobians(arm: Arm, T_flange_tcp: Pose, q: Floats) -> _Jacobians:
+def _jacobians(arm: Arm, point: ReferencePoint, q: Floats) -> _Jacobians:
     frames = arm.frames_rows(q)
-    tcp = frames.point(T_flange_tcp.position)
+    if isinstance(point, Pose):
+        tcp = frames.point(point.position)
+    else:
+        x, y, z = (np.full(len(q), value) for value in point.position)
+        tcp = x, y, z
     return _Jacobians(frames, jacobian_at(frames, tcp), np.array(tcp))
 
 

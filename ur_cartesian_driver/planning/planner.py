@@ -57,6 +57,7 @@ from ur_cartesian_driver.planning.moves.slow_moves import slow_move_stretches, u
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
+from ur_cartesian_driver.planning.preflight.held_part_kinematics import kinematics_of
 from ur_cartesian_driver.planning.preflight.offset_band_check import (
     dense_path,
     FILTER_SETTLING,
@@ -70,7 +71,6 @@ from ur_cartesian_driver.planning.preflight.start_checks import (
     check_reported_tcp,
     check_start,
 )
-from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.controlled_frame import (
     retarget_to_tcp,
     RetargetedGoal,
@@ -321,8 +321,7 @@ def plan_spline_goal(planner: GoalPlanner) -> Plan:
     found = plan_spline(
         SplineState(q=state.actual_q),
         replace(goal, waypoints=goal.waypoints[first:], segments=goal.segments[first:]),
-        planner.arm,
-        state.T_flange_tcp,
+        planner.kinematics,
         planner.options,
         first=first,
         tool_tips=planner.tool_tips,
@@ -395,12 +394,12 @@ class GoalPlanner:
         self.goal, self.state, self.arm, self.options = goal, state, arm, options
         self.running = running
         self.T_flange_active, self._retargeted = T_flange_active, retargeted
-        self.kinematics = TcpKinematics(arm, state.T_flange_tcp)
+        self.kinematics = kinematics_of(goal.moving_frame, arm, state.T_flange_tcp)
         self.tool_tips = tool_tips(goal, T_flange_active)
         self.remarks = list(retargeted.remarks)
         #: The reasons why a primitive is not the usual one of its segment type, by point.
         self.reasons: dict[int, list[str]] = {}
-        #: The points in base, rows (n, 7).
+        #: The points in the frame of the path, rows (n, 7): in base, or on a held part.
         self.targets = transform_rows(goal.T_base_frame, goal.waypoints.poses)
         self.timed = is_timed(goal)
         self.mode = resolve_execution_mode(goal)

@@ -105,7 +105,7 @@ def servo_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
     setpoints, monitor = SplineSetpoints(job.spline), _monitor(request, config)
     if job.offset_band is None or request.arm is None:
         return ServoFeeder(monitor, ServoStream(setpoints, settings))
-    offsets = OffsetSetpoints(setpoints, job.offset_band, _arm(request.arm))
+    offsets = OffsetSetpoints(setpoints, job.offset_band, _arm(request.arm), job.moving_frame)
     return ServoFeeder(monitor, ServoStream(offsets, settings), offsets, offsets.requests)
 
 

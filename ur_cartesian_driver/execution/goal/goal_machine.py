@@ -14,6 +14,7 @@ compares the packets of the robot with the plan; a :class:`~.feeder.Feeder` send
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import inf
 from typing import NamedTuple
 
@@ -127,8 +128,8 @@ class GoalMachine:
 
         :param packet: the newest packet of the robot.
         """
-        self._packet = packet
         job = self.job
+        self._packet = packet = self._seen(packet)
         own = job.following_outputs.union(job.pulse_outputs)
         self._guard = OutputGuard(job.safe_outputs, packet, own)
         self._pulses = PulseCounter(job.pulse_outputs, packet)
@@ -151,6 +152,8 @@ class GoalMachine:
             return self._append(event, now)
         if self.state is GoalState.ENDED:
             return []
+        if isinstance(event, events.StateReceived):
+            event = replace(event, state=self._seen(event.state))
         if self._packet_time is None:
             self._packet_time = now - self._packet.state_age
         if self.state is GoalState.ARMING:
@@ -176,6 +179,11 @@ class GoalMachine:
         if isinstance(event, events.StateReceived) and not sends_cancel:
             commands += self._after_packet(event, now)
         return commands
+
+    def _seen(self, packet: RobotState) -> RobotState:
+        """Return a packet as seen from the frame of the path: its poses and rates of the tool."""
+        frame = self.job.moving_frame
+        return packet if frame is None else frame.seen(packet)
 
     def motion_status(self) -> MotionStatus:
         """Return the progress of the motion, for the recording."""

@@ -32,6 +32,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     Tolerance,
 )
 from ur_cartesian_driver.motion.goal.joint_goal import JointTolerances
+from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
 from ur_cartesian_driver.motion.goal.output_names import pulse_outputs
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.move_rows import blend_radii, has_optimized, stops
@@ -70,6 +71,8 @@ class MotionJob:
     #: How long after the end of the motion the last output is switched [s]; ``due`` includes it.
     output_delay: float = 0.0
     T_base_frame: Pose = IDENTITY
+    #: How the frame of the goal moves; None = it stands in the base.
+    moving_frame: MovingFrame | None = None
     #: The robot's TCP at the time of planning.
     T_flange_active: Pose = IDENTITY
     #: The TCP that the plan needs; None = ``T_flange_active``.
@@ -220,6 +223,7 @@ def job_from_plan(
         due=max(last_time, duration) + output_delay if last_time > 0.0 else None,
         output_delay=output_delay,
         T_base_frame=goal.T_base_frame,
+        moving_frame=goal.moving_frame,
         T_flange_active=plan.T_flange_active,
         T_flange_tcp=plan.T_flange_tcp,
         T_tcp_controlled=plan.T_tcp_controlled,

@@ -39,6 +39,7 @@ from ur_cartesian_driver.motion.geometry.vectors import (
     ZERO3,
     ZERO6,
 )
+from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
 from ur_cartesian_driver.motion.plan.approach import approach_speed, ARRIVAL_TOLERANCE
 from ur_cartesian_driver.motion.plan.offset_band import AppliedOffset, NO_OFFSET, OffsetBand
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
@@ -93,14 +94,22 @@ class BoundedOffset:
 class OffsetSetpoints(Displaced):
     """The set-points of another source, displaced."""
 
-    def __init__(self, setpoints: RestingSource, band: OffsetBand, arm: Arm) -> None:
+    def __init__(
+        self,
+        setpoints: RestingSource,
+        band: OffsetBand,
+        arm: Arm,
+        moving_frame: MovingFrame | None = None,
+    ) -> None:
         """
         Begin on the path, with no offset to move to.
 
         :param setpoints: source of the set-points on the path, in the time of the motion.
         :param band: the offset band of the path.
+        :param moving_frame: how the frame of the path moves; None = it stands in the base.
         """
         self._setpoints, self._band, self._arm = setpoints, band, arm
+        self._moving_frame = moving_frame
         self.requests = OffsetRequests(band)
         self._offset = BoundedOffset(band)
         #: Time of the motion [s]; time up to which the offset has moved, in whole steps [s].
@@ -109,7 +118,7 @@ class OffsetSetpoints(Displaced):
         self._before = ZERO3
         #: How far the joints of the newest set-point are from those on the path [rad].
         self._change: Vector6 = ZERO6
-        # The newest set-points: joints, shift in base axes, offset in the frame of the path.
+        # The newest set-points: joints, shift in the frame of the goal, offset along the path.
         self._history: Floats = np.zeros((HISTORY, 12))
         self._count = self._seen = 0
 
@@ -152,7 +161,10 @@ class OffsetSetpoints(Displaced):
             near = add6(on_path, self._change)
             # The band was checked in planning: only rounding can leave no solution, and then the
             # last change is kept.
-            T_base_flange = Pose(add(flange.position, shift), flange.quaternion)
+            moved = shift
+            if self._moving_frame is not None:
+                moved = self._moving_frame.flange_shift(flange, shift)
+            T_base_flange = Pose(add(flange.position, moved), flange.quaternion)
             q = track_pose(self._arm, T_base_flange, near) or near
             self._change = subtract6(q, on_path)
             self.requests.note_applied(offset)

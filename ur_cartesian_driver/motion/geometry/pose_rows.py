@@ -96,6 +96,20 @@ def transform_rows(T_a_b: Pose, T_b_c: Floats) -> Floats:
     return rows
 
 
+def rotate_rows(orientations: Floats, vectors: Floats) -> Floats:
+    """Return vectors (n, 3) turned by unit quaternions (n, 4)."""
+    u, w = orientations[:, :3], orientations[:, 3:]
+    t = 2.0 * cross_rows(u, vectors)
+    turned: Floats = vectors + w * t + cross_rows(u, t)
+    return turned
+
+
+def inverse_rows(T_a_b: Floats) -> Floats:
+    """Return ``T_b_a`` (n, 7)."""
+    turned_back = conjugate_rows(T_a_b[:, 3:])
+    return np.concatenate([-rotate_rows(turned_back, T_a_b[:, :3]), turned_back], axis=1)
+
+
 def interpolate_rows(a: Floats, b: Floats, fraction: Floats) -> Floats:
     """
     Return the poses at fractions (n,) of the way from ``a`` to ``b`` (n, 7).

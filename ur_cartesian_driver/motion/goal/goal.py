@@ -48,6 +48,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3,
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.field_annotations import ColumnOf, Form, Mark, Range, Sent
 from ur_cartesian_driver.motion.goal.inertia import MAX_TRANSITION_TIME
+from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 
@@ -556,6 +557,9 @@ class Goal:
     T_flange_controlled: Annotated[Pose | None, Mark.NOT_SENT] = None
     #: The frame of the goal in the robot's base.
     T_base_frame: Annotated[Pose, Mark.NOT_SENT] = IDENTITY
+    #: How the frame moves, if the flange carries it on a part; poses are then in this frame, and
+    #: ``T_base_frame`` is the identity. None = the frame stands in the base.
+    moving_frame: Annotated[MovingFrame | None, Mark.NOT_SENT] = None
     #: Age of the goal's stamp on receipt [s]; None = no stamp.
     age: Annotated[float | None, Mark.NOT_SENT] = None
     path_tolerance: Tolerance = Tolerance()

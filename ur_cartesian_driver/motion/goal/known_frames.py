@@ -11,6 +11,9 @@ the axes of REP-103 (x forward): it is tool0 rotated by the inverse of rpy (pi/2
 ``tool0_controller`` is the robot's active TCP. A goal in one of these three frames is relative to
 the pose of the arm at the time of planning.
 
+A frame that the arm carries, together with a controlled frame that stands in the cell, is a held
+part before a fixed tool (:mod:`~.moving_frame`): then the frame moves with the arm.
+
 The parameter ``static_frames`` adds frames fixed to any of these. All other frames are looked up
 in tf2, if it is installed.
 """
@@ -26,6 +29,7 @@ from typing import Protocol, TypeVar
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady, shortened
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, normalize, Pose
 from ur_cartesian_driver.motion.goal.goal import Goal
+from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 G = TypeVar('G', bound=Goal)
@@ -116,16 +120,16 @@ class Frames:
         self.tcp = tf_prefix + TCP
         self.tool0 = tf_prefix + TOOL0
         self._transforms: FrameLookup | None = None
-        resolved = _resolve_static_frames(
-            {
-                self.base: (self.base, IDENTITY),
-                tf_prefix + BASE_LINK: (self.base, T_BASE_BASE_LINK),
-                self.tool0: (self.tool0, IDENTITY),
-                tf_prefix + FLANGE: (self.tool0, T_TOOL0_FLANGE),
-                self.tcp: (self.tcp, IDENTITY),
-            },
-            static_frames,
-        )
+        own = {
+            self.base: (self.base, IDENTITY),
+            tf_prefix + BASE_LINK: (self.base, T_BASE_BASE_LINK),
+            self.tool0: (self.tool0, IDENTITY),
+            tf_prefix + FLANGE: (self.tool0, T_TOOL0_FLANGE),
+            self.tcp: (self.tcp, IDENTITY),
+        }
+        resolved = _resolve_static_frames(own, static_frames)
+        #: The names that every robot has.
+        self._own_names = frozenset(own)
         self._T_base, self._T_flange, self._T_tcp = (
             {name: T for name, (root, T) in resolved.items() if root == of}
             for of in (self.base, self.tool0, self.tcp)
@@ -153,13 +157,58 @@ class Frames:
         :raises InvalidGoal: a frame is unknown.
         :raises RobotNotReady: a frame moves with the arm, whose pose is not known.
         """
+        if (moving := self.moving_frame(frame_id, controlled_frame, snapshot)) is not None:
+            return replace(
+                goal,
+                moving_frame=moving,
+                T_base_frame=IDENTITY,
+                T_flange_controlled=None,
+                controlled_frame=controlled_frame,
+            )
         T_flange_controlled = self.T_flange_frame(controlled_frame, snapshot)
         return replace(
             goal,
+            moving_frame=None,
             T_base_frame=self.T_base_frame(frame_id, snapshot, at=at),
             T_flange_controlled=T_flange_controlled,
             # Empty for the active TCP, even if the client named it.
             controlled_frame='' if T_flange_controlled is None else controlled_frame,
+        )
+
+    def moving_frame(
+        self, frame_id: str, controlled_frame: str, snapshot: ArmSnapshot | None = None
+    ) -> MovingFrame | None:
+        """
+        Return how the frame of a goal moves: on a part that the arm holds, along a fixed tool.
+
+        None = it does not: the controlled frame is not known to stand in the base, or it is the
+        base itself, where no tool is.
+
+        :raises InvalidGoal: the tool stands in the base, but so does the frame, or it is unknown.
+        :raises RobotNotReady: the frame is fixed to the TCP, which is not known.
+        """
+        if controlled_frame not in self._T_base or controlled_frame in self._own_names:
+            return None
+        if frame_id in self._T_flange:
+            T_flange_frame = self._T_flange[frame_id]
+        elif frame_id in self._T_tcp:
+            known = _require_snapshot(snapshot, _FRAME_ID, frame_id)
+            T_flange_frame = known.T_flange_tcp @ self._T_tcp[frame_id]
+        elif self._transforms is not None and frame_id not in ('', *self._T_base):
+            T_flange_frame = self._transforms.T_static(_FRAME_ID, self.tool0, frame_id)
+        else:
+            held = [name for name in self._T_flange if name not in self._own_names]
+            raise InvalidGoal(
+                _CONTROLLED,
+                f'is "{shortened(controlled_frame)}", which does not move with the arm, and '
+                f'neither does {_FRAME_ID} "{shortened(frame_id or self.base)}"',
+                f'for a part in the hand, name its frame in {_FRAME_ID} '
+                f'({", ".join(held) or "static_frames adds one, with tool0 as its parent"}); '
+                'for a tool in the hand, leave controlled_frame empty for the active TCP of the '
+                f'robot, or name one of {", ".join(self._T_flange)}',
+            )
+        return MovingFrame(
+            T_flange_frame=T_flange_frame, T_base_tool=self._T_base[controlled_frame]
         )
 
     def T_base_frame(self, name: str, snapshot: ArmSnapshot | None = None, at: int = 0) -> Pose:

@@ -49,7 +49,6 @@ from ur_cartesian_driver.planning.append.appendable_goal import (
 )
 from ur_cartesian_driver.planning.append.planned_part import PlannedPart, unreported_piece
 from ur_cartesian_driver.planning.append.replaced_tail import cut_tail, cut_time, state_at
-from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.options import MAX_POINTS, PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.planner import plan as plan_goal
@@ -194,7 +193,7 @@ class _PartPlanner:
         options: PlanningOptions,
     ) -> None:
         self._before, self._appended, self._arm, self._options = appendable, appended, arm, options
-        self._T_flange_tcp = appendable.T_flange_tcp or appendable.T_flange_active
+        self._kinematics = appendable.kinematics(arm)
         self._segments = appended.segments or (Segment(),) * len(appended.waypoints)
         #: Number of points of the goal, this part included.
         self._points = appendable.points + len(appended.waypoints)
@@ -340,8 +339,7 @@ class _PartPlanner:
         found = plan_spline(
             start,
             goal,
-            self._arm,
-            self._T_flange_tcp,
+            self._kinematics,
             self._options,
             first=before.points,
             tool_tips=tool_tips(goal, before.T_flange_active),
@@ -459,7 +457,7 @@ class _PartPlanner:
         times = np.linspace(0.0, piece.duration, _STOP_ROWS + 1)
         q, _, _ = rows_along(piece, end, len(times))
         return unreported_piece(piece, self._points - 1), ReferencePath(
-            poses=tcp_rows(self._arm, self._T_flange_tcp, q),
+            poses=self._kinematics.pose_rows(q),
             time=end.time + times,
             point=np.full(len(times), self._points - 1, dtype=np.int32),
             fraction=np.ones(len(times)),

@@ -10,6 +10,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints
@@ -33,6 +34,8 @@ from ur_cartesian_driver.motion.plan.plan import PlannedRows, PlannedSegment, Re
 from ur_cartesian_driver.planning.append.planned_part import PlannedPart
 from ur_cartesian_driver.planning.geometry.curves import SAME_ANGLE, SAME_POSITION
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.held_part_kinematics import kinematics_of
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.free_axis_rules import keep_open_error
 from ur_cartesian_driver.planning.request.goal_fields import long_segment_error, point_field
 from ur_cartesian_driver.planning.request.point_events.dwells import refuse_dwells_of_open_goals
@@ -134,6 +137,11 @@ class AppendableGoal:
     pulses: tuple[tuple[str, PulseTrain], ...] = ()
     #: All commands on ``parts``, each with the motion time when it is due [s].
     commands: tuple[tuple[float, IOCommand], ...] = ()
+
+    def kinematics(self, arm: Arm) -> TcpKinematics:
+        """Return the kinematics of an arm with the TCP of the motion."""
+        T_flange_tcp = self.T_flange_tcp or self.T_flange_active
+        return kinematics_of(self.goal.moving_frame, arm, T_flange_tcp)
 
 
 def check_appended_points(

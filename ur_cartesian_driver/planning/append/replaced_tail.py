@@ -22,7 +22,6 @@ from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.planning.append.appendable_goal import AppendableGoal, AppendedPoints
 from ur_cartesian_driver.planning.append.planned_part import PlannedPart
-from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.request.field_rules import check_finite
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
@@ -189,9 +188,7 @@ def _path(
     begin = part.begin(first)
     times = np.linspace(begin, time, ceil((time - begin) / _ROW_PERIOD) + 1)
     rows = np.searchsorted(part.spline.times, times - SAME_TIME) - 1
-    poses = tcp_rows(
-        arm, before.T_flange_tcp or before.T_flange_active, part.spline.rows(times)[0]
-    )
+    poses = before.kinematics(arm).pose_rows(part.spline.rows(times)[0])
     return ReferencePath(
         poses=poses,
         time=times,

@@ -26,7 +26,6 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6, ZERO6
 from ur_cartesian_driver.motion.goal.goal import Posture, Segment, SegmentType
 from ur_cartesian_driver.motion.goal.goal_columns import (
@@ -262,7 +261,7 @@ class JointPathPlanner:
             # at the waypoint need a configuration there.
             ends = self._path.curves.end[k + rounded]
             there = nearest_rows(
-                self.kinematics.arm, compose_rows(ends, self.kinematics.T_tcp_flange), q[rounded]
+                self.kinematics.arm, self.kinematics.flange_rows(ends), q[rounded]
             )
             q[rounded] = np.where(np.isnan(there), q[rounded], there)
         return q

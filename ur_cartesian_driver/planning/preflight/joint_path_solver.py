@@ -13,7 +13,7 @@ that then remains is real.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import hypot, pi
+from math import pi
 from typing import TypeAlias
 
 import numpy as np
@@ -22,10 +22,8 @@ from ur_cartesian_driver.kinematics.inverse_rows import branch_measures, solve_p
 from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_rows
-from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath
-from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.samples import (
     CurvePieces,
     joined_columns,
@@ -119,7 +117,7 @@ def sample_joint_move(
     """Return the samples on a single piece, which is in joint space."""
     piece, t = sample_parameters(pieces)
     q = path.joint_rows(int(pieces.number[0]), t)
-    return JointPath(pieces, piece, t, tcp_rows(kinematics.arm, kinematics.T_flange_tcp, q), q)
+    return JointPath(pieces, piece, t, kinematics.pose_rows(q), q)
 
 
 def solve_joint_path(kinematics: TcpKinematics, pieces: CurvePieces, q_start: Joints) -> JointPath:
@@ -167,9 +165,7 @@ def solve_joint_path(kinematics: TcpKinematics, pieces: CurvePieces, q_start: Jo
 
 def _solve_block(kinematics: TcpKinematics, poses: Floats, q: Joints) -> tuple[Floats, list[int]]:
     """Return the joints (n, 6) of samples, and the rows before which to refine."""
-    path = solve_path(
-        kinematics.arm, compose_rows(poses, kinematics.T_tcp_flange), q, skip_gaps=False
-    )
+    path = solve_path(kinematics.arm, kinematics.flange_rows(poses), q, skip_gaps=False)
     branch = branch_measures(kinematics.arm, np.concatenate([[q], path.q])).branch
     bad = (path.step > _MAX_STEP) | (np.diff(branch) != 0) | ~path.found
     lost = np.flatnonzero(~path.found)
@@ -264,8 +260,4 @@ def _may_leave_line(kinematics: TcpKinematics, q: Joints, q_next: Joints) -> boo
 def max_path_length(kinematics: TcpKinematics) -> float:
     """Return an upper bound [m] on the length of lines and arcs that the arm can follow."""
     # In a ball of radius r a circle is no longer than 2 pi r.
-    return (
-        2.0
-        * pi
-        * (kinematics.arm.model.max_reach + hypot(*kinematics.T_flange_tcp.position) + 0.1)
-    )
+    return 2.0 * pi * (kinematics.reach + 0.1)

@@ -20,7 +20,6 @@ from math import ceil, hypot
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
 from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows, solve_path
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import (
@@ -140,7 +139,7 @@ def path_joints(
     :param start: the joint positions before the first sample [rad].
     :raises GoalRefused: a pose has no solution.
     """
-    solved = solve_path(kinematics.arm, compose_rows(path.poses, kinematics.T_tcp_flange), start)
+    solved = solve_path(kinematics.arm, kinematics.flange_rows(path.poses), start)
     if not solved.found.all():
         row = int(np.argmin(solved.found))
         where = describe_location(int(path.point[row]), float(path.fraction[row]))
@@ -306,13 +305,12 @@ class OffsetBandCheck:
 
     def _joint_speeds_of_offsets(self, q: Floats, axes: Floats) -> Floats:
         """Return the joint speeds (n, 6) [rad/s] that offsets at their full speed need."""
-        arm, T_flange_tcp = self.kinematics.arm, self.kinematics.T_flange_tcp
         speeds = np.zeros_like(q)
         for k in np.flatnonzero(self.band.limits).tolist():
             # The turning of the frame adds at most the same speed.
             twist = np.zeros_like(q)
             twist[:, :3] = 2.0 * self.band.speed * axes[:, k]
-            speeds += np.abs(joint_rates(arm, T_flange_tcp, q, twist, np.zeros_like(q))[0])
+            speeds += np.abs(self.kinematics.joint_rates(q, twist, np.zeros_like(q))[0])
         return speeds
 
     def _check_corner(
@@ -348,9 +346,7 @@ class OffsetBandCheck:
         for step in range(1, steps + 1):
             poses = path.poses.copy()
             poses[:, :3] += step / steps * shift
-            there = nearest_rows(
-                kinematics.arm, compose_rows(poses, kinematics.T_tcp_flange), before
-            )
+            there = nearest_rows(kinematics.arm, kinematics.flange_rows(poses), before)
             lost = ~(np.abs(there - before).max(axis=1) < _MAX_CHANGE)  # NaN, too
             if lost.any():
                 row = int(np.argmax(lost))

@@ -20,17 +20,18 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import PartChange
+from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.offset_band import OffsetBand
 from ur_cartesian_driver.motion.plan.plan import Plan, ReferencePath
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines, JointSamples
+from ur_cartesian_driver.planning.preflight.held_part_kinematics import kinematics_of
 from ur_cartesian_driver.planning.preflight.offset_band_check import (
     dense_path,
     OffsetBandCheck,
     path_joints,
 )
-from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.controlled_frame import tool_tips
 
 
@@ -45,6 +46,8 @@ class PathLeft:
     tool_tips: tuple[Pose, ...]
     #: The band in which offsets may move the tool; None = offsets are not allowed.
     band: OffsetBand | None = None
+    #: How the frame of the path moves; None = it stands in the base.
+    moving_frame: MovingFrame | None = None
     #: Time from which another path is in effect [s].
     until: float = inf
 
@@ -57,6 +60,7 @@ class PathLeft:
             T_flange_tcp=plan.T_flange_tcp or plan.T_flange_active,
             tool_tips=tool_tips(plan.goal, plan.T_flange_active),
             band=plan.offset_band,
+            moving_frame=plan.goal.moving_frame,
         )
 
     @property
@@ -84,7 +88,7 @@ class PathLeft:
         path = self.reference.since(time)
         if len(path.time) < 2 or self.end <= time:
             return
-        path, kinematics = dense_path(path), TcpKinematics(arm, self.T_flange_tcp)
+        path, kinematics = dense_path(path), kinematics_of(self.moving_frame, arm, self.T_flange_tcp)
         if self.spline is not None:
             joints = self.spline.rows(path.time)[0]
         else:

@@ -21,8 +21,9 @@ MAX_MISMATCH_ANGLE = 0.05
 def check_reported_tcp(state: RobotState, kinematics: TcpKinematics) -> None:
     """Refuse a robot whose TCP is not where the kinematics puts it."""
     predicted = kinematics.arm.forward(state.actual_q) @ state.T_flange_tcp
-    distance = predicted.distance_to(state.actual_tcp_pose)
-    angle = predicted.angle_to(state.actual_tcp_pose)
+    reported = kinematics.tcp(state.actual_tcp_pose)
+    distance = predicted.distance_to(reported)
+    angle = predicted.angle_to(reported)
     if distance > MAX_MISMATCH_POSITION or angle > MAX_MISMATCH_ANGLE:
         raise RobotNotReady(
             f'The robot reports its TCP {1e3 * distance:.1f} mm and {angle:.3f} rad away from '

@@ -18,6 +18,11 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.closed_form_rows import BRANCHES
+from ur_cartesian_driver.kinematics.differential_kinematics import (
+    joint_rates,
+    largest_joint_rates,
+    tool_rates,
+)
 from ur_cartesian_driver.kinematics.inverse import (
     explain_unreachable,
     format_distinct,
@@ -33,9 +38,12 @@ from ur_cartesian_driver.motion.errors import (
     NearSingularity,
     Unreachable,
 )
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import Posture
+from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.request.joint_points import named_joints
 
@@ -52,21 +60,63 @@ _ARM_LENGTH = 0.3
 
 class TcpKinematics:
     """
-    The inverse kinematics of the TCP of one arm, with refusals that name the point.
+    The kinematics of the tool of one arm, with refusals that name the point.
+
+    Planners know poses and rates of the tool in the frame of the path, and get from here those of
+    flange and joints, and back. Here the frame of the path is the base, and the tool is the TCP;
+    a kinematics whose frame moves overrides the methods down to :attr:`reach`.
 
     :param arm: nominal or calibrated.
     :param T_flange_tcp: the active TCP.
     """
 
+    #: Whether the frame of the path moves, so that the TCP and the tool have different speeds.
+    frame_moves = False
+
     def __init__(self, arm: Arm, T_flange_tcp: Pose) -> None:
         """Prepare the transform from the TCP to the flange."""
         self.arm = arm
         self.T_flange_tcp = T_flange_tcp
-        self.T_tcp_flange = T_flange_tcp.inverse()
+        self._T_tcp_flange = T_flange_tcp.inverse()
 
     def flange(self, T_base_tcp: Pose) -> Pose:
-        """Return the flange pose for a TCP pose."""
-        return T_base_tcp @ self.T_tcp_flange
+        """Return the flange pose for a pose of the tool."""
+        return T_base_tcp @ self._T_tcp_flange
+
+    def flange_rows(self, poses: Floats) -> Floats:
+        """Return the flange poses (n, 7) for poses of the tool (n, 7)."""
+        return compose_rows(poses, self._T_tcp_flange)
+
+    def tcp(self, T_base_tcp: Pose) -> Pose:
+        """Return the pose of the TCP in base for a pose of the tool."""
+        return T_base_tcp
+
+    def pose_rows(self, q: Floats) -> Floats:
+        """Return the poses of the tool (n, 7) at joint positions (n, 6) [rad]."""
+        return tcp_rows(self.arm, self.T_flange_tcp, q)
+
+    def tool_rates(self, q: Floats, qd: Floats, qdd: Floats) -> tuple[Floats, Floats]:
+        """Return twist and acceleration (n, 6) of the tool, see :func:`~.tool_rates`."""
+        return tool_rates(self.arm, self.T_flange_tcp, q, qd, qdd)
+
+    def joint_rates(self, q: Floats, twist: Floats, acceleration: Floats) -> tuple[Floats, Floats]:
+        """Return joint velocities and accelerations (n, 6), see :func:`~.joint_rates`."""
+        return joint_rates(self.arm, self.T_flange_tcp, q, twist, acceleration)
+
+    def largest_joint_rates(
+        self, q: Floats, rates: tuple[float, float], accelerations: tuple[float, float]
+    ) -> tuple[Floats, Floats]:
+        """Return bounds of these (n, 6), see :func:`~.largest_joint_rates`."""
+        return largest_joint_rates(self.arm, self.T_flange_tcp, q, rates, accelerations)
+
+    def carrier_speeds(self, q: Floats, qd: Floats) -> Floats | None:
+        """Return the speeds of the TCP in base (n,) [m/s]; None = they are those of the tool."""
+        return None
+
+    @property
+    def reach(self) -> float:
+        """The greatest distance of the tool from the frame of the path [m]."""
+        return self.arm.model.max_reach + hypot(*self.T_flange_tcp.position)
 
     def solution(self, T_base_tcp: Pose, q_near: Joints) -> Joints | None:
         """Return the solution nearest to a configuration; None if none is within the limits."""

@@ -44,7 +44,11 @@ _SAME_TCP = 5e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RetargetedGoal:
-    """A goal and the state of its robot, both expressed for the TCP of the motion."""
+    """
+    A goal and the state of its robot, both expressed for the TCP of the motion.
+
+    If the frame of the goal moves, both are expressed in that frame.
+    """
 
     goal: GoalTable
     state: RobotState
@@ -63,6 +67,8 @@ def retarget_to_tcp(
 
     :raises InvalidGoal: the TCP must not change, but the tool turns.
     """
+    if goal.moving_frame is not None:
+        return RetargetedGoal(goal=goal, state=goal.moving_frame.seen(state))
     T_flange_controlled = goal.T_flange_controlled
     if T_flange_controlled is None or is_same_tcp(T_flange_controlled, state.T_flange_tcp):
         return RetargetedGoal(goal=goal, state=state)

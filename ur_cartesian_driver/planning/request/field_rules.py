@@ -47,9 +47,12 @@ def check_fields(goal: GoalTable, options: PlanningOptions) -> None:
 
 def check_frames(goal: GoalTable, options: PlanningOptions) -> None:
     """Refuse frames whose pose is not finite or has no unit quaternion."""
+    frame, controlled = goal.T_base_frame, goal.T_flange_controlled
+    if goal.moving_frame is not None:
+        frame, controlled = goal.moving_frame.T_flange_frame, goal.moving_frame.T_base_tool
     for name, pose in (
-        ('trajectory.header.frame_id', goal.T_base_frame),
-        ('trajectory.controlled_frame', goal.T_flange_controlled),
+        ('trajectory.header.frame_id', frame),
+        ('trajectory.controlled_frame', controlled),
     ):
         if pose is not None:
             check_finite(f'the pose of {name}', (*pose.position, *pose.quaternion))

@@ -75,7 +75,9 @@ def check_for_arm(goal: Goal, T_flange_tcp: Pose, arm: Arm, options: PlanningOpt
         posture = JointPositions(names=postures[i].names, values=postures[i].values)
         q = posture.joints(options.tf_prefix)
         _check_ranges(i, q, arm)
-        poses[i] = (T_frame_base @ arm.forward(q) @ T_flange_point).row()
+        flange = arm.forward(q)
+        held = table.moving_frame
+        poses[i] = (held.tool(flange) if held else T_frame_base @ flange @ T_flange_point).row()
         postures[i] = posture
     waypoints = replace(table.waypoints, poses=poses, postures=postures)
     return check(replace(table, waypoints=waypoints), options)

@@ -68,6 +68,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     point_field,
     segment_field,
 )
+from ur_cartesian_driver.planning.request.held_part_rules import check_held_part
 from ur_cartesian_driver.planning.request.mode_rules import check_mode, GOAL_RULES
 from ur_cartesian_driver.planning.request.path_offset import check_path_offset
 from ur_cartesian_driver.planning.request.point_events.registry import check_outputs, check_stops
@@ -196,7 +197,8 @@ def _supported(goal: GoalTable, options: PlanningOptions) -> None:
             )
     check_outputs(goal, options)
     known = ('', options.tf_prefix + 'tool0_controller')
-    if goal.T_flange_controlled is None and goal.controlled_frame not in known:
+    named = goal.controlled_frame if goal.moving_frame is None else ''
+    if goal.T_flange_controlled is None and named not in known:
         raise InvalidGoal(
             'trajectory.controlled_frame',
             f"is '{goal.controlled_frame}', but T_flange_controlled is not set",
@@ -295,6 +297,7 @@ FIELD_RULES: tuple[Rule, ...] = (_number_of_points, check_fields)
 RULES: tuple[Rule, ...] = (
     _joint_points,
     check_frames,
+    check_held_part,
     _keep_open,
     _travel,
     _measurable_tolerances,

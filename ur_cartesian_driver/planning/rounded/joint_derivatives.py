@@ -15,10 +15,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
 from ur_cartesian_driver.kinematics.inverse_rows import solve_path
 from ur_cartesian_driver.motion.geometry.arrays import Floats
-from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
@@ -41,6 +39,8 @@ class JointDerivatives:
     q2: Floats
     #: Joint positions at the last place [rad]; None = the arm cannot follow the path.
     end: Joints | None
+    #: (m,) way of the TCP in base [m] per unit of s; None = the tool's, or no limit is near.
+    carrier: Floats | None = None
 
 
 def joint_derivatives(
@@ -64,12 +64,12 @@ def joint_derivatives(
     few = np.unique(np.append(np.searchsorted(s, np.arange(s[0], s[-1], _STEP)), len(s) - 1))
     none = np.empty((len(s), 0))
     for rows in (few, slice(None)):
-        flange = compose_rows(poses[rows], kinematics.T_tcp_flange)
+        flange = kinematics.flange_rows(poses[rows])
         path = solve_path(arm, flange, q_start, skip_gaps=False)
         if not path.found.all():
             return JointDerivatives(q1=none, q2=none, end=None)
         end = vector6(path.q[-1].tolist())
         if rows is few and not may_near_limits(kinematics, path.q, *peaks, options):
             return JointDerivatives(q1=none, q2=none, end=end)
-    q1, q2 = joint_rates(arm, kinematics.T_flange_tcp, path.q, *derivatives)
-    return JointDerivatives(q1=q1, q2=q2, end=end)
+    q1, q2 = kinematics.joint_rates(path.q, *derivatives)
+    return JointDerivatives(q1=q1, q2=q2, end=end, carrier=kinematics.carrier_speeds(path.q, q1))

@@ -17,7 +17,6 @@ from math import inf
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.motion.errors import InvalidGoal, InvalidPosture, TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.geometry.polynomials import MotionRows
@@ -347,7 +346,7 @@ def _limit_excess(motion: RoundedMotion, options: PlanningOptions, rows: Indices
     part = np.arange(1, _SAMPLES_INSIDE + 1) / (_SAMPLES_INSIDE + 1)
     t = (pieces.times[rows, None] + np.diff(pieces.times)[rows, None] * part).ravel()
     q, qd, qdd = motion.joint_spline.rows(t)
-    _, tool = tool_rates(kinematics.arm, kinematics.T_flange_tcp, q, qd, qdd)
+    _, tool = kinematics.tool_rates(q, qd, qdd)
     segments, _ = motion.places(t)
     excess = np.maximum.reduce(
         [

@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.plan.plan import PlannedRows
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SlowStretch
 from ur_cartesian_driver.planning.rounded.programmed_path import SegmentEnds
 from ur_cartesian_driver.planning.rounded.rounded_planner import RoundedMotion
-from ur_cartesian_driver.planning.rounded.section_law import SectionLaw
+from ur_cartesian_driver.planning.rounded.section_law import BENDS, HELD_PART, SectionLaw
 from ur_cartesian_driver.planning.spline.joint_polynomials import piece_rows
 
 #: The requested speed counts as kept if the tool is slower by at most this fraction.
@@ -198,8 +198,13 @@ class _SectionSpeeds:
         name = self.names[self.limit[begin + int(np.argmin(self.cap[begin:stop]))]]
         if name in JOINT_NAMES:
             return SlowCause.JOINT_LIMIT, f'of the speed limit of {name}'
+        if name.endswith(BENDS):
+            joint = name.removesuffix(BENDS)
+            return SlowCause.JOINT_LIMIT, f'of max_joint_acceleration of {joint}'
         if name == 'max_tool_speed':
             return SlowCause.TOOL_LIMIT, 'of max_tool_speed'
+        if name == HELD_PART:
+            return SlowCause.TOOL_LIMIT, 'of max_tool_speed, which the held part reaches in base'
         what = {
             'corner': 'the acceleration across the path',
             'turn': 'the angular acceleration across the path',

@@ -66,6 +66,9 @@ _SLOWER = 1.5
 _JERK_STEP = 0.002
 #: Number of times that are measured at once, so that the intermediate arrays stay in the cache.
 _BLOCK = 8192
+#: Names of the limits of a held part: its speed in base; and, behind the name of a joint, the
+#: acceleration that its motion along the path needs even at a constant speed.
+HELD_PART, BENDS = 'held part', ' bends'
 _TINY = 1e-12
 _NEARLY = 1e-10
 
@@ -249,10 +252,19 @@ class SectionLaw:
         )
 
     def _joint_caps(self) -> dict[str, Floats]:
-        return {
+        joints, options = self._joints, self._options
+        caps = {
             JOINT_NAMES[k]: self._model.max_joint_speed[k] / np.maximum(np.abs(column), _TINY)
-            for k, column in enumerate(self._joints.q1.T)
+            for k, column in enumerate(joints.q1.T)
         }
+        if joints.carrier is not None:
+            # While the tool crawls around an edge of the part, the part may fly.
+            bound = options.max_tool_speed or inf
+            caps[HELD_PART] = bound / np.maximum(joints.carrier, _TINY)
+            for name, column in zip(JOINT_NAMES, joints.q2.T, strict=True):
+                bend = np.maximum(np.abs(column), _TINY)
+                caps[name + BENDS] = np.sqrt(options.max_joint_acceleration / bend)
+        return caps
 
     def _limits(self) -> LawLimits:
         samples, tool, joints = self.samples, self._limits_at, self._joints

@@ -17,7 +17,6 @@ from math import inf
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
 from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows
 from ur_cartesian_driver.motion.errors import TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
@@ -27,16 +26,10 @@ from ur_cartesian_driver.motion.geometry.polynomials import (
     quintic_rows,
     values,
 )
-from ur_cartesian_driver.motion.geometry.pose_rows import (
-    angle_rows,
-    compose_rows,
-    distance_rows,
-    length_rows,
-)
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, distance_rows, length_rows
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.move_rows import SplineRows
 from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows, ReferencePath
-from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.spline.spline_path import SplinePath
@@ -216,17 +209,12 @@ class _PieceRefinement:
         near = self.path.q[
             np.clip(np.searchsorted(self._sample_times, times), 0, len(self._sample_times) - 1)
         ]
-        flange = compose_rows(self.path.spline.poses(piece, t), self.kinematics.T_tcp_flange)
+        flange = self.kinematics.flange_rows(self.path.spline.poses(piece, t))
         return self._rates(piece, t, nearest_rows(self.kinematics.arm, flange, near))
 
     def _rates(self, piece: Indices, t: Floats, q: Floats) -> MotionRows:
         """Return joint positions with the rates that the tool has at these times."""
-        qd, qdd = joint_rates(
-            self.kinematics.arm,
-            self.kinematics.T_flange_tcp,
-            q,
-            *self.path.spline.rates(piece, t),
-        )
+        qd, qdd = self.kinematics.joint_rates(q, *self.path.spline.rates(piece, t))
         # The rates are rounded, so that they are exactly 0 at rest.
         return MotionRows(q, np.round(qd, _DIGITS) + 0.0, np.round(qdd, _DIGITS) + 0.0)
 
@@ -248,7 +236,7 @@ class _PieceRefinement:
         begin, end = self.times[rows], self.times[rows + 1]
         t = (end - begin)[:, None] * parts
         q = values(self._coefficients(rows), t).reshape(-1, 6)
-        tool = tcp_rows(self.kinematics.arm, self.kinematics.T_flange_tcp, q)
+        tool = self.kinematics.pose_rows(q)
         spline, piece = self.path.spline, np.repeat(self.piece[rows], len(parts))
         wanted = spline.poses(piece, (begin[:, None] + t).ravel() - spline.times[piece])
         distance = length_rows(tool[:, :3] - wanted[:, :3])

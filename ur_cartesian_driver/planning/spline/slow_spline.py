@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Int64s
 from ur_cartesian_driver.motion.plan.slow_stretch import (
     SlowCause,
@@ -54,7 +53,7 @@ def slow_spline_stretches(
     """
     piece, u, times = _places(path)
     joints = polynomials.spline.rows(times)
-    tool, _ = tool_rates(kinematics.arm, kinematics.T_flange_tcp, *joints)
+    tool, _ = kinematics.tool_rates(*joints)
     velocities = tool[:, :3]
     speeds = np.linalg.norm(velocities, axis=1)
     asked = _asked_speeds(path, piece, u, twists, stretch)

@@ -16,7 +16,6 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates, largest_joint_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
@@ -130,6 +129,8 @@ class Rates(NamedTuple):
     #: Joint velocities [rad/s] and accelerations [rad/s^2].
     qd: Floats
     qdd: Floats
+    #: (m,) speeds of the TCP in base [m/s], if the frame of the path moves.
+    carrier: Floats | None = None
 
 
 def worst_excess(
@@ -137,9 +138,9 @@ def worst_excess(
 ) -> LimitExcess | None:
     """Return the quantity along a path that exceeds its limit most; None if none does."""
     sampled, durations = path.piece + path.u, np.diff(path.spline.times)
-    arm = kinematics.arm
+    model = kinematics.arm.model
     joint_speeds = np.abs(np.diff(path.q, axis=0)) / np.diff(path.times)[:, None]
-    is_near = bool((joint_speeds > _NEAR * np.array(arm.model.max_joint_speed)).any())
+    is_near = bool((joint_speeds > _NEAR * np.array(model.max_joint_speed)).any())
     if not is_near:
         speeds, accelerations = (
             (float(length_rows(rows[:, :3]).max()), float(length_rows(rows[:, 3:]).max()))
@@ -152,9 +153,10 @@ def worst_excess(
         if not is_near:
             return Rates(*tool, zeros(len(u)), zeros(len(u)))
         q = np.stack([np.interp(piece + u, sampled, joint) for joint in path.q.T], axis=1)
-        return Rates(*tool, *joint_rates(arm, kinematics.T_flange_tcp, q, *tool))
+        qd, qdd = kinematics.joint_rates(q, *tool)
+        return Rates(*tool, qd, qdd, kinematics.carrier_speeds(q, qd))
 
-    return worst_excess_between(rates, path.piece, path.u, path.first, arm.model, options)
+    return worst_excess_between(rates, path.piece, path.u, path.first, model, options)
 
 
 def may_near_limits(
@@ -167,15 +169,18 @@ def may_near_limits(
     """
     Return whether a joint may come near a limit in one of the configurations (n, 6) [rad].
 
-    The inverse of the Jacobian bounds the joint rates by those of the tool.
+    The inverse of the Jacobian bounds the joint rates by those of the tool. Where the frame of the
+    path moves, True: the speed of the TCP in base has to be known, too.
 
     :param rates: greatest speed and turn rate of the tool [m/s], [rad/s].
     :param accelerations: likewise [m/s^2], [rad/s^2].
     """
-    arm, T_flange_tcp = kinematics.arm, kinematics.T_flange_tcp
+    if kinematics.frame_moves:
+        return True
+    model = kinematics.arm.model
     for k in range(0, len(q), _BLOCK):
-        qd, qdd = largest_joint_rates(arm, T_flange_tcp, q[k : k + _BLOCK], rates, accelerations)
-        speeds = qd / arm.model.max_joint_speed
+        qd, qdd = kinematics.largest_joint_rates(q[k : k + _BLOCK], rates, accelerations)
+        speeds = qd / model.max_joint_speed
         if max(speeds.max(), qdd.max() / options.max_joint_acceleration) > _NEAR:
             return True
     return False
@@ -265,6 +270,8 @@ def _quantities(rates: Rates, model: RobotModel, options: PlanningOptions) -> It
         speed = np.linalg.norm(rates.twists[:, :3], axis=1)
         limit, name = options.max_tool_speed, 'max_tool_speed'
         yield 'the tool', speed, limit, 1, 'm/s', name, SlowCause.TOOL_LIMIT
+        if rates.carrier is not None:
+            yield 'the held part', rates.carrier, limit, 1, 'm/s', name, SlowCause.TOOL_LIMIT
     cause = SlowCause.ACCELERATION_LIMIT
     for part, name, unit in (
         (slice(0, 3), 'max_linear_acceleration', 'm/s^2'),

@@ -20,7 +20,6 @@ from math import ceil, degrees, inf
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import GoalRefused, JointLimitExceeded, TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Floats
@@ -33,7 +32,6 @@ from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import Spline
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowStretch, SpeedLimit
-from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.min_speed import slower_by
 from ur_cartesian_driver.planning.options import PlanningOptions
@@ -81,13 +79,13 @@ class SplineState:
         """Return the joints as rows (1, 6)."""
         return MotionRows(np.array([self.q]), np.array([self.qd]), np.array([self.qdd]))
 
-    def tool(self, arm: Arm, T_flange_tcp: Pose) -> ToolPoints:
-        """Return the pose and the rates of the TCP in base, as one row."""
+    def tool(self, kinematics: TcpKinematics) -> ToolPoints:
+        """Return the pose and the rates of the tool in the frame of the path, as one row."""
         q, qd, qdd = self.rows()
-        twist, acceleration = tool_rates(arm, T_flange_tcp, q, qd, qdd)
+        twist, acceleration = kinematics.tool_rates(q, qd, qdd)
         return ToolPoints(
             times=np.array([self.time]),
-            poses=tcp_rows(arm, T_flange_tcp, q),
+            poses=kinematics.pose_rows(q),
             twists=twist,
             accelerations=acceleration,
             quintic=True,
@@ -113,8 +111,7 @@ class SplinePieces:
 def plan_spline(
     start: SplineState,
     goal: GoalTable,
-    arm: Arm,
-    T_flange_tcp: Pose,
+    kinematics: TcpKinematics,
     options: PlanningOptions,
     *,
     first: int = 0,
@@ -126,14 +123,13 @@ def plan_spline(
     :param goal: the goal, whose waypoints come after the state and have times since the start of
         the motion. With ``keep_open``, the arm may still be moving at the last point; the stop by
         :func:`plan_stop` is then checked as well.
-    :param T_flange_tcp: the TCP of the motion.
+    :param kinematics: of the arm with the TCP of the motion.
     :param first: the index that the first of these waypoints has in the whole goal.
-    :param tool_tips: the tool tips to check for collisions; empty = only ``T_flange_tcp``.
+    :param tool_tips: the tool tips to check for collisions; empty = only this TCP.
     :raises GoalRefused: the spline cannot be executed; the text names point, quantity, value and
         bound.
     """
-    kinematics = TcpKinematics(arm, T_flange_tcp)
-    points = tool_points(goal, start.tool(arm, T_flange_tcp))
+    points = tool_points(goal, start.tool(kinematics))
     path = solve_spline_path(
         kinematics,
         ToolSpline.through(points),
@@ -163,7 +159,13 @@ def plan_spline(
             *point_remarks(goal, first),
             *([stretch_remark(stretch, limit, path.spline.times[-1])] if limit else []),
             *_clearance_remarks(
-                path, end, arm, tool_tips or (T_flange_tcp,), start, options, goal.part_changes
+                path,
+                end,
+                kinematics.arm,
+                tool_tips or (kinematics.T_flange_tcp,),
+                start,
+                options,
+                goal.part_changes,
             ),
             f'joints: {len(polynomials.piece)} {kind} pieces, which keep the tool within '
             f'{1e3 * polynomials.distance:.3f} mm and {polynomials.angle:.5f} rad of its spline',

@@ -1,0 +1,145 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Paths on a part that the arm holds before a fixed tool, judged by pinocchio on our URDF."""
+
+from collections import Counter
+from dataclasses import replace
+from math import radians
+
+from held_part_goals import (
+    held_case,
+    measure,
+    off_path,
+    rounded_goal,
+    spline_goal,
+    spline_poses,
+    STEP,
+    turned_by,
+)
+import numpy as np
+import pytest
+from random_cases import cases, random_of
+
+from ur_cartesian_driver.motion.errors import (
+    JointLimitExceeded,
+    NearSingularity,
+    TooFast,
+    Unreachable,
+)
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.stop_prediction import state_at_rest
+
+pytest.importorskip('pinocchio')
+
+OPTIONS = PlanningOptions(self_collision='off', max_approach_distance=2.0)
+PARTS = 5
+#: What refuses a random goal rightly: the arm cannot be there.
+EXPLAINED = (Unreachable, NearSingularity, JointLimitExceeded)
+#: The tool is on its path within this [m], [rad].
+POSITION, TURN = 1e-4, radians(0.05)
+#: Speeds and limits are kept within this part.
+PART = 0.02
+#: The feed may be lower where something is this near its limit, so long before or after [s].
+BINDS, AROUND = 0.8, 0.1
+#: Pieces may leave the path by micrometres, which changes the speed by so much [m/s]; below the
+#: second speed this is more than that part.
+PIECES, SLOW = 6e-4, 0.02
+#: The widest corner: a time at the greatest speed [s], but no less than [m].
+WIDEST, SLOW_WIDTH = 0.3, 0.002
+
+
+def planned(case, options=OPTIONS):
+    return plan(case.goal, state_at_rest(case.arm, case.state.actual_q), case.arm, options)
+
+
+@pytest.mark.random
+@pytest.mark.parametrize('part', range(PARTS))
+def test_rounded_paths_on_parts_keep_path_feed_and_limits(part):
+    random, refused, count = random_of('held rounded', part), Counter(), cases(350 // PARTS)
+    judged = 0
+    for _ in range(count):
+        case = held_case(random, rounded_goal)
+        try:
+            made = planned(case)
+        except EXPLAINED as error:
+            refused[type(error)] += 1
+            continue
+        seen = measure(case, made, OPTIONS)
+        assert off_path(case, seen).max() <= case.goal.corner_deviation + 1e-6, case
+        for limited in (seen.joint_speed, seen.joint_acceleration, seen.carrier):
+            assert limited.max() <= 1.0 + PART, case
+        inner = slice(2, -2)
+        assert seen.acceleration[inner].max(initial=0.0) <= 1.0 + PART, case
+        assert seen.turn_acceleration[inner].max(initial=0.0) <= 1.0 + PART, case
+        assert seen.jerk[inner].max(initial=0.0) <= 1.0 + PART, case
+        judged += check_feed(case, made, seen)
+        end = case.goal.waypoints[-1].pose.matrix()
+        assert np.linalg.norm(seen.tool[-1, :3, 3] - end[:3, 3]) < POSITION
+        assert turned_by(seen.tool[-1, :3, :3], end[:3, :3]) < TURN
+    assert sum(refused.values()) <= 0.6 * count + 2, refused
+    assert judged > 0
+
+
+def check_feed(case, made, seen):
+    """
+    Compare the feed on the part with what was asked, and return how many samples were compared.
+
+    It is never higher. It is not lower either in the middle of a segment, away from the ramps and
+    the widest corners at its ends, unless something is near its limit.
+    """
+    t = STEP * np.arange(len(seen.speed))
+    row = np.clip(np.searchsorted(made.reference.time, t), 0, len(made.reference.time) - 1)
+    segment = made.reference.point[row]
+    lengths = np.array(
+        [a.distance_to(b.pose) for a, b in zip(case.starts, case.goal.waypoints, strict=True)]
+    )
+    asked = np.array([min(each.velocity, OPTIONS.max_tool_speed) for each in case.goal.segments])
+    highest = np.where(lengths > 1e-6, asked, OPTIONS.linear_velocity).max()
+    assert seen.speed.max() <= (1.0 + PART) * highest + PIECES, case
+    accelerations = np.array([each.acceleration or 1.0 for each in case.goal.segments])
+    ends = SLOW_WIDTH + WIDEST * asked.max() + asked**2 / np.minimum(accelerations, 1.0)
+    from_ends = np.minimum(
+        *(
+            np.linalg.norm(
+                seen.tool[:, :3, 3] - np.array([each.position for each in poses])[segment], axis=1
+            )
+            for poses in (case.starts, [point.pose for point in case.goal.waypoints])
+        )
+    )
+    reach = int(AROUND / STEP)
+    around = np.convolve(seen.near_limits > BINDS, np.ones(2 * reach + 1))[reach:-reach] > 0.0
+    judged = (from_ends > ends[segment]) & ~around
+    lowest = (1.0 - PART) * asked[segment] - PIECES
+    assert np.all(seen.speed[judged] >= lowest[judged]), case
+    return int(judged.sum())
+
+
+@pytest.mark.random
+@pytest.mark.parametrize('part', range(PARTS))
+def test_splines_on_parts_are_where_their_times_say(part):
+    random, refused, count = random_of('held splines', part), Counter(), cases(150 // PARTS)
+    # Pieces of joint cubics are that close to the path; their speeds follow from it.
+    options = replace(OPTIONS, max_tool_speed=2.0, spline_tolerance=1e-5)
+    for _ in range(count):
+        case = held_case(random, spline_goal)
+        try:
+            made = planned(case, options)
+        except (*EXPLAINED, TooFast) as error:
+            refused[type(error)] += 1
+            continue
+        seen = measure(case, made, options)
+        t = STEP * np.arange(len(seen.speed))
+        off = np.linalg.norm(seen.tool[:, :3, 3] - spline_poses(case, t), axis=1)
+        assert off.max() <= POSITION, case
+        asked = np.linalg.norm(np.gradient(spline_poses(case, t), STEP, axis=0), axis=1)
+        fast = asked > SLOW
+        assert np.all(np.abs(seen.speed - asked)[fast] <= PART * asked[fast]), case
+        for waypoint in case.goal.waypoints:
+            q = made.joint_spline.rows(np.array([waypoint.time]))[0]
+            at, wanted = case.relative(q)[0], waypoint.pose.matrix()
+            assert np.linalg.norm(at[:3, 3] - wanted[:3, 3]) <= POSITION, case
+            assert turned_by(at[:3, :3], wanted[:3, :3]) <= TURN, case
+        assert seen.joint_speed.max() <= 1.0 + PART
+        assert seen.joint_acceleration.max() <= 1.0 + PART
+        assert seen.carrier.max() <= 1.0 + PART
+    assert sum(refused.values()) <= 0.6 * count + 2, refused
