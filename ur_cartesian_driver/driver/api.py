@@ -461,9 +461,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         goal = path.goal(self.frames, snapshot)
         if path.start is None or path.starts_with_joint_motion:
             return goal
-        T_flange_tool = goal.T_flange_controlled or snapshot.T_flange_tcp
-        tool = snapshot.T_base_flange @ T_flange_tool
-        start = goal.T_base_frame @ path.start
+        tool, start = snapshot.tool(goal), path.start
         distance, angle = tool.distance_to(start), tool.angle_to(start)
         options = self.options
         if distance > options.start_tolerance_position or angle > options.start_tolerance_angle:

@@ -10,7 +10,6 @@ from typing import Literal
 import numpy as np
 
 from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal
-from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.path.path_builder import Path
 from ur_cartesian_driver.path.path_points import is_same
@@ -58,9 +57,7 @@ def _where(number: int) -> str:
 def _beginning(first: Path, by: AirTravel) -> Path:
     """Return a path without points that begins where the arm stands, with a path's speeds."""
     goal = first._begin(by, _where(0)).goal
-    T_flange_tool = goal.T_flange_controlled or by.state.T_flange_tcp
-    T_base_tool: Pose = by.snapshot.T_base_flange @ T_flange_tool
-    start = Path(goal.T_base_frame.inverse() @ T_base_tool, frame=first.frame, tool=first.tool)
+    start = Path(by.snapshot.tool(goal), frame=first.frame, tool=first.tool)
     return start._with_feed_of(first)
 
 

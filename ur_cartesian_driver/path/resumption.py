@@ -496,7 +496,8 @@ def _check(goal: Goal, place: PathPlace, overlap: float, approach: float) -> Non
             'send what is left of the path as a goal of its own',
         )
     # The name may have a prefix. If the goal has the pose of its frame, this pose is kept.
-    if goal.frame_id.endswith(FRAMES_OF_TOOL) and goal.T_base_frame == IDENTITY:
+    moved = goal.T_base_frame == IDENTITY and goal.moving_frame is None
+    if goal.frame_id.endswith(FRAMES_OF_TOOL) and moved:
         raise InvalidGoal(
             'trajectory.header.frame_id',
             f'is {goal.frame_id}, which has moved with the arm since the goal began, and the path '

@@ -34,7 +34,7 @@ class LivePage:
         self._arm, self._plan = arm, plan
         self._scene = scene_of_plan(server, arm, state.T_flange_tcp, plan, cell)
         self._tcp = state.T_flange_tcp
-        place = np.array(state.actual_tcp_pose.position)
+        place = np.array(_seen(state, plan).actual_tcp_pose.position)
         self._trail = np.array([place, place])
         if plan is None:
             self._scene.look_at(self._trail)
@@ -49,7 +49,7 @@ class LivePage:
             self._tcp = state.T_flange_tcp
             self._scene.set_tool(self._tcp)
         self._scene.pose_arm(state.actual_q)
-        place = np.array(state.actual_tcp_pose.position)
+        place = np.array(_seen(state, self._plan).actual_tcp_pose.position)
         if np.linalg.norm(place - self._trail[-1]) >= TRAIL_STEP:
             self._trail = np.vstack((self._trail[-TRAIL_EDGES:], place))
             self._scene.set_trail(self._trail)
@@ -97,6 +97,12 @@ def path_deviation(path: Floats, place: Floats) -> float:
     return float(np.linalg.norm(nearest - place, axis=1).min())
 
 
+def _seen(state: RobotState, plan: Plan | None) -> RobotState:
+    """Return the state as seen from the frame of the planned path, if this frame moves."""
+    frame = None if plan is None else plan.goal.moving_frame
+    return state if frame is None else frame.seen(state)
+
+
 def _text(state: RobotState, plan: Plan | None) -> str:
     x, y, z = (1e3 * value for value in state.actual_tcp_pose.position)
     lag = state.actual_tcp_pose.distance_to(state.target_tcp_pose)
@@ -110,7 +116,11 @@ def _text(state: RobotState, plan: Plan | None) -> str:
         ('off its set-point', f'{1e3 * lag:.2f} mm'),
     ]
     if plan is not None:
-        place = np.array(state.actual_tcp_pose.position)
+        seen = _seen(state, plan)
+        place = np.array(seen.actual_tcp_pose.position)
+        if plan.goal.moving_frame is not None:
+            speed = 1e3 * hypot(*seen.actual_tcp_twist[:3])
+            rows.append(('speed on the part', f'{speed:.1f} mm/s'))
         deviation = path_deviation(plan.reference.poses[:, :3], place)
         rows.append(('from the planned path', f'{1e3 * deviation:.2f} mm'))
     if state.points_begun:

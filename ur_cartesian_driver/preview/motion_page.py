@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.cell.cell import Cell, EMPTY_CELL
 from ur_cartesian_driver.motion.errors import CollisionPredicted, GoalRefused
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.geometry.vectors import Joints
+from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector3
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes
 from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.plan.plan import Plan
@@ -161,6 +161,8 @@ def scene_of_plan(
     """Return a scene with arm and cell and, if a plan is given, its points, outputs and path."""
     scene = Scene(server, arm, tcp, cell)
     if plan is not None:
+        if plan.goal.moving_frame is not None:
+            scene.hold(plan.goal.moving_frame, plan.start)
         scene.add_points(_waypoints(plan))
         scene.add_outputs(_outputs(plan))
         scene.add_path(plan.reference.poses[:, :3], _by_type(plan).colours)
@@ -186,12 +188,7 @@ def refusal_page(
     :raises ImportError: viser is not installed; the text says how to get it.
     """
     # The orientation may be what is wrong; points given by joints have no place.
-    path = np.array(
-        [
-            (arm.forward(q) @ tcp).position,
-            *(goal.T_base_frame.apply(waypoint.pose.position) for waypoint in goal.waypoints),
-        ]
-    )
+    path = np.array(_places(goal, arm.forward(q), tcp))
     has_place = np.isfinite(path).all(axis=1)
     touching: tuple[str, ...] = ()
     cell = options.cell
@@ -210,6 +207,15 @@ def refusal_page(
         recorded = scene.record(np.zeros(1), np.array([q]))
     text = f'<p class="refused">Refused: {escape(str(refusal))}</p>'
     return _page({'type': recorded}, text)
+
+
+def _places(goal: Goal, T_base_flange: Pose, tcp: Pose) -> list[Vector3]:
+    """Return where the tool and the points of a goal are in base; on a held part, at the start."""
+    start, frame = (T_base_flange @ tcp).position, goal.T_base_frame
+    if goal.moving_frame is not None:
+        start = goal.moving_frame.T_base_tool.position
+        frame = goal.moving_frame.frame(T_base_flange)
+    return [start, *(frame.apply(waypoint.pose.position) for waypoint in goal.waypoints)]
 
 
 def cell_page(

@@ -38,7 +38,8 @@ class Preview:
 
     #: (n,) the times since the start of the motion [s]; the last one is its end.
     time: Floats
-    #: (n, 7) poses of the TCP in the robot's base: x y z [m], unit quaternion x y z w.
+    #: (n, 7) poses of the TCP in the robot's base: x y z [m], unit quaternion x y z w. On a held
+    #: part, poses of the fixed tool in the frame on the part.
     poses: Floats
     #: (n, 6) joint positions [rad]; NaN where the arm has no solution for the pose.
     joints: Floats

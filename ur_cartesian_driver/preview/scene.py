@@ -19,9 +19,10 @@ from ur_cartesian_driver.kinematics.link_shapes import ARM_LINKS, link_shapes, L
 from ur_cartesian_driver.motion.cell.cell import Cell, CellBody, EMPTY_CELL
 from ur_cartesian_driver.motion.cell.shapes import Box, Cylinder, HalfSpace, Mesh, Shape, Sphere
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
-from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.geometry.vectors import Joints
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector3
 from ur_cartesian_driver.motion.geometry.workspace import Plane
+from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
 from ur_cartesian_driver.preview.drawn_shapes import coarse_mesh, SQUARE_SIDE, triangles_per_mesh
 
 Colours = NDArray[np.uint8]
@@ -74,6 +75,8 @@ class Scene:
         self._server, self._scene = server, server.scene
         self._frames = LinkFrames(arm)
         self._touching = touching
+        #: The node in whose frame the path is, '' = the base; the pose of this frame at the start.
+        self._path_root, self._T_base_path = '', IDENTITY
         self._links = [self._scene.add_frame(name, show_axes=False) for name in _LINK_NODES]
         for k, shape in enumerate(link_shapes(arm, 'collision')):
             if shape.mesh is not None:
@@ -159,13 +162,43 @@ class Scene:
             wxyz=_wxyz(pose),
         )
 
+    def hold(self, frame: MovingFrame, q: Joints) -> None:
+        """
+        Let paths, points and outputs move with a part in the hand, and draw the fixed tool.
+
+        :param q: the joint positions at the start [rad].
+        """
+        T_link_frame = self._frames.flange @ frame.T_flange_frame
+        self._path_root = f'{_LINK_NODES[-1]}/held_part'
+        self._scene.add_frame(
+            self._path_root,
+            axes_length=0.05,
+            axes_radius=0.0025,
+            position=np.array(T_link_frame.position),
+            wxyz=_wxyz(T_link_frame),
+        )
+        self._scene.add_frame(
+            '/fixed_tool',
+            axes_length=0.08,
+            axes_radius=0.004,
+            position=np.array(frame.T_base_tool.position),
+            wxyz=_wxyz(frame.T_base_tool),
+        )
+        self._scene.add_label('/fixed_tool/label', 'fixed tool', font_screen_scale=0.7)
+        wrist = pose_from_row(self._frames.poses(np.array([q]))[0][-1])
+        self._T_base_path = wrist @ T_link_frame
+
     def add_path(self, positions: Floats, colours: Colours) -> None:
         """Draw a path with a colour for each of its edges, and point the camera at the path."""
         edges = np.stack((positions[:-1], positions[1:]), axis=1).astype(np.float32)
         self._scene.add_line_segments(
-            '/path', edges, np.repeat(colours[:, None], 2, axis=1), thickness=0.007
+            f'{self._path_root}/path',
+            edges,
+            np.repeat(colours[:, None], 2, axis=1),
+            thickness=0.007,
         )
-        self.look_at(positions)
+        rows = np.array([self._T_base_path.apply(vector3(place)) for place in positions.tolist()])
+        self.look_at(rows if self._path_root else positions)
 
     def look_at(self, positions: Floats) -> None:
         """Point the camera at path and arm from the side, so that they appear beside the text."""
@@ -182,7 +215,7 @@ class Scene:
     def set_trail(self, positions: Floats) -> None:
         """Draw the trail of the TCP, in place of the previous trail."""
         edges = np.stack((positions[:-1], positions[1:]), axis=1).astype(np.float32)
-        self._scene.add_line_segments('/trail', edges, _TRAIL, thickness=0.004)
+        self._scene.add_line_segments(f'{self._path_root}/trail', edges, _TRAIL, thickness=0.004)
 
     def pose_arm(self, q: Joints) -> None:
         """Draw the arm at joint positions [rad]."""
@@ -192,17 +225,21 @@ class Scene:
         """Draw points with their numbers, up to :data:`MAX_NUMBERED_POINTS` of them."""
         for number, place in list(points)[:MAX_NUMBERED_POINTS]:
             self.add_ball(f'points/{number}', place, 0.006, _POINT)
-            self._scene.add_label(f'/points/{number}/label', str(number), font_screen_scale=0.7)
+            node = f'{self._path_root}/points/{number}'
+            self._scene.add_label(f'{node}/label', str(number), font_screen_scale=0.7)
 
     def add_outputs(self, outputs: Iterable[tuple[str, Floats]]) -> None:
         """Mark places of outputs, waits and calls with their texts."""
         for k, (text, place) in enumerate(outputs):
             self.add_ball(f'outputs/{k}', place, 0.008, _OUTPUT)
-            self._scene.add_label(f'/outputs/{k}/label', text, font_screen_scale=0.7)
+            node = f'{self._path_root}/outputs/{k}'
+            self._scene.add_label(f'{node}/label', text, font_screen_scale=0.7)
 
     def add_ball(self, name: str, place: Floats, radius: float, colour: Colour) -> None:
         """Draw a ball."""
-        self._scene.add_icosphere(f'/{name}', radius, colour, subdivisions=2, position=place)
+        self._scene.add_icosphere(
+            f'{self._path_root}/{name}', radius, colour, subdivisions=2, position=place
+        )
 
     def record(self, time: Floats, q: Floats, cells: Mapping[int, Cell] = _NO_CHANGES) -> str:
         """

@@ -95,6 +95,7 @@ def _title(recording: Recording) -> str:
 
 def _draw_path(figure: Any, recording: Recording) -> None:
     """Draw the path in space, and flat: from above, or from the side if it is mainly vertical."""
+    recording = recording.on_the_part()
     planned, actual = recording.planned_pose[:, :3], recording.actual_pose[:, :3]
     space, flat = figure.add_subplot(2, 1, 1, projection='3d'), figure.add_subplot(2, 1, 2)
     low, high = (side(np.vstack((planned, actual)), axis=0) for side in (np.min, np.max))

@@ -119,7 +119,9 @@ class _Messages:
     def single(self) -> Iterator[_Record]:
         """Yield the plan, and the events as the messages of a log."""
         if len(self._recording.planned_pose):
-            header = _header(self._start, self._base)
+            metadata = self._recording.metadata
+            on_part = metadata.get('moving_frame') is not None
+            header = _header(self._start, metadata['frame_id'] if on_part else self._base)
             poses = [
                 {'header': header, 'pose': _pose(row)}
                 for row in self._recording.planned_pose.tolist()

@@ -92,6 +92,7 @@ def motion_metadata(
         'due': job.due,
         'keep_open': job.keep_open,
         'T_base_frame': job.T_base_frame.row(),
+        'moving_frame': _moving_frame(job),
         'T_flange_tcp': (job.T_flange_tcp or job.T_flange_active).row(),
         'T_tcp_controlled': job.T_tcp_controlled.row(),
         'path_tolerance': asdict(job.path_tolerance),
@@ -102,6 +103,17 @@ def motion_metadata(
         'outcome': None,
         'rows_left_out': 0,
         'trouble': '',
+    }
+
+
+def _moving_frame(job: MotionJob) -> dict[str, Any] | None:
+    """Return the frame on the part and the fixed tool, if the frame of the path moves."""
+    frame = job.moving_frame
+    if frame is None:
+        return None
+    return {
+        'T_flange_frame': frame.T_flange_frame.row(),
+        'T_base_tool': frame.T_base_tool.row(),
     }
 
 

@@ -11,7 +11,7 @@ compared with the planned one in the same way as in the driver.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from errno import EINVAL
 import json
 from pathlib import Path
@@ -26,6 +26,12 @@ from ur_cartesian_driver.driver.recordings.recording_format import Event
 from ur_cartesian_driver.execution.monitoring.path_tracker import PathTracker, tracker_speed
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Int32s
 from ur_cartesian_driver.motion.geometry.pose import pose_from_row
+from ur_cartesian_driver.motion.geometry.pose_rows import (
+    compose_rows,
+    cross_rows,
+    inverse_rows,
+    rotate_rows,
+)
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.motion.state.effective_speed import EffectiveSpeed
 from ur_cartesian_driver.protocol.program.registers import PULSE_COUNTS
@@ -57,7 +63,8 @@ class Recording:
     One motion: n packets of the robot, m samples of the plan.
 
     Poses describe the TCP in the robot's base: x y z [m], unit quaternion x y z w. Twists are
-    linear [m/s] and angular [rad/s] in base axes.
+    linear [m/s] and angular [rad/s] in base axes. Planned poses of a path on a held part describe
+    the fixed tool in the frame on the part, see :meth:`on_the_part`.
     """
 
     #: Goal, parameters and outcome; see doc/recordings.md.
@@ -190,6 +197,37 @@ class Recording:
         last = np.flatnonzero(np.diff(self.planned_point, append=-1))
         return np.asarray(self.planned_pose[last])
 
+    def on_the_part(self) -> Recording:
+        """
+        Return the recording as seen from the frame of the plan, if this frame is on a held part.
+
+        Poses and twists are then those of the fixed tool in that frame, as the planned poses are.
+        """
+        known = self.metadata.get('moving_frame')
+        if known is None:
+            return self
+        T_base_tool = pose_from_row(known['T_base_tool'])
+        T_tcp_flange = pose_from_row(self.metadata['T_flange_tcp']).inverse()
+        T_tcp_frame = T_tcp_flange @ pose_from_row(known['T_flange_frame'])
+
+        def seen(poses: Floats, twists: Floats) -> tuple[Floats, Floats]:
+            T_frame_base = inverse_rows(compose_rows(poses, T_tcp_frame))
+            turned, w = T_frame_base[:, 3:], twists[:, 3:]
+            v = twists[:, :3] + cross_rows(w, np.array(T_base_tool.position) - poses[:, :3])
+            rates = np.concatenate([rotate_rows(turned, v), rotate_rows(turned, w)], axis=1)
+            return compose_rows(T_frame_base, T_base_tool), -rates
+
+        actual_pose, actual_twist = seen(self.actual_pose, self.actual_twist)
+        target_pose, target_twist = seen(self.target_pose, self.target_twist)
+        return replace(
+            self,
+            metadata={**self.metadata, 'moving_frame': None},
+            actual_pose=actual_pose,
+            actual_twist=actual_twist,
+            target_pose=target_pose,
+            target_twist=target_twist,
+        )
+
     def deviation(self) -> RecordedDeviation:
         """
         Compare with the plan, packet by packet.
@@ -201,7 +239,7 @@ class Recording:
         """
         rows = np.full((len(self.time), 6), np.nan)
         if len(self.planned_time) > 1:
-            self._compare(PathTracker(self.reference), rows)
+            self.on_the_part()._compare(PathTracker(self.reference), rows)
         position, angle, target_position, target_angle, time, waypoint = rows.T
         return RecordedDeviation(
             position=position,

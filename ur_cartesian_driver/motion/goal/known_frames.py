@@ -95,6 +95,13 @@ class ArmSnapshot:
         """Return the snapshot of a robot's reported poses, which include its calibration."""
         return cls(state.actual_tcp_pose @ state.T_flange_tcp.inverse(), state.T_flange_tcp)
 
+    def tool(self, goal: Goal) -> Pose:
+        """Return the pose of a goal's tool in the frame of the goal."""
+        if goal.moving_frame is not None:
+            return goal.moving_frame.tool(self.T_base_flange)
+        T_flange_tool = goal.T_flange_controlled or self.T_flange_tcp
+        return goal.T_base_frame.inverse() @ self.T_base_flange @ T_flange_tool
+
 
 class FrameLookup(Protocol):
     """Looks up the frames of other nodes; ``ros.tf.tf_lookup`` does so in tf2."""

@@ -28,9 +28,13 @@ class MovingFrame:
     T_flange_frame: Pose
     T_base_tool: Pose
 
+    def frame(self, T_base_flange: Pose) -> Pose:
+        """Return the frame in base."""
+        return T_base_flange @ self.T_flange_frame
+
     def tool(self, T_base_flange: Pose) -> Pose:
         """Return the pose of the tool in the frame."""
-        return (T_base_flange @ self.T_flange_frame).inverse() @ self.T_base_tool
+        return self.frame(T_base_flange).inverse() @ self.T_base_tool
 
     def flange(self, T_frame_tool: Pose) -> Pose:
         """Return the pose of the flange in base that leads the tool to a pose in the frame."""
@@ -38,8 +42,7 @@ class MovingFrame:
 
     def flange_shift(self, T_base_flange: Pose, shift: Vector3) -> Vector3:
         """Return the shift of the flange in base [m] that shifts the tool in the frame."""
-        T_base_frame = T_base_flange @ self.T_flange_frame
-        return scale(rotate(T_base_frame.quaternion, shift), -1.0)
+        return scale(rotate(self.frame(T_base_flange).quaternion, shift), -1.0)
 
     def seen(self, state: RobotState) -> RobotState:
         """
@@ -74,7 +77,7 @@ class MovingFrame:
         self, T_base_tcp: Pose, T_flange_tcp: Pose, twist: Vector6, acceleration: Vector6 | None
     ) -> tuple[Pose, Vector6, Vector6 | None]:
         """Return pose, twist and acceleration of the tool in the frame, from those of the TCP."""
-        T_base_frame = T_base_tcp @ T_flange_tcp.inverse() @ self.T_flange_frame
+        T_base_frame = self.frame(T_base_tcp @ T_flange_tcp.inverse())
         offset = subtract(self.T_base_tool.position, T_base_tcp.position)
         # The frame turns away under the tool: its own motion there, reversed.
         there = twist_at(twist, offset)

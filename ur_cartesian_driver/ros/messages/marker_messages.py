@@ -13,6 +13,8 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose, pose_from_row
+from ur_cartesian_driver.motion.goal.known_frames import BASE, TOOL0
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.preview.motion_page import BLEND, MOTIONS
 from ur_cartesian_driver.ros.message_fields import pose_message
@@ -46,20 +48,24 @@ def plan_markers(plan: Plan, base: str, stamp: Time) -> MarkerArray:
     Return a plan as markers, which replace the markers of the plan before.
 
     Namespace ``path``: the path of the TCP, each piece in the colour of its motion; ``points``:
-    the points of the goal; ``ends``: the axes of the TCP at the start and at the end.
+    the points of the goal; ``ends``: the axes of the TCP at the start and at the end. Of a path
+    on a held part, all of them move with the flange.
 
     :param base: the frame of the robot's base.
     """
-    header = Header(stamp=stamp, frame_id=base)
-    ends = [plan.reference.poses[row] for row in (0, -1)]
-    return MarkerArray(
-        markers=[
-            Marker(header=header, action=Marker.DELETEALL),
-            _path(plan, header),
-            _points(plan, header),
-            *(_axes(row, number, header) for number, row in enumerate(ends)),
-        ]
-    )
+    header, T_header_path = Header(stamp=stamp, frame_id=base), IDENTITY
+    moving = plan.goal.moving_frame
+    if moving is not None:  # RViz moves the markers with the flange
+        header.frame_id = base.removesuffix(BASE) + TOOL0
+        T_header_path = moving.T_flange_frame
+    lines = [_path(plan, header), _points(plan, header)]
+    for marker in lines:
+        marker.pose = pose_message(T_header_path)
+    ends = [T_header_path @ pose_from_row(plan.reference.poses[row]) for row in (0, -1)]
+    markers = [*lines, *(_axes(pose, number, header) for number, pose in enumerate(ends))]
+    for marker in markers:
+        marker.frame_locked = moving is not None
+    return MarkerArray(markers=[Marker(header=header, action=Marker.DELETEALL), *markers])
 
 
 def _path(plan: Plan, header: Header) -> Marker:
@@ -86,12 +92,9 @@ def _points(plan: Plan, header: Header) -> Marker:
     return marker
 
 
-def _axes(row: Floats, number: int, header: Header) -> Marker:
-    x, y, z, qx, qy, qz, qw = row.tolist()
+def _axes(pose: Pose, number: int, header: Header) -> Marker:
     marker = Marker(header=header, ns='ends', id=number, type=Marker.LINE_LIST)
-    marker.pose.position = Point(x=x, y=y, z=z)
-    for name, value in zip('xyzw', (qx, qy, qz, qw), strict=True):
-        setattr(marker.pose.orientation, name, value)
+    marker.pose = pose_message(pose)
     marker.scale.x = PATH_WIDTH
     for direction, colour in _AXES:
         x, y, z = (AXIS_LENGTH * part for part in direction)
