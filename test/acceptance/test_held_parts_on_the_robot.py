@@ -10,7 +10,9 @@ places at which it is interrupted.
 
 from dataclasses import dataclass, replace
 import os
+import runpy
 
+from checkout import CHECKOUT, needs_checkout
 from curve_distance import distances
 from held_part_goals import origin_pose
 import numpy as np
@@ -21,6 +23,7 @@ from recorded_goal import SETUP
 from robot_cell import CYCLE, RTDE, run_cell
 from urdf_arm import urdf_of, UrdfArm
 from virtual_network import HOST
+import yaml
 
 from ur_cartesian_driver.driver.ipc.channel import SetPathOffset
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -45,8 +48,9 @@ from ur_cartesian_driver.motion.goal.goal import (
 )
 from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
 from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
-from ur_cartesian_driver.path import resume
+from ur_cartesian_driver.path import Frames, Path, resume, StaticFrame
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.resources import share_path
 
 pytest.importorskip('pinocchio')
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
@@ -262,5 +266,38 @@ def test_an_offset_moves_the_tool_in_the_frame_of_the_part():
         off = distances(places, [programmed()[:2]])
         assert off.max() == pytest.approx(side, abs=2e-4)
         assert off[-1] < 3e-4
+
+    run_cell(body)
+
+
+@pytest.mark.parametrize('name', ['polish_rim', 'glue_contour', 'deburr_ring'])
+@needs_checkout
+def test_the_examples_lead_their_parts(name):
+    """In a file and in Python: the same goal, carried out as it says."""
+    module = runpy.run_path(str(CHECKOUT / 'examples' / f'{name}.py'))
+    frames = Frames(static_frames=module['FRAMES'])
+    goal = module[name](None).goal(frames)
+    file = share_path() / 'config' / 'examples' / 'held_part' / f'{name}.yaml'
+    parameters = yaml.safe_load((share_path() / 'config' / 'held_part.yaml').read_text())
+    listed = parameters['/**']['ros__parameters']['static_frames']
+    from_file = Path.load(file).goal(Frames(static_frames=map(StaticFrame.parse, listed)))
+    assert from_file.frame_id == goal.frame_id
+    for a, b in zip(from_file.waypoints, goal.waypoints, strict=True):
+        assert a.pose.distance_to(b.pose) < 1e-9
+    for a, b in (
+        (from_file.moving_frame.T_base_tool, goal.moving_frame.T_base_tool),
+        (from_file.moving_frame.T_flange_frame, goal.moving_frame.T_flange_frame),
+    ):
+        assert a.distance_to(b) < 1e-6
+        assert a.angle_to(b) < 1e-6
+
+    async def body(cell):
+        bench = await Bench(cell).connect()
+        motion = await bench.begin(from_file)
+        outcome = await bench.end(motion)
+        assert outcome.code is ErrorCode.SUCCESSFUL, outcome
+        seen = motion.progress[-1].actual_pose
+        assert seen.distance_to(goal.waypoints[-1].pose) < 1e-4
+        assert seen.angle_to(goal.waypoints[-1].pose) < 1e-3
 
     run_cell(body)

@@ -43,8 +43,9 @@ from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 FOLDER = CHECKOUT / 'examples'
 #: By set-points, which keep to the clock, or against a part. In virtual time they are carried out
 #: by test_path_offsets.py, test_presses.py, test_replaced_tails.py, test_stall.py and
-#: test_feed_override.py.
-IN_VIRTUAL_TIME = {'tracked_seam', 'grind', 'replanned', 'stall', 'fed_bead'}
+#: test_feed_override.py; those with a part in the hand, by test_held_parts_on_the_robot.py.
+HELD = {'polish_rim', 'glue_contour', 'deburr_ring'}
+IN_VIRTUAL_TIME = {'tracked_seam', 'grind', 'replanned', 'stall', 'fed_bead', *HELD}
 EXAMPLES = sorted({path.stem for path in tracked_files(FOLDER, '*.py')} - {'on_robot'})
 NAMES = [name for name in EXAMPLES if name not in IN_VIRTUAL_TIME]
 

@@ -6,6 +6,7 @@ from collections import Counter
 from dataclasses import replace
 from math import radians
 
+from curve_distance import distances
 from held_part_goals import (
     held_case,
     measure,
@@ -21,6 +22,7 @@ import pytest
 from random_cases import cases, random_of
 
 from ur_cartesian_driver.motion.errors import (
+    GoalRefused,
     JointLimitExceeded,
     NearSingularity,
     TooFast,
@@ -143,3 +145,68 @@ def test_splines_on_parts_are_where_their_times_say(part):
         assert seen.joint_acceleration.max() <= 1.0 + PART
         assert seen.carrier.max() <= 1.0 + PART
     assert sum(refused.values()) <= 0.6 * count + 2, refused
+
+
+def test_the_same_path_from_both_sides_is_the_same_relative_path():
+    """Once the tool moves on a part that stands, once the part moves before a tool that stands."""
+    random = random_of('both sides')
+    case = held_case(random, rounded_goal)
+    while len(case.goal.waypoints) < 4:
+        case = held_case(random, rounded_goal)
+    start = state_at_rest(case.arm, case.state.actual_q)
+    flange = case.arm.forward(case.state.actual_q)
+    # Nothing but the goal's own speeds and accelerations binds: the motions take the same time.
+    slow = replace(
+        case.goal,
+        segments=tuple(
+            replace(each, velocity=0.1 * each.velocity, acceleration=0.2)
+            for each in case.goal.segments
+        ),
+    )
+    options = replace(OPTIONS, max_tool_speed=0.0)
+    moves = plan(slow, start, case.arm, options)
+    # The part stands where the tool would be, and the flange carries the tool: P is the same.
+    T_flange_tool = case.frame.T_flange_frame
+    T_base_part = flange @ T_flange_tool @ case.state.actual_tcp_pose.inverse()
+    stands = plan(
+        replace(
+            slow,
+            moving_frame=None,
+            T_base_frame=T_base_part,
+            T_flange_controlled=T_flange_tool,
+            controlled_frame='tool',
+        ),
+        start,
+        case.arm,
+        options,
+    )
+    assert moves.duration == pytest.approx(stands.duration, rel=0.02)
+    # Both keep the same rounded path; the law differs by the rounding of its pieces.
+    t = np.linspace(0.0, min(moves.duration, stands.duration), 400)
+    one = case.relative(moves.joint_spline.rows(t)[0])
+    q = stands.joint_spline.rows(t)[0]
+    T_part_base = np.linalg.inv(T_base_part.matrix())
+    tool = case.urdf.relative('part', 'base', q)  # the frame that the flange carries
+    other = T_part_base @ tool
+    at_ends = [0, -1]
+    np.testing.assert_allclose(one[at_ends], other[at_ends], atol=1e-3)
+    apart = distances(one[:, :3, 3], [other[:, :3, 3]])
+    assert apart.max() < 2.0 * POSITION
+
+
+def test_exchanged_frames_are_pointed_out():
+    """A path that begins where the arm is, with part and tool exchanged, begins elsewhere."""
+    case = held_case(random_of('exchanged'), rounded_goal)
+    start = state_at_rest(case.arm, case.state.actual_q)
+    assert not [line for line in planned(case).remarks if line.startswith('check the frames')]
+    exchanged = replace(
+        case.goal,
+        moving_frame=None,
+        T_base_frame=case.frame.T_base_tool,
+        T_flange_controlled=case.frame.T_flange_frame,
+        controlled_frame='part',
+    )
+    with pytest.raises(
+        GoalRefused, match=r'\(with header.frame_id and controlled_frame exchanged'
+    ):
+        plan(exchanged, start, case.arm, replace(OPTIONS, max_approach_distance=0.02))

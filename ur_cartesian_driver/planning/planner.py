@@ -24,6 +24,7 @@ from typing import TypeAlias
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import GoalRefused, NearSingularity
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
@@ -57,6 +58,10 @@ from ur_cartesian_driver.planning.moves.slow_moves import slow_move_stretches, u
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
+from ur_cartesian_driver.planning.preflight.exchanged_frames import (
+    exchanged_frames,
+    with_exchanged_frames,
+)
 from ur_cartesian_driver.planning.preflight.held_part_kinematics import kinematics_of
 from ur_cartesian_driver.planning.preflight.offset_band_check import (
     dense_path,
@@ -160,10 +165,19 @@ def _plan_fixed(
     """Return the plan of a checked goal without a free axis."""
     table = add_safe_outputs(apply_default_tolerances(table, options), options)
     retargeted = retarget_to_tcp(table, at_set_point(state, arm), options)
-    planner = GoalPlanner(retargeted, state.T_flange_tcp, arm, options, running)
-    plan = PLANNERS[planner.mode](planner)
-    remark = feed_remark(table.feed_override, plan.duration)
-    return replace(plan, remarks=(*plan.remarks, remark)) if remark else plan
+    try:
+        planner = GoalPlanner(retargeted, state.T_flange_tcp, arm, options, running)
+        plan = PLANNERS[planner.mode](planner)
+    except GoalRefused as refusal:
+        hinted = with_exchanged_frames(refusal, table, state)
+        if hinted is refusal:
+            raise
+        raise hinted from None
+    remarks = [feed_remark(table.feed_override, plan.duration)]
+    if table.moving_frame is not None and (clause := exchanged_frames(table, state)):
+        remarks.append(f'check the frames: {clause}')
+    remarks = [remark for remark in remarks if remark]
+    return replace(plan, remarks=(*plan.remarks, *remarks)) if remarks else plan
 
 
 def _plan_free(table: GoalTable, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
@@ -370,6 +384,22 @@ def _with_offset_band(plan: Plan, planner: GoalPlanner) -> Plan:
     return replace(plan, offset_band=band, remarks=remarks)
 
 
+def _held_part_remark(plan: Plan, planner: GoalPlanner) -> str:
+    """Return a line about the arm behind a held part: how fast it is where it is fastest."""
+    goal, time = plan.goal, plan.reference.time
+    q, qd, _ = plan.joint_spline.rows(time)
+    tcp = planner.kinematics.carrier_speeds(q, qd)
+    assert tcp is not None
+    parts = np.abs(qd) / planner.arm.model.max_joint_speed
+    row, joint = divmod(int(np.argmax(parts)), 6)
+    return (
+        f'held part: {goal.frame_id or "the part"} is led along '
+        f'{goal.controlled_frame or "the fixed tool"}, and all speeds are those on the part; in '
+        f'base the TCP reaches {tcp.max():.3f} m/s, and {JOINT_NAMES[joint]} '
+        f'{100.0 * parts[row, joint]:.0f} % of its speed limit, {time[row]:.2f} s after the start'
+    )
+
+
 class GoalPlanner:
     """
     The input of the planners of all execution modes; collects the remarks for the goal's report.
@@ -480,4 +510,8 @@ class GoalPlanner:
             older_program=self.options.older_program,
             execution=self.mode,
         )
+        if goal.moving_frame is not None:
+            planned = replace(
+                planned, remarks=(*planned.remarks, _held_part_remark(planned, self))
+            )
         return _with_offset_band(planned, self) if goal.path_offset else planned
