@@ -4,6 +4,7 @@
 
 from collections.abc import Callable
 import contextlib
+from dataclasses import replace
 import json
 import os
 import pathlib
@@ -52,10 +53,44 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
 from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 # ---- contents of a file -------------------------------------------------------------------------
+
+
+def test_a_recording_of_a_held_part_compares_on_the_part(tmp_path):
+    """The TCP in base is kept; the deviation is that of the tool from the path on the part."""
+    turned = Pose((0.1, 0.2, 0.3), (0.5, 0.5, 0.5, 0.5))
+    held = MovingFrame(T_flange_frame=Pose((0.0, 0.0, 0.1)), T_base_tool=turned)
+    T_flange_tcp = Pose((0.0, 0.05, 0.0))
+
+    def seen(i):
+        """The packet whose tool on the part is where the plain one has its TCP."""
+        plain = packet(i, T_flange_tcp=T_flange_tcp)
+        return replace(
+            plain,
+            actual_tcp_pose=held.flange(plain.actual_tcp_pose) @ T_flange_tcp,
+            target_tcp_pose=held.flange(plain.target_tcp_pose) @ T_flange_tcp,
+        )
+
+    job = replace(JOB, moving_frame=held, T_flange_active=T_flange_tcp)
+    metadata = motion_metadata(job, robot={}, parameters=DriverConfig())
+    recorder = Recorder(str(tmp_path), 10.0, Warnings())
+    recorder.start(job, metadata, seen(0))
+    for i in range(1, 200):
+        recorder.add_state(seen(i))
+    recorder.end(DONE)
+    recorder.close(30.0)
+    found = Recording.load(only_file(tmp_path))
+    assert found.actual_pose[10] == pytest.approx(seen(10).actual_tcp_pose.row())
+    on_part = found.on_the_part()
+    assert on_part.target_pose[10, :3] == pytest.approx(packet(10).target_tcp_pose.position)
+    assert on_part.on_the_part() is on_part
+    deviation = found.deviation()
+    assert deviation.position == pytest.approx(0.001, abs=1e-9)
+    assert deviation.target_position == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_recording_holds_every_packet_as_it_came(tmp_path):

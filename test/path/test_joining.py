@@ -16,7 +16,17 @@ from ur_cartesian_driver.motion.cell.shapes import Box
 from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_columns import goal_table
-from ur_cartesian_driver.path import AirTravel, digital, DOWN, join, mm, Path, Pose
+from ur_cartesian_driver.path import (
+    AirTravel,
+    digital,
+    DOWN,
+    Frames,
+    join,
+    mm,
+    Path,
+    Pose,
+    StaticFrame,
+)
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.sim.simulator_config import HOME
@@ -190,3 +200,15 @@ def test_a_held_part_is_kept_clear_of_the_table_on_the_next_travel():
     path, place = path._travelled(RIGHT.release('part'), by, place, 'The travel')
     assert not place.cell.body('part').is_on_tool
     assert planned(path, by).duration > 0.0
+
+
+def test_a_path_on_a_part_in_the_hand_is_not_joined():
+    frames = Frames(
+        static_frames=[
+            StaticFrame('part', 'tool0', Pose((0.0, 0.0, 0.1))),
+            StaticFrame('belt', 'base', Pose((-0.5, 0.0, 0.3))),
+        ]
+    )
+    path = Path((0.0, 0.0, 0.0), DOWN, frame='part', tool='belt').at(speed=0.05).by(dx=0.02)
+    with pytest.raises(InvalidGoal, match='a path on part, which the arm holds, and travels are'):
+        join([path], replace(BY, frames=frames))

@@ -21,6 +21,7 @@ from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.motion.errors import GoalRefused, Unreachable
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.goal.goal import Goal, Segment, Waypoint
+from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.preview import ArmPlan, motion_page, refusal_page
@@ -174,3 +175,39 @@ def test_what_happens_at_points_is_marked(name, marks):
         message['props']['text'] for _, message in scene if 'text' in message.get('props', {})
     ]
     assert [text for text in texts if text in marks] == marks
+
+
+def on_a_part():
+    """An arm with a goal on a part that it holds, and the frame on the part."""
+    arm, frame = Arm(MODELS['ur5e']), Pose((0.0, 0.02, 0.1))
+    held = MovingFrame(T_flange_frame=frame, T_base_tool=arm.forward(HOME) @ frame)
+    points = (Waypoint(pose=Pose((x, 0.0, 0.0))) for x in (0.05, 0.1))
+    return arm, Goal(waypoints=tuple(points), moving_frame=held, corner_deviation=0.001)
+
+
+def test_the_path_on_a_held_part_moves_with_the_flange_before_the_tool():
+    arm, goal = on_a_part()
+    made = plan(goal, state_at_rest(arm, HOME, TCP), arm, PlanningOptions())
+    scene = scenes_of(motion_page(made, arm))['type']
+    held = goal.moving_frame
+    node = '/arm/wrist_3/held_part'
+    assert np.allclose(positions(scene, '/fixed_tool')[-1], held.T_base_tool.position)
+    T_link_frame = LinkFrames(arm).flange @ held.T_flange_frame
+    assert np.allclose(positions(scene, node)[-1], T_link_frame.position)
+    assert np.allclose(positions(scene, f'{node}/points/1')[-1], (0.1, 0.0, 0.0))
+    (path,) = (
+        message['props']['points']
+        for _, message in scene
+        if message.get('name') == f'{node}/path' and 'props' in message
+    )
+    assert np.allclose(path.reshape(-1, 3)[[0, -1]], [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0)], atol=1e-6)
+    assert not [1 for _, message in scene if message.get('name') == '/path']
+
+
+def test_a_refused_goal_on_a_held_part_is_drawn_where_the_part_is():
+    arm, goal = on_a_part()
+    far = replace(goal, waypoints=(*goal.waypoints, Waypoint(pose=Pose((0.0, 3.0, 0.0)))))
+    page = refusal_page(far, Unreachable('trajectory.points[2] is far.'), arm, HOME, TCP)
+    scene = scenes_of(page)['type']
+    place = goal.moving_frame.frame(arm.forward(HOME)).apply((0.0, 3.0, 0.0))
+    assert np.allclose(positions(scene, '/refused')[-1], place, atol=1e-5)

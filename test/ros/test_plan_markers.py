@@ -15,6 +15,8 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.link_shapes import LinkFrames
 from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
 from ur_cartesian_driver.path import DOWN, mm, Path
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
@@ -124,3 +126,19 @@ def test_the_newest_plan_is_published(single_cell):
     start = cell.T_base_tcp.position
     np.testing.assert_allclose(array(path.points)[0], start, atol=1e-4)
     np.testing.assert_allclose(array(path.points)[-1], np.add(start, (0, 0, 0.05)), atol=1e-4)
+
+
+def test_a_path_on_a_held_part_moves_with_the_flange():
+    flange, frame = STATE.target_tcp_pose, Pose((0.0, 0.02, 0.1), DOWN)
+    held = MovingFrame(T_flange_frame=frame, T_base_tool=flange @ frame)
+    points = [Waypoint(pose=Pose((x, 0.0, 0.0))) for x in (0.05, 0.1)]
+    goal = Goal(waypoints=points, moving_frame=held, corner_deviation=0.001)
+    made = plan(goal, STATE, ARM, PlanningOptions())
+    first, *others = plan_markers(made, 'left_base', Time(sec=7)).markers
+    assert first.action == Marker.DELETEALL
+    assert {(m.header.frame_id, m.frame_locked) for m in others} == {('left_tool0', True)}
+    by_name = {(m.ns, m.id): m for m in others}
+    for name in ('path', 'points'):
+        np.testing.assert_allclose(pose_from_message(by_name[name, 0].pose).row(), frame.row())
+    end = pose_from_message(by_name['ends', 1].pose)
+    assert end.distance_to(frame @ points[-1].pose) < 1e-5

@@ -16,6 +16,7 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import MAX_JOINT_VALUE
 from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector3
 from ur_cartesian_driver.motion.twin.twin import checked_day, checked_software
 from ur_cartesian_driver.robot.services.service_calls import MAX_TOOL_OFFSET
 from ur_cartesian_driver.sim.command_line.simulator_options import (
@@ -150,6 +151,17 @@ def pose(text: str) -> Pose:
 def box(text: str) -> tuple[float, ...]:
     """Return the least and greatest coordinates of a box [m]."""
     return six_numbers(text, (MAX_OFFSET, 'm'), (MAX_OFFSET, 'm'))
+
+
+def place(text: str) -> Vector3:
+    """Return a place of three numbers [m]."""
+    try:
+        x, y, z = map(float, text.split(','))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{text!r} is not X,Y,Z') from None
+    for value in (x, y, z):
+        check_magnitude(value, MAX_OFFSET, 'm')
+    return x, y, z
 
 
 def experiments(text: str) -> tuple[str, ...]:

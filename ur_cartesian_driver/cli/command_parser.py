@@ -552,6 +552,32 @@ def _add_teach(command: CommandParser) -> None:
         '--speed', type=argument_types.factor, help="of lines and arcs [m/s]; else the driver's"
     )
     _add_length(command, 'blend', None, 'at inner points, like 1mm')
+    what = command.add_mutually_exclusive_group()
+    what.add_argument(
+        '--fixed-tool',
+        metavar='NAME',
+        help='teach the frame of a tool that stands in the cell, by touching it with the TCP',
+    )
+    what.add_argument(
+        '--held-part',
+        metavar='NAME',
+        help='teach the frame of a part in the hand, by touching a fixed tool with its points',
+    )
+    command.add_argument(
+        '--point',
+        type=argument_types.place,
+        action='append',
+        default=[],
+        metavar='X,Y,Z',
+        help='point on the held part that touches, in the frame of the part [m], like '
+        '0,0.08,0.005; four or more times',
+    )
+    command.add_argument(
+        '--tip',
+        type=argument_types.place,
+        metavar='X,Y,Z',
+        help='where the points of the held part touch, in base, like -0.56,-0.15,0.41 [m]',
+    )
 
 
 def _add_valve(command: CommandParser) -> None:

@@ -9,9 +9,11 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path as FilePath
 import sys
 import threading
+from typing import ClassVar, Protocol
 
 from ur_cartesian_driver.cli.argument_types import check_writable
 from ur_cartesian_driver.cli.own_driver import ready_driver
+from ur_cartesian_driver.cli.teach_frames import FixedToolLesson, HeldPartLesson
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
@@ -36,6 +38,8 @@ def teach_path(arguments: argparse.Namespace) -> int:
 
     :raises OSError: the file cannot be written any more; the goal is printed instead.
     """
+    if arguments.fixed_tool or arguments.held_part:
+        return teach_frame(arguments)
     lesson = Lesson(Path().at(speed=arguments.speed, blend=arguments.blend))
     output = arguments.output or DEFAULT_OUTPUT
     if not arguments.output:
@@ -51,6 +55,28 @@ def teach_path(arguments: argparse.Namespace) -> int:
             _say(f'{_points(len(lesson.path))} in {output}')
         else:
             _say('no point was taken, so nothing is written')
+    return 0
+
+
+def teach_frame(arguments: argparse.Namespace) -> int:
+    """
+    Connect, let a person touch with the arm, and print the frame of a fixed tool or held part.
+
+    :raises InvalidGoal: options are missing or contradict each other, or touches make no frame.
+    """
+    lesson: FixedToolLesson | HeldPartLesson
+    if arguments.fixed_tool:
+        lesson = FixedToolLesson(arguments.fixed_tool)
+    elif arguments.tip is None:
+        raise InvalidGoal(
+            '--tip', 'is missing: where the points touch', 'teach --fixed-tool first'
+        )
+    else:
+        lesson = HeldPartLesson(arguments.held_part, arguments.point, arguments.tip)
+    with ready_driver(arguments, allow_freedrive=True) as driver:
+        guide(driver, lesson, _keys(), _say)
+    for line in lesson.report():
+        _say(line)
     return 0
 
 
@@ -70,7 +96,7 @@ def save(path: Path, file: str) -> None:
 
 
 def guide(
-    driver: Driver, lesson: Lesson, keys: Iterable[str], say: Callable[[str], object]
+    driver: Driver, lesson: Taught, keys: Iterable[str], say: Callable[[str], object]
 ) -> None:
     """
     Keep freedrive on while keys are read, and end it afterwards, even after an error.
@@ -83,7 +109,7 @@ def guide(
     try:
         if not active.wait(FREEDRIVE_TIME):
             raise RobotNotReady('The robot has not begun freedrive.')
-        say(HELP)
+        say(lesson.HELP)
         for key in keys:
             if freedrive.done():
                 raise RobotNotReady(f'Freedrive has ended: {freedrive.result().text}')
@@ -99,8 +125,20 @@ def guide(
         freedrive.result(FREEDRIVE_TIME)
 
 
+class Taught(Protocol):
+    """What keys teach while the arm is guided."""
+
+    #: The meanings of the keys.
+    HELP: ClassVar[str]
+
+    def press(self, key: str, state: RobotState) -> str:
+        """Carry out a key, and return a text about the result; InvalidGoal = not taken."""
+
+
 class Lesson:
     """The points taken so far."""
+
+    HELP: ClassVar[str] = HELP
 
     def __init__(self, beginning: Path) -> None:
         """Begin with a path that has no points, but may set speeds."""

@@ -26,7 +26,7 @@ from ur_cartesian_driver.goal_files import (
 )
 from ur_cartesian_driver.goal_files.goal_reading import nanoseconds
 from ur_cartesian_driver.goal_files.goal_schema import message_of, with_defaults
-from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal
+from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.geometry.vectors import ZERO3
@@ -401,10 +401,19 @@ class Path(PathWithEvents):
         Return where the path begins for an arm that travels to it.
 
         :raises InvalidGoal: the path has no start.
+        :raises NotAvailable: the frame of the path moves with the arm.
         """
         if self.start is None or not self._points:
             raise no_start(where)
-        return PathBegin(self.goal(by.frames, by.snapshot), self.start)
+        goal = self.goal(by.frames, by.snapshot)
+        if goal.moving_frame is not None:
+            raise NotAvailable(
+                where,
+                f'leads to a path on {self.frame}, which the arm holds, and travels are joint '
+                'motions and blends, which such paths do not have',
+                'send each path as a goal of its own, with a joint goal in between',
+            )
+        return PathBegin(goal, self.start)
 
     def _with_legs(self, legs: Iterable[Leg], factor: float) -> Path:
         """Return the path with the motions of a travel, whose blends are scaled by a factor."""

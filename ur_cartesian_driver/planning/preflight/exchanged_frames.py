@@ -36,7 +36,7 @@ def exchanged_frames(goal: GoalTable, state: RobotState) -> str:
         given = goal.T_base_frame.inverse() @ T_base_flange @ goal.T_flange_controlled
         other = MovingFrame(T_flange_frame=goal.T_flange_controlled, T_base_tool=goal.T_base_frame)
         exchanged = other.tool(T_base_flange)
-    far, near = _way(given, first), _way(exchanged, first)
+    far, near = _far_from(given, first), _far_from(exchanged, first)
     if not (far > _FAR and far > _TIMES * near):
         return ''
     return (
@@ -54,5 +54,5 @@ def with_exchanged_frames(refusal: GoalRefused, goal: GoalTable, state: RobotSta
     return refusal
 
 
-def _way(a: Pose, b: Pose) -> float:
+def _far_from(a: Pose, b: Pose) -> float:
     return a.distance_to(b) + _TURN * a.angle_to(b)
