@@ -28,6 +28,7 @@ LEFT_OUT = (
     'Path offset, PRIMITIVES',
     'Replaced tails',
     'Rounded corners',
+    'A part in the hand',
     'Feed override',
     'Feed override, SERVO',
 )

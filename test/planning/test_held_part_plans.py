@@ -29,6 +29,8 @@ from ur_cartesian_driver.motion.errors import (
     Unreachable,
 )
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
+from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 
 pytest.importorskip('pinocchio')
@@ -210,3 +212,21 @@ def test_exchanged_frames_are_pointed_out():
         GoalRefused, match=r'\(with header.frame_id and controlled_frame exchanged'
     ):
         plan(exchanged, start, case.arm, replace(OPTIONS, max_approach_distance=0.02))
+
+
+def test_points_appended_on_a_part_continue_the_path_on_it():
+    random, options = random_of('held appended'), replace(OPTIONS, max_tool_speed=2.0)
+    case = held_case(random, spline_goal)
+    while len(case.goal.waypoints) < 4:
+        case = held_case(random, spline_goal)
+    start, points = state_at_rest(case.arm, case.state.actual_q), case.goal.waypoints
+    opened = plan(
+        replace(case.goal, waypoints=points[:2], keep_open=True), start, case.arm, options
+    )
+    first = plan_first_part(opened, case.arm, options)
+    rest = AppendedPoints(waypoints=points[2:], last=True)
+    made = plan_append(first.next_goal, rest, case.arm, options, from_rest=False)
+    end = case.relative(np.array([made.plan.segments[-1].joints]))[0]
+    np.testing.assert_allclose(end, points[-1].pose.matrix(), atol=1e-6)
+    whole = planned(case, options).segments[-1].joints
+    assert made.plan.segments[-1].joints == pytest.approx(whole, abs=1e-6)

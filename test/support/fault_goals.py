@@ -44,6 +44,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     Tolerance,
     Waypoint,
 )
+from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
 from ur_cartesian_driver.motion.plan.primitive import PulseLaw
 from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.planning import plan
@@ -688,6 +689,27 @@ class RoundedGoal(OutputGoal):
         raise AssertionError(phase)
 
 
+@lru_cache
+def held_part_plan(start, values):
+    """Return the same motion of the flange, as a path on a part before a tool that stands."""
+    goal = rounded_output_plan(start, values, ExecutionMode.SPLINE).goal
+    flange = start.state.actual_tcp_pose @ start.state.T_flange_tcp.inverse()
+    to_flange = start.state.T_flange_tcp.inverse()
+    held = MovingFrame(
+        T_flange_frame=Pose((0.0, 0.0, 0.1)), T_base_tool=flange @ Pose((0.02, 0.0, 0.12))
+    )
+    points = (replace(point, pose=held.tool(point.pose @ to_flange)) for point in goal.waypoints)
+    goal = replace(goal, waypoints=tuple(points), moving_frame=held, controlled_frame='tool')
+    return plan(goal, start.state, ARM, OPTIONS)
+
+
+class HeldPartGoal(RoundedGoal):
+    """The same, on a part in the hand."""
+
+    def plan_from(self, start):
+        return held_part_plan(start, tuple(not value for value in self._before))
+
+
 class ServoOutputGoal(RoundedGoal):
     """The same by set-points."""
 
@@ -1003,6 +1025,7 @@ GOALS = {
     'At a point': RestGoal,
     'At a point, SERVO': ServoRestGoal,
     'Rounded corners': RoundedGoal,
+    'A part in the hand': HeldPartGoal,
     'Outputs, SERVO': ServoOutputGoal,
     'Waits, SERVO': ServoWaitGoal,
     'Scripts': CallGoal,

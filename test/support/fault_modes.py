@@ -507,6 +507,16 @@ ROUNDED_CORNERS = _mode(
     pendant=('protective stop', 'an operator pauses the program'),
 )
 
+HELD_PART = _mode(
+    'A part in the hand',
+    'The same, with the path on a part that the arm leads along a tool that stands.',
+    ROUNDED_CORNERS.phases,
+    3.0,
+    {},
+    faults=WITH_POINTS,
+    pendant=('protective stop', 'an operator pauses the program'),
+)
+
 SERVO_OUTPUTS = _mode(
     'Outputs, SERVO',
     'Set-points around rounded corners, with an output at the second corner, one after the end, '
@@ -720,6 +730,7 @@ MODES = (
     AT_A_POINT,
     SERVO_AT_A_POINT,
     ROUNDED_CORNERS,
+    HELD_PART,
     SERVO_OUTPUTS,
     SERVO_WAITS,
     SCRIPTS,
