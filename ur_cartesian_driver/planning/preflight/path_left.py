@@ -88,7 +88,10 @@ class PathLeft:
         path = self.reference.since(time)
         if len(path.time) < 2 or self.end <= time:
             return
-        path, kinematics = dense_path(path), kinematics_of(self.moving_frame, arm, self.T_flange_tcp)
+        path, kinematics = (
+            dense_path(path),
+            kinematics_of(self.moving_frame, arm, self.T_flange_tcp),
+        )
         if self.spline is not None:
             joints = self.spline.rows(path.time)[0]
         else:
