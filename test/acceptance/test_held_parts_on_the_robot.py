@@ -11,6 +11,7 @@ places at which it is interrupted.
 from dataclasses import dataclass, replace
 import os
 import runpy
+from typing import Any
 
 from checkout import CHECKOUT, needs_checkout
 from curve_distance import distances
@@ -133,7 +134,7 @@ def programmed():
 class Bench:
     """The robot, and the readings of it."""
 
-    cell: object
+    cell: Any
 
     async def connect(self):
         self.recorder = RtdeRecorder()
@@ -282,8 +283,8 @@ def test_the_examples_lead_their_parts(name):
     listed = parameters['/**']['ros__parameters']['static_frames']
     from_file = Path.load(file).goal(Frames(static_frames=map(StaticFrame.parse, listed)))
     assert from_file.frame_id == goal.frame_id
-    for a, b in zip(from_file.waypoints, goal.waypoints, strict=True):
-        assert a.pose.distance_to(b.pose) < 1e-9
+    for point, other in zip(from_file.waypoints, goal.waypoints, strict=True):
+        assert point.pose.distance_to(other.pose) < 1e-9
     for a, b in (
         (from_file.moving_frame.T_base_tool, goal.moving_frame.T_base_tool),
         (from_file.moving_frame.T_flange_frame, goal.moving_frame.T_flange_frame),

@@ -20,6 +20,7 @@ from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.state.servo_report import ServoActivity
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 from ur_cartesian_driver.planning.spline.spline_points import tool_points
 from ur_cartesian_driver.protocol.program import registers
@@ -124,7 +125,8 @@ def test_every_point_is_passed_within_the_lag_that_is_reported(name, factor, mon
     run = run_cell(scenario, feedback_rate=500.0, servoj_gain=2000.0, servoj_lookahead_time=0.03)
     assert run.motion.outcome.code is ErrorCode.SUCCESSFUL, run.motion.outcome
     goal, start = run.made.goal, SplineState(q=run.made.start)
-    curve = ToolSpline.through(tool_points(goal, start.tool(ARM, run.made.T_flange_active)))
+    kinematics = TcpKinematics(ARM, run.made.T_flange_active)
+    curve = ToolSpline.through(tool_points(goal, start.tool(kinematics)))
     times = np.array([state.timestamp for state in run.packets]) - run.begin()
     places = np.array([state.target_tcp_pose.position for state in run.packets])
     twists = np.array([state.target_tcp_twist for state in run.packets])

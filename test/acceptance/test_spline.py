@@ -28,6 +28,7 @@ from ur_cartesian_driver.motion.goal.goal_columns import goal_table
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 from ur_cartesian_driver.planning.spline.spline_points import tool_points
 
@@ -55,7 +56,9 @@ class Run:
     def curve(self):
         goal, begin = self.made.goal, SplineState(q=self.made.start)
         return ToolSpline.through(
-            tool_points(goal_table(goal), begin.tool(ARM, self.made.T_flange_active))
+            tool_points(
+                goal_table(goal), begin.tool(TcpKinematics(ARM, self.made.T_flange_active))
+            )
         )
 
     def passing(self, time):

@@ -17,6 +17,7 @@ from urdf_arm import urdf_of, UrdfArm
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_roll_pitch_yaw
+from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
@@ -118,7 +119,7 @@ def spline_goal(random, start):
         twist = (0.0,) * 6
         if k + 1 < count:
             twist = (*(0.5 * speed * rng.normal(size=3)).tolist(), *rng.normal(0.0, 0.05, 3))
-        points.append(Waypoint(time=time, pose=pose, twist=tuple(map(float, twist))))
+        points.append(Waypoint(time=time, pose=pose, twist=vector6(map(float, twist))))
     return Goal(waypoints=tuple(points), execution=ExecutionMode.SPLINE)
 
 

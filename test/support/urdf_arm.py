@@ -4,6 +4,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -49,7 +50,7 @@ class UrdfArm:
     """Pinocchio's view of a URDF."""
 
     urdf: str
-    model: object = field(init=False)
+    model: Any = field(init=False)
 
     def __post_init__(self) -> None:
         import pinocchio
