@@ -13,17 +13,15 @@ FRAMES = (
 
 
 def deburr_ring(start: Pose, radius: float = 0.04) -> Path:
-    def at(angle: float, away: float = 0.0) -> Pose:
-        """The brush touches from outside, its axis x along the edge."""
-        out = (cos(deg(angle)), sin(deg(angle)), 0.0)
-        x, y, z = ((radius + away) * value for value in out)
-        return Pose((x, y, z), against(out, x=(-out[1], out[0], 0.0)))
+    def at(angle: float, r: float = radius) -> Pose:  # from outside, x of the brush along the edge
+        x, y = cos(deg(angle)), sin(deg(angle))
+        return Pose((r * x, r * y, 0.0), against((x, y, 0.0), x=(-y, x, 0.0)))
 
     path = Path(frame='ring', tool='brush').rounded(mm(0.1)).at(speed=0.1)
-    path = path.line(at(-240, mm(10))).line(at(-240)).at(speed=0.02)
+    path = path.line(at(-240, radius + mm(10))).line(at(-240)).at(speed=0.02)
     for angle in range(-180, 61, 60):  # a turn of 300 degrees, which the wrist has
         path = path.arc(at(angle), via=at(angle - 30).position)
-    return path.at(speed=0.1).line(at(60, mm(10)))
+    return path.at(speed=0.1).line(at(60, radius + mm(10)))
 
 
 if __name__ == '__main__':

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Polish the rim of a box in the hand: the arm leads it along a belt that stands in the cell."""
 
-from math import sqrt
-
 from ur_cartesian_driver.path import against, axis_angle, deg, mm, Path, Pose, StaticFrame, Y, Z
 
 FRAMES = (
@@ -16,15 +14,13 @@ def polish_rim(start: Pose, a: float = 0.04, b: float = 0.03, r: float = 0.01) -
     path = Path(frame='box', tool='belt').rounded(mm(0.2)).at(speed=0.1)
     for side in range(4):
         turn = Pose((0.0, 0.0, 0.0), axis_angle(Z, deg(90 * side)))
-        touch = turn @ Pose((0.0, 0.0, 0.0), against((0, -1, 0), x=(1, 0, 0)))
+        touch = (turn @ Pose((0.0, 0.0, 0.0), against((0, -1, 0), x=(1, 0, 0)))).quaternion
         along, out = (a, b) if side % 2 == 0 else (b, a)
         begin, end = (turn.apply((x, -out, 0.0)) for x in (r - along, along - r))
-        if side == 0:
-            path = path.line(begin, touch.quaternion).at(speed=0.02)
-        else:  # around a corner, which has the radius r
-            k = r * (1.0 - sqrt(0.5))
-            path = path.arc(begin, touch.quaternion, via=turn.apply((k - along, k - out, 0.0)))
-        path = path.line(end)
+        k = 0.29289 * r  # the middle of the arc around a corner, which has the radius r
+        corner = turn.apply((k - along, k - out, 0.0))
+        path = path.arc(begin, touch, via=corner) if side else path.line(begin, touch)
+        path = path.at(speed=0.02).line(end)
     return path.at(speed=0.1).line(turn.apply((along - r, -out - mm(20), 0.0)))
 
 

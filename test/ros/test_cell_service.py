@@ -6,6 +6,7 @@ from typing import Any
 
 from planning_scenes import box, held, pose, scene
 import pytest
+from rclpy.impl.rcutils_logger import RcutilsLogger
 from visualization_msgs.msg import MarkerArray
 
 from ur_cartesian_driver.motion.cell.cell import CellBody, PlacedShape
@@ -55,9 +56,11 @@ def test_a_changed_cell_is_shown(single_cell, change):
     single_cell.spin_until(lambda: {each.ns for each in shown[-1].markers} == {'part', ''})
 
 
-def test_objects_of_the_planning_scene_become_bodies_beside_the_others(single_cell, capfd):
+def test_objects_of_the_planning_scene_become_bodies_beside_the_others(single_cell, monkeypatch):
     """moveit_msgs need not be installed for the conversion; the topic needs it."""
     node, driver = single_cell.node, single_cell.node.driver
+    said: list[str] = []
+    monkeypatch.setattr(RcutilsLogger, 'error', lambda self, text: said.append(text))
     scenes = PlanningSceneSubscriber(node, driver, node.action_server.frames, '/scene')
     driver.change_cell([CellBody(name='own', shapes=(PlacedShape(Sphere(0.01)),))])
     try:
@@ -74,9 +77,11 @@ def test_objects_of_the_planning_scene_become_bodies_beside_the_others(single_ce
     finally:
         scenes.close()
         driver.change_cell(remove=driver.cell.names)
-    said = capfd.readouterr().err
-    assert 'planning_scene_topic is /scene, but moveit_msgs is not installed' in said
-    assert 'The planning scene is not taken over: object "own": the cell has another bo' in said
+    assert [text.partition(':')[0] for text in said] == [
+        'planning_scene_topic is /scene, but moveit_msgs is not installed',
+        'The planning scene is not taken over',
+    ]
+    assert 'object "own": the cell has another body of this name' in said[1]
 
 
 def test_bodies_come_as_the_text_of_a_file_and_all_or_nothing_changes(single_cell, change):
