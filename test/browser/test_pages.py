@@ -82,7 +82,11 @@ def test_the_page_of_an_example_plays_without_a_network(example, tab, tmp_path):
     assert file.stat().st_size < 4e6
     tab.open(file.as_uri())
     assert 'tightest margin' in tab.page.locator('aside').inner_text()
-    early, late = tab.at(0.1), tab.at(0.6)
+    early = tab.at(0.1)
+    for _ in range(4):  # a loaded page may miss a click
+        late = tab.at(0.6)
+        if np.abs(early - late).mean() > 1e-4:
+            break
     assert early.std() > 0.02
     assert np.abs(early - late).mean() > 1e-4
     assert tab.problems == []
