@@ -25,7 +25,7 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.cell_poses import T_carrier_body
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
+from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, CONNECTOR, Link
 from ur_cartesian_driver.kinematics.collision_meshes import missing_meshes
 from ur_cartesian_driver.kinematics.link_shapes import (
     link_meshes,
@@ -36,7 +36,6 @@ from ur_cartesian_driver.kinematics.link_shapes import (
 )
 from ur_cartesian_driver.kinematics.solids import (
     CarrierFrames,
-    coal,
     Depths,
     distances,
     has_coal,
@@ -44,6 +43,7 @@ from ur_cartesian_driver.kinematics.solids import (
     Solid,
 )
 from ur_cartesian_driver.motion.cell.cell import Cell, LINK_NAMES
+from ur_cartesian_driver.motion.cell.mesh_file import read_mesh
 from ur_cartesian_driver.motion.cell.shapes import Cylinder, HalfSpace, Mesh
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose import Pose
@@ -334,7 +334,7 @@ def _arm_bodies(
         for shape in link_meshes(name, 'collision'):
             exact.setdefault(shape.link, []).append(_link_solid(shape))
         # The meshes of the base lack the connector.
-        exact[Link.BASE] += coarse[Link.BASE][1:2]
+        exact[Link.BASE].append(coarse[Link.BASE][CONNECTOR])
     return [
         _Body(
             name=LINK_NAMES[link],
@@ -385,12 +385,7 @@ def _is_convex(mesh: Mesh) -> bool:
 
 @lru_cache
 def _read_link_mesh(file: str) -> Mesh | Hull:
-    tree = coal().MeshLoader().load(file, np.ones(3))
-    triangles = [
-        [triangle[k] for k in range(3)]
-        for triangle in (tree.tri_indices(k) for k in range(tree.num_tris))
-    ]
-    mesh = Mesh(np.array(tree.vertices()), np.array(triangles), file)
+    mesh = read_mesh(file)
     return Hull(mesh.vertices) if _is_convex(mesh) else mesh
 
 

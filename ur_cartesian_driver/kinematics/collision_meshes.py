@@ -29,6 +29,7 @@ from ur_cartesian_driver.kinematics.link_shapes import (
     mesh_tolerance,
     shortest_turn_of_z,
 )
+from ur_cartesian_driver.kinematics.solids import coal
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 
@@ -88,7 +89,7 @@ class CollisionMeshes:
             self._attach(
                 Link.TOOL,
                 arm.forward((0.0,) * 6) @ T_flange_middle,
-                _coal().Cylinder(tool_radius, length),
+                coal().Cylinder(tool_radius, length),
             )
         self._pairs = {pair: self._add_pairs(pair) for pair in combinations(Link, 2)}
         self._placement = pinocchio.GeometryData(self._geometry)
@@ -166,20 +167,11 @@ class CollisionMeshes:
 def _solid(shape: LinkShape) -> Any:
     """Return a shape as an object that pinocchio can measure."""
     if shape.mesh is None:
-        return _coal().Cylinder(shape.radius, shape.length)
+        return coal().Cylinder(shape.radius, shape.length)
     return _mesh(str(shape.mesh))
 
 
 @lru_cache
 def _mesh(file: str) -> Any:
     """Return the tree of the triangles in a mesh file."""
-    return _coal().MeshLoader().load(file, np.ones(3))
-
-
-def _coal() -> Any:
-    """Return the module of pinocchio's shapes, which has another name in older versions."""
-    try:
-        import coal
-    except ImportError:
-        import hppfcl as coal
-    return coal
+    return coal().MeshLoader().load(file, np.ones(3))

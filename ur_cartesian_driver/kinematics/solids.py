@@ -23,6 +23,7 @@ import numpy as np
 from ur_cartesian_driver.motion.cell.shapes import Box, Cylinder, HalfSpace, Mesh, Shape, Sphere
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import vector3
 
 # Directions that are tried without coal: the bound is then within a millimetre for most pairs.
 _ROUNDS = 60
@@ -73,12 +74,6 @@ class CarrierFrames(NamedTuple):
         inside: Floats = np.matmul(points - self.origin[:, None], self.rotation)
         return inside
 
-    def points(self, local: Floats) -> Floats:
-        """Return points (k, 3) of this frame in base, (n, k, 3)."""
-        outside: Floats = np.matmul(local, self.rotation.transpose(0, 2, 1))
-        outside += self.origin[:, None]
-        return outside
-
 
 class Solid:
     """
@@ -88,14 +83,9 @@ class Solid:
     """
 
     def __init__(self, shape: SolidShape, T_carrier_shape: Pose) -> None:
-        self.shape = shape
+        self.shape, self._T_carrier_shape = shape, T_carrier_shape
         matrix = T_carrier_shape.matrix()
         self._rotation, self._position = matrix[:3, :3], matrix[:3, 3]
-
-    @property
-    def is_convex(self) -> bool:
-        """Whether the solid is convex and has an end."""
-        return not isinstance(self.shape, Mesh | HalfSpace)
 
     def frames(self, carrier: CarrierFrames) -> CarrierFrames:
         """Return the frames of the shape in base."""
@@ -103,11 +93,6 @@ class Solid:
             carrier.rotation @ self._rotation,
             carrier.rotation @ self._position + carrier.origin,
         )
-
-    def local(self, points: Floats) -> Floats:
-        """Return points (..., 3) of the carrier in the frame of the shape."""
-        inside: Floats = (points - self._position) @ self._rotation
-        return inside
 
     def corners(self) -> Floats:
         """Return the corners of its bounding box in the carrier's frame, (8, 3) [m]."""
@@ -120,12 +105,9 @@ class Solid:
     def box(self) -> Solid:
         """The bounding box of the shape, at the same place."""
         low, high = self.shape.bounds
-        middle, size = 0.5 * (low + high), np.maximum(high - low, 1e-6)
-        box = Solid.__new__(Solid)
-        box.shape = Box((float(size[0]), float(size[1]), float(size[2])))
-        box._rotation = self._rotation
-        box._position = self._position + self._rotation @ middle
-        return box
+        x, y, z = (0.5 * (low + high)).tolist()
+        box = Box(vector3(np.maximum(high - low, 1e-6).tolist()))
+        return Solid(box, self._T_carrier_shape @ Pose((x, y, z)))
 
     def spheres(self) -> tuple[Floats, Floats]:
         """Return centres (k, 3) in the carrier's frame and radii (k,) of spheres that cover it."""
