@@ -99,8 +99,11 @@ def test_a_goal_that_fails_while_the_arm_moves_ends_when_the_arm_is_at_rest():
 
 
 def test_what_is_shown_is_the_plan_that_was_made_again():
-    driver, shown, outcomes = EagerDriver(), [], []
-    driver.renewed = lambda plan: f'{plan}, planned again'  # type: ignore[method-assign]
+    class RenewingDriver(EagerDriver):
+        def renewed(self, plan):
+            return f'{plan}, planned again'
+
+    driver, shown, outcomes = RenewingDriver(), [], []
     run = make_run(driver, outcomes, show=shown.append)
     run.thread.start()
     run.thread.join()

@@ -24,7 +24,17 @@ from ur_cartesian_driver.motion.geometry.pose import (
     roll_pitch_yaw_from_quaternion,
 )
 
-STL = 'solid\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n'  # fmt: skip  # noqa: E501
+STL = """\
+solid
+facet normal 0 0 0
+outer loop
+vertex 0 0 0
+vertex 1 0 0
+vertex 0 1 0
+endloop
+endfacet
+endsolid
+"""
 
 
 def origin(random):
