@@ -20,7 +20,6 @@ from ur_cartesian_driver.kinematics.collision_bodies import (
     segment_gap,
 )
 from ur_cartesian_driver.kinematics.collision_meshes import (
-    _coal,
     CollisionMeshes,
     missing_meshes,
 )
@@ -32,6 +31,7 @@ from ur_cartesian_driver.kinematics.link_shapes import (
     MODELS_WITH_MESHES,
 )
 from ur_cartesian_driver.kinematics.robot_models import MODELS
+from ur_cartesian_driver.kinematics.solids import coal
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import Clearance
@@ -121,7 +121,7 @@ def test_bodies_contain_every_triangle_of_the_meshes(name, detail, pinocchio):
 
 def loaded_triangles(file, T):
     """The corners of the triangles (n, 3, 3) of a mesh in base [m]."""
-    mesh = _coal().MeshLoader().load(str(file), np.ones(3))
+    mesh = coal().MeshLoader().load(str(file), np.ones(3))
     points = mesh.vertices() @ T[:3, :3].T + T[:3, 3]
     corners = [mesh.tri_indices(k) for k in range(mesh.num_tris)]
     found = points[np.array([[corner[i] for i in range(3)] for corner in corners])]
