@@ -62,8 +62,8 @@ class Motion:
         cell = cell.with_bodies((*plates, needle))
         self.bodies = CellDistances(self.arm, tcp, cell)
         # What is too close at the start would be allowed to separate.
-        for a, b, *_ in self.bodies.pairs_below(self._start):
-            if named := sorted({a, b} & cell.names):
+        for pair, _ in self.bodies.pairs_below(self._start):
+            if named := sorted({pair.a, pair.b} & cell.names):
                 cell = cell.without(named[0])
         self.bodies = CellDistances(self.arm, tcp, cell)
         largest = np.abs(np.diff(self.at(np.linspace(0.0, 1.0, 1001)), axis=0)).max() * 1000.0

@@ -99,8 +99,8 @@ def cell_beside(rng, arm, tcp, q, goal):
     away = rng.normal(size=(len(ways), 3)) * 0.12
     places = np.concatenate([ways + away, frames[3:7, :3, 3] + 0.25 * rng.normal(size=(4, 3))])
     cell = random_cell(rng, places, spread=0.1, largest=0.25)
-    for a, b, *_ in CellDistances(arm, tcp, cell).pairs_below(np.array(q)):
-        if named := sorted({a, b} & cell.names):
+    for pair, _ in CellDistances(arm, tcp, cell).pairs_below(np.array(q)):
+        if named := sorted({pair.a, pair.b} & cell.names):
             cell = cell.without(named[0])
     return cell
 

@@ -15,7 +15,7 @@ import sys
 import numpy as np
 import yaml
 
-from ur_cartesian_driver.kinematics.cell_distances import CellDistances, missing_coal
+from ur_cartesian_driver.kinematics.cell_distances import CellDistances, missing_coal, Pair
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.cell.cell import Cell, CellBody
@@ -50,9 +50,9 @@ def show_or_check(arguments: argparse.Namespace) -> int:
             raise ValueError(f'{arguments.file} {clause}')
         radius = arguments.tool_radius
         pairs = CellDistances(arm, tcp, cell, radius).pairs_below(np.array(q))
-        touching = {name for a, b, _, _ in pairs for name in (a, b)}
+        touching = {name for pair, _ in pairs for name in (pair.a, pair.b)}
         lines = [f'{model.name}, joints {" ".join(f"{value:.4g}" for value in q)} rad']
-        lines += touching_lines(pairs) if pairs else closest_lines(cell, arm, q, tcp, radius)
+        lines += touching_lines(pairs, cell) if pairs else closest_lines(cell, arm, q, tcp, radius)
         status = 1 if pairs else 0
     else:
         print(table)
@@ -94,14 +94,14 @@ def cell_notes(cell: Cell) -> list[str]:
     return [*(f'may touch: {a} and {b}' for a, b in pairs), *cell_remarks(cell)]
 
 
-def touching_lines(pairs: Sequence[tuple[str, str, float, float]]) -> list[str]:
+def touching_lines(pairs: Sequence[tuple[Pair, float]], cell: Cell) -> list[str]:
     """
-    Return what is too close, and the lines of a cell that allow it.
+    Return what is too close, and the field of the cell that allows it.
 
-    :param pairs: names, distance and clearance [m].
+    :param pairs: each with its distance [m].
     """
     lines = []
-    for a, b, distance, clearance in pairs:
+    for (a, b, clearance), distance in pairs:
         if distance > 0.0:
             how = f'are {1e3 * distance:.1f} mm apart, and the clearance is {1e3 * clearance:g} mm'
         else:
@@ -109,9 +109,10 @@ def touching_lines(pairs: Sequence[tuple[str, str, float, float]]) -> list[str]:
         lines.append(f'{a} and {b} {how}')
     return [
         *lines,
-        'Correct the places or the clearances; if these are meant to touch, add to the cell:',
+        'Correct the places or the clearances; if these are meant to touch, the cell needs:',
         'may_touch:',
-        *(f'- {_flow((a, b))}' for a, b, _, _ in pairs),
+        *(f'- {_flow(sorted(pair))}' for pair in sorted(cell.may_touch, key=sorted)),
+        *(f'- {_flow((pair.a, pair.b))}' for pair, _ in pairs),
     ]
 
 

@@ -38,7 +38,7 @@ class RunningPath:
         :param take_part_change: called at each point at which the cell changes.
         """
         self._start, self._take_part_change = plan.start, take_part_change
-        self._T_flange_tcp = plan.T_flange_tcp or plan.T_flange_active
+        self._T_flange_active = plan.T_flange_active
         #: Guards the attributes below.
         self._lock = threading.Lock()
         self._paths = [PathLeft.of(plan, spline)]
@@ -74,7 +74,7 @@ class RunningPath:
             passed = [each for each in self._part_changes if each[0].waypoint + 1.0 <= place]
             del self._part_changes[: len(passed)]
         for change, q in passed:
-            self._take_part_change(change, q, self._T_flange_tcp)
+            self._take_part_change(change, q, self._T_flange_active)
 
     def append(self, plan: Plan, start_time: float, spline: JointSpline | None) -> None:
         """
@@ -98,5 +98,6 @@ class RunningPath:
         time, q = (0.0, self._start) if progress is None else (progress.time, progress.desired_q)
         with self._lock:
             paths, changes = list(self._paths), [change for change, _ in self._part_changes]
-        for path in paths:
-            path.check(arm, options, q, changes, time)
+        for path in paths:  # of several, none changes the cell
+            q = path.check(arm, options, q, changes, time)
+            time = max(time, path.end)

@@ -114,15 +114,23 @@ class CellDistances:
     """
     The distances of one arm, its tool and all bodies of a cell.
 
-    :param T_flange_tcp: the TCP, for the tool and for bodies in ``tool0_controller``.
-    :param tool_radius: radius of a cylinder from the flange to the TCP [m]; 0 = none.
+    :param T_flange_tcp: the active TCP, for bodies in ``tool0_controller``.
     :param cell: without meshes if :func:`missing_coal` says so.
+    :param tool_radius: radius of a cylinder from the flange to the tool's tip [m]; 0 = none.
+    :param T_flange_tip: the tool's tip; None = the active TCP.
     """
 
-    def __init__(self, arm: Arm, T_flange_tcp: Pose, cell: Cell, tool_radius: float = 0.0) -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        T_flange_tcp: Pose,
+        cell: Cell,
+        tool_radius: float = 0.0,
+        T_flange_tip: Pose | None = None,
+    ) -> None:
         """Place all bodies on their carriers."""
         self._frames = LinkFrames(arm)
-        arm_bodies = _arm_bodies(arm, self._frames, T_flange_tcp, tool_radius)
+        arm_bodies = _arm_bodies(arm, self._frames, T_flange_tip or T_flange_tcp, tool_radius)
         self._bodies = [*arm_bodies, *_cell_bodies(cell, self._frames, T_flange_tcp)]
         #: The numbers of the bodies of each pair, (pairs, 2); the first of them moves.
         self._numbers = _pair_numbers(self._bodies, len(arm_bodies), cell)
@@ -228,12 +236,12 @@ class CellDistances:
             found[near] = np.maximum(found[near], exact)
         return found
 
-    def pairs_below(self, q: Floats) -> list[tuple[str, str, float, float]]:
+    def pairs_below(self, q: Floats) -> list[tuple[Pair, float]]:
         """
         Return the pairs that are closer than their clearance at one configuration.
 
         :param q: (6,) [rad].
-        :returns: names, distance [m] and clearance [m] of each pair, the deepest first.
+        :returns: each pair with its distance [m], the deepest first.
         """
         poses = self.poses(np.asarray(q, dtype=np.float64)[None])
         lower = self.lower_bounds(poses)[0]
@@ -242,8 +250,8 @@ class CellDistances:
             pair = self.pairs[column]
             distance = float(self.distances(column, poses, pair.clearance)[0])
             if distance < pair.clearance:
-                found.append((pair.a, pair.b, distance, pair.clearance))
-        return sorted(found, key=lambda each: each[2] - each[3])
+                found.append((pair, distance))
+        return sorted(found, key=lambda each: each[1] - each[0].clearance)
 
     def closest(self, q: Floats) -> tuple[Floats, Indices]:
         """

@@ -176,7 +176,7 @@ class Cell:
     clearance: float = DEFAULT_CLEARANCE
     #: What the files left open: sentences.
     remarks: tuple[str, ...] = field(default=(), compare=False)
-    #: The names of the bodies, and the arm's.
+    #: The names of the bodies.
     names: frozenset[str] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -157,7 +157,8 @@ def _search_without_collisions(lattice: RotationLattice, path: _FreePath) -> Rot
 
     def too_close(q: Floats, more: float) -> Flags:
         options = replace(path.options, min_clearance=min(least + more, MAX_CLEARANCE))
-        checks = (Clearance(lattice.arm, T_flange_tip, options) for T_flange_tip in path.tool_tips)
+        tips = path.tool_tips
+        checks = (Clearance(lattice.arm, T_flange_tip, options, tips[0]) for T_flange_tip in tips)
         close: Flags = np.any([check.too_close(q) for check in checks], axis=0)
         return close
 
@@ -192,7 +193,8 @@ class _FreePath:
         #: Whether the controlled frame is or becomes the TCP; any other frame would leave its
         #: straight line if the tool turned.
         self.can_turn = options.allow_tcp_change or is_same_tcp(T_tcp_controlled, IDENTITY)
-        self.tool_tips = {state.T_flange_tcp, T_flange_controlled}
+        #: The active TCP first, and the controlled frame if it is another one.
+        self.tool_tips = tuple(dict.fromkeys((state.T_flange_tcp, T_flange_controlled)))
         self.T_controlled_flange = T_flange_controlled.inverse()
         self.q_start = state.actual_q
         self.name = FreeAxis(int(segments.free_axes[first])).name.lower()

@@ -13,7 +13,7 @@ it is treated like all others.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import inf
@@ -27,7 +27,7 @@ from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Lin
 from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes, missing_meshes
 from ur_cartesian_driver.kinematics.inverse import format_distinct
 from ur_cartesian_driver.kinematics.link_shapes import mesh_model, MODELS_WITH_MESHES
-from ur_cartesian_driver.motion.cell.cell import Cell
+from ur_cartesian_driver.motion.cell.cell import Cell, EMPTY_CELL
 from ur_cartesian_driver.motion.errors import CollisionPredicted, NotAvailable
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int32s
 from ur_cartesian_driver.motion.geometry.pose import Pose
@@ -112,10 +112,18 @@ class Clearance:
 
     :param T_flange_tcp: the TCP of the goal; the cylinder of the tool leads from the flange to it.
     :param options: self_collision, min_clearance, tool_radius, workspace_planes and cell are used.
+    :param T_flange_active: the active TCP, for bodies in ``tool0_controller``; None = that of the
+        goal.
     :raises NotAvailable: the cell has a mesh, and pinocchio is not installed.
     """
 
-    def __init__(self, arm: Arm, T_flange_tcp: Pose, options: PlanningOptions) -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        T_flange_tcp: Pose,
+        options: PlanningOptions,
+        T_flange_active: Pose | None = None,
+    ) -> None:
         """Create the checkers."""
         bodies = _bodies(arm, T_flange_tcp, options.tool_radius)
         self._checkers: list[_SelfCollisionChecker | _PlaneChecker] = []
@@ -123,7 +131,9 @@ class Clearance:
             self._checkers.append(_SelfCollisionChecker(bodies, T_flange_tcp, options))
         if planes := parse_planes(options.workspace_planes):
             self._checkers.append(_PlaneChecker(bodies, arm, T_flange_tcp, planes))
-        self._cell = _cell_clearance(arm, T_flange_tcp, options.cell, options.tool_radius)
+        self._cell = _cell_clearance(
+            arm, T_flange_active or T_flange_tcp, options.cell, options.tool_radius, T_flange_tcp
+        )
 
     def too_close(self, q: Floats) -> Flags:
         """Return whether each configuration (n, 6) [rad] is too close, regardless of the start."""
@@ -148,8 +158,7 @@ class Clearance:
             if found is not None:
                 return found
         if self._cell is not None and (pairs := self._cell.bodies.pairs_below(row[0])):
-            a, b, distance, clearance = pairs[0]
-            return _violation_in_cell(Pair(a, b, clearance), distance, 0, q)
+            return _violation_in_cell(*pairs[0], 0, q)
         return None
 
     def closest(self, q: Floats) -> tuple[Floats, list[tuple[str, str]]]:
@@ -226,13 +235,18 @@ class Clearance:
 
 def _violation_in_cell(pair: Pair, distance: float, row: int, q: Joints) -> Violation:
     """Return the violation of a pair that is closer than its clearance [m], in a row."""
-    found, bound = format_distinct(distance, pair.clearance)
-    near = f'come within {found} m of each other' if distance > 0.0 else 'touch'
-    if distance < -_DEPTH_SHOWN:
-        near = f'overlap by {-distance:.4f} m'
+    if distance > 0.0:
+        found, bound = format_distinct(distance, pair.clearance)
+        near, than = (
+            f'come within {found} m of each other',
+            f', less than the clearance of {bound} m',
+        )
+    else:
+        near = f'overlap by {-distance:.4f} m' if distance < -_DEPTH_SHOWN else 'touch'
+        than = f', with a clearance of {pair.clearance:.4f} m'
     return Violation(
         row=row,
-        text=f'{pair.a} and {pair.b} {near}, less than the clearance of {bound} m in the cell',
+        text=f'{pair.a} and {pair.b} {near}{than} in the cell',
         remedy='take another path or posture, change the cell, or list the pair in may_touch',
         bodies=(pair.a, pair.b),
         q=q,
@@ -245,16 +259,17 @@ def _bodies(arm: Arm, T_flange_tcp: Pose, tool_radius: float) -> CollisionBodies
     return CollisionBodies(arm, T_flange_tcp, tool_radius)
 
 
-@lru_cache(maxsize=8)
+# A goal may take and put down a dozen parts, and its offsets come back to each stretch.
+@lru_cache(maxsize=32)
 def _cell_clearance(
-    arm: Arm, T_flange_tcp: Pose, cell: Cell, tool_radius: float
+    arm: Arm, T_flange_active: Pose, cell: Cell, tool_radius: float, T_flange_tip: Pose
 ) -> CellClearance | None:
     """Return the clearance from a cell; cached likewise. None = the cell is empty."""
     if not cell:
         return None
     if problem := missing_coal(cell):
         raise NotAvailable('cell_file', problem)
-    return CellClearance(CellDistances(arm, T_flange_tcp, cell, tool_radius))
+    return CellClearance(CellDistances(arm, T_flange_active, cell, tool_radius, T_flange_tip))
 
 
 def clearance_remarks(clear: ClearanceResult, segment: Int32s, fraction: Floats) -> list[str]:
@@ -294,32 +309,56 @@ def clearance_remarks(clear: ClearanceResult, segment: Int32s, fraction: Floats)
 
 def clearance_lines(
     arm: Arm,
-    tool_tips: Iterable[Pose],
+    tool_tips: Sequence[Pose],
     options: PlanningOptions,
     path: JointSamples,
     q_start: Joints,
     part_changes: Sequence[PartChange] = (),
 ) -> list[str]:
+    """Return the report lines about the clearance; for errors see :func:`clearances`."""
+    found = clearances(arm, tool_tips, options, path, q_start, part_changes)
+    # Two tips often have the same line.
+    return list(dict.fromkeys(line for _, lines in found for line in lines))
+
+
+def clearances(
+    arm: Arm,
+    tool_tips: Sequence[Pose],
+    options: PlanningOptions,
+    path: JointSamples,
+    q_start: Joints,
+    part_changes: Sequence[PartChange] = (),
+    displaced: Floats | None = None,
+    *,
+    closest: bool = True,
+) -> Iterator[tuple[ClearanceResult, list[str]]]:
     """
-    Return the report lines about the clearance with each of several tool tips.
+    Yield the clearance of each stretch of a path with each tool tip, and its report lines.
 
-    For parameters and errors see :meth:`Clearance.check` and :func:`clearance_remarks`.
-
+    :param tool_tips: the active TCP first.
     :param part_changes: the bodies that the tool takes or puts down along the path.
+    :param displaced: (n, 6) the joints to check, if an offset moves them from those of the path
+        [rad].
+    :param closest: whether the closest pair in the cell is searched, too, which takes longer.
+    :raises CollisionPredicted: there is a violation for which the goal is refused.
     """
-    lines = []
-    for tip in tool_tips:
-        for rows, cell, start in cell_stretches(
-            part_changes, path.segment, path.q, q_start, arm, tip, options.cell
-        ):
-            used = options if cell is options.cell else replace(options, cell=cell)
-            clear = Clearance(arm, tip, used).check(path.q[rows], start)
+    checked = path.q if displaced is None else displaced
+    active = tool_tips[0]
+    stretches = cell_stretches(
+        part_changes, path.segment, path.q, q_start, arm, active, options.cell
+    )
+    for rows, cell, start in stretches:
+        used = options if cell is options.cell else replace(options, cell=cell)
+        for tip in tool_tips:
+            if tip is not active and cell and not options.tool_radius:
+                used = replace(used, cell=EMPTY_CELL)  # nothing in the cell depends on the tip
+            clear = Clearance(arm, tip, used, active).check(checked[rows], start, closest=closest)
             try:
-                lines += clearance_remarks(clear, path.segment[rows], path.fraction[rows])
+                lines = clearance_remarks(clear, path.segment[rows], path.fraction[rows])
             except CollisionPredicted as error:
                 error.cell = cell
                 raise
-    return list(dict.fromkeys(lines))  # two tips often have the same line
+            yield clear, lines
 
 
 class _InitialViolations:

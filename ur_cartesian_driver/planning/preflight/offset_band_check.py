@@ -14,7 +14,7 @@ The corners of the band are checked along the whole path, as the path itself was
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from math import ceil, hypot
 
@@ -36,8 +36,7 @@ from ur_cartesian_driver.motion.goal.goal import PartChange, PathOffset
 from ur_cartesian_driver.motion.plan.offset_band import OFFSET_AXES, OffsetBand
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.preflight.cell_stretches import cell_stretches
-from ur_cartesian_driver.planning.preflight.clearance import Clearance, clearance_remarks
+from ur_cartesian_driver.planning.preflight.clearance import clearances, JointSamples
 from ur_cartesian_driver.planning.preflight.joint_path_solver import describe_location
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.preflight.tightest_margins import (
@@ -324,18 +323,18 @@ class OffsetBandCheck:
 
     def _clearance(self, there: Floats) -> list[str]:
         """Check the clearance at joint positions along a corner, and return the warnings."""
-        arm, path, q = self.kinematics.arm, self.reference, self.q
-        start, warnings = vector6(q[0].tolist()), []
-        for T_flange_tip in self.tool_tips:
-            # The tool takes and puts down parts on the path, whatever the offset.
-            for rows, cell, before in cell_stretches(
-                self.part_changes, path.point, q, start, arm, T_flange_tip, self.options.cell
-            ):
-                options = replace(self.options, cell=cell)
-                clear = Clearance(arm, T_flange_tip, options).check(there[rows], before)
-                lines = clearance_remarks(clear, path.point[rows], path.fraction[rows])
-                if clear.warning is not None:
-                    warnings.append(lines[0])
+        path = JointSamples(self.reference.point, self.reference.fraction, self.q)
+        found = clearances(
+            self.kinematics.arm,
+            self.tool_tips,
+            self.options,
+            path,
+            vector6(self.q[0].tolist()),
+            self.part_changes,
+            there,
+            closest=False,
+        )
+        warnings = [lines[0] for clear, lines in found if clear.warning is not None]
         return list(dict.fromkeys(warnings))
 
     def _joints_at(self, corner: Vector3, axes: Floats, q: Floats) -> Floats:

@@ -25,7 +25,7 @@ from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.offset_band import OffsetBand
 from ur_cartesian_driver.motion.plan.plan import Plan, ReferencePath
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.preflight.clearance import clearance_lines, JointSamples
+from ur_cartesian_driver.planning.preflight.clearance import clearances, JointSamples
 from ur_cartesian_driver.planning.preflight.held_part_kinematics import kinematics_of
 from ur_cartesian_driver.planning.preflight.offset_band_check import (
     dense_path,
@@ -75,7 +75,7 @@ class PathLeft:
         q: Joints,
         part_changes: Sequence[PartChange],
         time: float = 0.0,
-    ) -> None:
+    ) -> Joints:
         """
         Check the path from a time on.
 
@@ -83,36 +83,46 @@ class PathLeft:
         :param q: the joint positions at this time [rad].
         :param part_changes: those that are still to come.
         :param time: since the start of the goal [s].
+        :returns: the joint positions at the end of the path [rad].
         :raises GoalRefused: the path would touch; or the joints along it are not known.
         """
         path = self.reference.since(time)
         if len(path.time) < 2 or self.end <= time:
-            return
-        path, kinematics = (
-            dense_path(path),
-            kinematics_of(self.moving_frame, arm, self.T_flange_tcp),
+            return q
+        path = dense_path(path)
+        ahead = (path.time >= time) & (path.time <= self.until)
+        if not ahead.any():
+            return q
+        path = ReferencePath(
+            poses=path.poses[ahead],
+            point=path.point[ahead],
+            time=path.time[ahead],
+            fraction=path.fraction[ahead],
         )
+        kinematics = kinematics_of(self.moving_frame, arm, self.T_flange_tcp)
         if self.spline is not None:
             joints = self.spline.rows(path.time)[0]
         else:
             joints, _ = path_joints(path, kinematics, q)
-        ahead = (path.time >= time) & (path.time <= self.until)
-        samples = JointSamples(path.point[ahead], path.fraction[ahead], joints[ahead])
-        if len(samples.q):
-            # The arm itself and the planes are as they were when the path was planned.
-            only_cell = replace(options, self_collision='off', workspace_planes=())
-            clearance_lines(arm, self.tool_tips, only_cell, samples, q, part_changes)
-            if self.band is not None:
-                OffsetBandCheck(
-                    kinematics=kinematics,
-                    options=only_cell,
-                    band=self.band,
-                    reference=path,
-                    q=joints,
-                    qd=np.zeros_like(joints),
-                    tool_tips=self.tool_tips,
-                    part_changes=part_changes,
-                ).check_clearance()
+        # The arm itself and the planes are as they were when the path was planned.
+        only_cell = replace(options, self_collision='off', workspace_planes=())
+        samples = JointSamples(path.point, path.fraction, joints)
+        for _ in clearances(
+            arm, self.tool_tips, only_cell, samples, q, part_changes, closest=False
+        ):
+            pass
+        if self.band is not None:
+            OffsetBandCheck(
+                kinematics=kinematics,
+                options=only_cell,
+                band=self.band,
+                reference=path,
+                q=joints,
+                qd=np.zeros_like(joints),
+                tool_tips=self.tool_tips,
+                part_changes=part_changes,
+            ).check_clearance()
+        return vector6(joints[-1].tolist())
 
 
 def joints_at(plan: Plan, waypoint: int) -> Joints:
