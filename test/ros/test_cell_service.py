@@ -72,6 +72,9 @@ def test_objects_of_the_planning_scene_become_bodies_beside_the_others(single_ce
         assert frozenset({'held', 'tool'}) in cell.may_touch
         scenes.take(scene(box('new'), box('own')))
         assert driver.cell is cell
+        scenes.take(scene(box('held', at=pose(y=1.2))))
+        assert driver.cell.body('held').frame == 'base'
+        assert driver.cell.may_touch == frozenset()
         scenes.take(scene(is_diff=False))
         assert driver.cell.names == {'own'}
     finally:

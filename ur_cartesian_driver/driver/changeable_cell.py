@@ -30,7 +30,7 @@ from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.cell_stretches import attached, changed, released
-from ur_cartesian_driver.planning.preflight.path_left import PathLeft
+from ur_cartesian_driver.planning.preflight.path_left import PathLeft, spline_of
 from ur_cartesian_driver.planning.request.point_events.part_changes import check_part_changes
 
 
@@ -158,7 +158,9 @@ class ChangeableCell(ABC):
         if options.cell or plan.goal.part_changes:
             check_part_changes(plan.goal, options.cell)
             try:
-                PathLeft.of(plan).check(self.arm, options, plan.start, plan.goal.part_changes)
+                PathLeft.of(plan, spline_of(plan)).check(
+                    self.arm, options, plan.start, plan.goal.part_changes
+                )
             except GoalRefused as error:
                 raise error.reworded(f'The cell is not that of the plan: {error}') from None
         return options.cell

@@ -105,7 +105,7 @@ class InteractiveMotions(ABC):
         :raises InvalidGoal: the target is malformed, or too far away.
         :raises RobotNotReady: the robot cannot accept a motion now, or one is running.
         """
-        state = self._state_for('follow live targets')
+        state, cell = self._state_for('follow live targets'), self.options.cell
         T_base_tcp, age = plain_target(T_base_tcp, age)
         check_target(T_base_tcp, state, self.options)
         motion = self._start_stationary(
@@ -115,6 +115,8 @@ class InteractiveMotions(ABC):
         )
         self._live = LiveSession(motion, self._send_target)
         self._live.set_target(T_base_tcp, age=age)
+        if self.options.cell is not cell:  # it changed before the session was known
+            self._end_session_for(motion, 'a session in the changed cell')
         return self._live
 
     def send_live_target(self, T_base_tcp: Pose, *, age: float = 0.0) -> MotionHandle:

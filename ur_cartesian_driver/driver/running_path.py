@@ -18,7 +18,7 @@ from ur_cartesian_driver.motion.goal.goal import PartChange
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.planning import PlanningOptions
-from ur_cartesian_driver.planning.preflight.path_left import joints_at, PathLeft
+from ur_cartesian_driver.planning.preflight.path_left import joints_at, PathLeft, spline_of
 from ur_cartesian_driver.planning.request.point_events.goal_rest import NO_FRACTION
 
 #: Takes a change of the cell, with the joints at its point [rad] and the active TCP.
@@ -41,7 +41,7 @@ class RunningPath:
         self._T_flange_active = plan.T_flange_active
         #: Guards the attributes below.
         self._lock = threading.Lock()
-        self._paths = [PathLeft.of(plan, spline)]
+        self._paths = [PathLeft.of(plan, spline or spline_of(plan))]
         #: The changes to come, each with the joints at its point [rad].
         self._part_changes = [
             (change, joints_at(plan, change.waypoint))

@@ -21,7 +21,6 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.cell.cell import Cell
 from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal
-from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import Goal
@@ -32,7 +31,7 @@ from ur_cartesian_driver.planning.preflight.cell_stretches import changed
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_change, TcpKinematics
 from ur_cartesian_driver.planning.stop_prediction import at_set_point, state_at_rest
 from ur_cartesian_driver.planning.travel.arm_space import ArmSpace
-from ur_cartesian_driver.planning.travel.transfer import find_transfer, TransferSettings
+from ur_cartesian_driver.planning.travel.transfer import find_transfer, Transfer, TransferSettings
 from ur_cartesian_driver.planning.travel.travel_to_goal import blend_radii, MAX_BLEND, SAME_JOINTS
 
 
@@ -174,7 +173,7 @@ class Traveller:
             if max_joint_change(q, entry) < SAME_JOINTS:
                 return [], entry
         found = find_transfer(self.space, q, entries, self._by, self._where)
-        poses = list(self._poses(q, found.waypoints))
+        poses = list(self._poses(q, found))
         radii = blend_radii([pose for pose, _ in poses], self._by.blend)
         legs = [
             Leg(pose, posture, radius)
@@ -182,21 +181,19 @@ class Traveller:
         ]
         return legs, found.goal
 
-    def _poses(
-        self, q: Joints, waypoints: Floats
-    ) -> Iterator[tuple[Pose, dict[str, float] | None]]:
+    def _poses(self, q: Joints, found: Transfer) -> Iterator[tuple[Pose, dict[str, float] | None]]:
         """Yield the beginning and the end of each motion, with a posture for joint motions."""
         T_frame_base = self._there.goal.T_base_frame.inverse()
         yield T_frame_base @ self.space.tcp(q), None
-        if self._by.retract:
-            yield T_frame_base @ self.space.tcp(vector6(waypoints[0].tolist())), None
+        if found.retracts:
+            yield T_frame_base @ self.space.tcp(vector6(found.waypoints[0].tolist())), None
         names = [self._by.options.tf_prefix + name for name in JOINT_NAMES]
-        for before, row in pairwise(waypoints):
+        for before, row in pairwise(found.waypoints):
             if np.abs(row - before).max() >= SAME_JOINTS:
                 joints = vector6(row.tolist())
                 posture = dict(zip(names, joints, strict=True))
                 yield T_frame_base @ self.space.tcp(joints), posture
-        if self._by.approach:
+        if max_joint_change(vector6(found.waypoints[-1].tolist()), found.goal) >= SAME_JOINTS:
             yield self._there.pose, None
 
 

@@ -125,6 +125,11 @@ class PathLeft:
         return vector6(joints[-1].tolist())
 
 
+def spline_of(plan: Plan) -> JointSpline | None:
+    """Return the joints over time of a plan that is a spline; None = they follow from its path."""
+    return plan.joint_spline if plan.execution.traits.is_spline else None
+
+
 def joints_at(plan: Plan, waypoint: int) -> Joints:
     """Return the joint positions at a point at which the arm stops [rad]."""
     rows = plan.rows

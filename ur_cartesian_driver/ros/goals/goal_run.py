@@ -257,8 +257,12 @@ class GoalRun:
 
     def _execute(self, plan: Plan) -> Outcome:
         # Feedback and pictures are of the plan that is executed.
-        plan = self._context.driver.renewed(plan)
-        motion = self._context.driver.start(plan, self._feedback_publisher(plan))
+        try:
+            plan = self._context.driver.renewed(plan)
+            motion = self._context.driver.start(plan, self._feedback_publisher(plan))
+        except CollisionPredicted as refusal:
+            self._context.show_refusal(refusal)
+            raise
         with self._lock:
             self._motion = motion
             abort_requested = self._abort_requested.is_set()

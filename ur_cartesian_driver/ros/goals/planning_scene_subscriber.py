@@ -65,13 +65,19 @@ class PlanningSceneSubscriber:
         before = SceneBodies(cell=driver.cell, names=self._names & driver.cell.names)
         try:
             after = updated_scene(before, message, place)
-            changed = [body for body in after.cell.bodies if body not in before.cell.bodies]
-            pairs = after.cell.may_touch - before.cell.may_touch
-            if changed or pairs or before.cell.names != after.cell.names:
+            pairs, pairs_before = after.cell.may_touch, before.cell.may_touch
+            # A body forgets what it may touch only when it is removed.
+            anew = {name for pair in pairs_before - pairs for name in pair} & after.names
+            changed = [
+                body
+                for body in after.cell.bodies
+                if body.name in anew or body not in before.cell.bodies
+            ]
+            if changed or pairs != pairs_before or before.cell.names != after.cell.names:
                 driver.change_cell(
                     changed,
-                    remove=before.cell.names - after.cell.names,
-                    may_touch=pairs,
+                    remove=(before.cell.names - after.cell.names) | anew,
+                    may_touch=[pair for pair in pairs if pair & anew or pair not in pairs_before],
                 )
         except (DriverError, ValueError) as error:
             clause = str(error).rstrip('.')
