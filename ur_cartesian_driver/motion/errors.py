@@ -6,7 +6,7 @@ The errors of this package: a class, with the action's code, for each way a goal
 ::
 
     DriverError
-    |-- GoalRefused              nothing has moved
+    |-- GoalRefused              nothing has moved, unless the cell changed (CollisionPredicted)
     |   |-- InvalidGoal              the goal contradicts itself or the rules
     |   |   |-- NotAvailable             the goal needs something that this version does not do
     |   |   `-- TooFast                  the goal needs more speed than the limits allow

@@ -235,7 +235,8 @@ class Outcome:
         ``driver.execute(goal).raise_for_error()`` lets Python code handle failures as exceptions;
         the table of codes and classes is :data:`~ur_cartesian_driver.motion.errors.ERRORS`.
 
-        :raises GoalRefused: the goal was refused before anything moved.
+        :raises GoalRefused: the goal was refused before anything moved; or, as CollisionPredicted,
+            the cell changed and what was left of the path would have touched.
         :raises ExecutionEnded: the goal ended before its last point. Like GoalRefused, the error
             carries the text and the ``report`` of this outcome.
         """

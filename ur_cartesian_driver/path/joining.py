@@ -27,8 +27,8 @@ def join(seams: Sequence[Path], by: AirTravel, *, order: Order = 'given') -> Pat
     of the path before it; to the first path, those of its own end.
 
     :param by: the arm, where it is when the joined path begins, and how it travels.
-    :param order: ``given``; or ``best``: the order, the postures and the directions of open paths
-        with the least travel, as far as the joints turn. A path with events (outputs, say) keeps
+    :param order: ``given``; or ``best``: the order and the directions of open paths with the least
+        travel, as far as the joints turn. A path with events (outputs, say) keeps
         its direction, and a closed one is left where it begins.
     :raises GoalRefused: a path cannot be executed, or no way was found.
     :raises InvalidGoal: there is no path, a path has no start, frames or tools differ, or the
