@@ -80,8 +80,7 @@ class RunningMotions:
     @property
     def handles(self) -> list[MotionHandle]:
         """The running motion, or an empty list."""
-        with self._loop.lock:
-            return [active.motion for active in self._motions.values()]
+        return [active.motion for active in self.active]
 
     @property
     def active(self) -> list[ActiveMotion]:

@@ -35,6 +35,7 @@ from ur_cartesian_driver.motion.plan.primitive import AwaitInput, CallFunction, 
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.cell_stretches import changed
 from ur_cartesian_driver.planning.preflight.clearance import Clearance
+from ur_cartesian_driver.planning.preflight.path_left import joints_at
 from ur_cartesian_driver.planning.preflight.tightest_margins import normalized_margins
 from ur_cartesian_driver.planning.request.point_events.switched_outputs import describe_command
 from ur_cartesian_driver.preview.distance_curve import distance_curve, groups_of_pairs
@@ -127,8 +128,7 @@ def _cells(plan: Plan, preview: Preview, arm: Arm, tcp: Pose, cell: Cell) -> dic
     """Return the cell from each row of the samples on at which the tool takes or leaves a part."""
     cells = {0: cell}
     for change in sorted(plan.goal.part_changes, key=lambda each: each.waypoint):
-        q = next(one.joints for one in reversed(plan.segments) if one.waypoint == change.waypoint)
-        cell = changed(cell, change, arm, q, tcp)
+        cell = changed(cell, change, arm, joints_at(plan, change.waypoint), tcp)
         reference = plan.reference
         last = int(np.searchsorted(reference.point, change.waypoint, side='right')) - 1
         cells[int(np.searchsorted(preview.time, reference.time[last]))] = cell
@@ -188,13 +188,15 @@ def refusal_page(
     :raises ImportError: viser is not installed; the text says how to get it.
     """
     # The orientation may be what is wrong; points given by joints have no place.
-    path = np.array(_places(goal, arm.forward(q), tcp))
-    has_place = np.isfinite(path).all(axis=1)
     touching: tuple[str, ...] = ()
-    cell = options.cell
+    cell, q_start = options.cell, q
     if isinstance(refusal, CollisionPredicted) and refusal.q is not None:
         q, touching = refusal.q, refusal.bodies
         cell = refusal.cell if isinstance(refusal.cell, Cell) else cell
+    # A path on a held part is where the part is drawn; any other begins where the arm stood.
+    seen_from = q_start if goal.moving_frame is None else q
+    path = np.array(_places(goal, arm.forward(seen_from), tcp))
+    has_place = np.isfinite(path).all(axis=1)
     with serve(parse_planes(options.workspace_planes)) as server:
         scene = Scene(server, arm, tcp, cell, touching)
         drawn = path[has_place]

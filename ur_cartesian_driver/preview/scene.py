@@ -37,11 +37,10 @@ MAX_NUMBERED_POINTS = 60
 FIXED: Colour = (190, 165, 130)
 CARRIED: Colour = (110, 160, 110)
 REFUSED: Colour = (210, 30, 30)
-_ARM, _TOOL, _POINT, _START, _OUTPUT, _PLANE, _TRAIL = (
+_ARM, _TOOL, _POINT, _OUTPUT, _PLANE, _TRAIL = (
     (176, 184, 194),
     (90, 100, 110),
     (50, 60, 70),
-    (20, 140, 60),
     (200, 120, 0),
     (120, 170, 220),
     (230, 60, 160),
@@ -90,7 +89,7 @@ class Scene:
             self._add_body(f'/cell/{k}', body, triangles_per_mesh(cell))
             for k, body in enumerate(cell.bodies)
         ]
-        self._cell, self._tcp = cell, tcp
+        self._cell = cell
         self.set_tool(tcp)
 
     def _colour(self, name: str, otherwise: Colour) -> Colour:

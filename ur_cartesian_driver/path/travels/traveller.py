@@ -28,6 +28,7 @@ from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.cell_stretches import changed
+from ur_cartesian_driver.planning.preflight.path_left import joints_at
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_change, TcpKinematics
 from ur_cartesian_driver.planning.stop_prediction import at_set_point, state_at_rest
 from ur_cartesian_driver.planning.travel.arm_space import ArmSpace
@@ -79,13 +80,12 @@ class AirTravel(TransferSettings):
         # A travel leads to the goal, however far away that is.
         options = replace(self.options, max_approach_distance=0.0, cell=place.cell)
         state = state_at_rest(self.arm, place.q, T_flange_tcp)
-        rows = planning.plan(goal, state, self.arm, options).rows  # loads the planner when needed
+        made = planning.plan(goal, state, self.arm, options)  # loads the planner when needed
         cell = place.cell
         for change in sorted(goal.part_changes, key=lambda each: each.waypoint):
-            row = int(np.searchsorted(rows.waypoints, change.waypoint, side='right')) - 1
-            q = vector6(rows.joints[row].tolist())
-            cell = changed(cell, change, self.arm, q, goal.T_flange_controlled or T_flange_tcp)
-        return ArmStand(vector6(rows.joints[-1].tolist()), cell)
+            q = joints_at(made, change.waypoint)
+            cell = changed(cell, change, self.arm, q, T_flange_tcp)
+        return ArmStand(vector6(made.rows.joints[-1].tolist()), cell)
 
 
 @dataclass(frozen=True, slots=True)
