@@ -191,7 +191,7 @@ class ChangeableCell(ABC):
         """Return why a motion cannot go on in the present cell, as a clause; '' = it can."""
         try:
             if active.path is not None:
-                active.path.check(self.arm, self.options)
+                active.path.check(self.arm, lambda: self.options)
         except GoalRefused as error:
             return f'the cell has changed, and what is left of the path would touch: {error}'
         except Exception as error:  # a motion that cannot be checked must not go on

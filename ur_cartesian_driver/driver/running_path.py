@@ -39,8 +39,9 @@ class RunningPath:
         """
         self._start, self._take_part_change = plan.start, take_part_change
         self._T_flange_active = plan.T_flange_active
-        #: Guards the attributes below.
-        self._lock = threading.Lock()
+        #: Guards the attributes below, and keeps a change of the cell and its removal from the list
+        #: one step. A listener of the cell may append points meanwhile.
+        self._lock = threading.RLock()
         self._paths = [PathLeft.of(plan, spline or spline_of(plan))]
         #: The changes to come, each with the joints at its point [rad].
         self._part_changes = [
@@ -73,8 +74,8 @@ class RunningPath:
         with self._lock:
             passed = [each for each in self._part_changes if each[0].waypoint + 1.0 <= place]
             del self._part_changes[: len(passed)]
-        for change, q in passed:
-            self._take_part_change(change, q, self._T_flange_active)
+            for change, q in passed:
+                self._take_part_change(change, q, self._T_flange_active)
 
     def append(self, plan: Plan, start_time: float, spline: JointSpline | None) -> None:
         """
@@ -88,16 +89,18 @@ class RunningPath:
             self._paths = [path for path in paths if path.end > now]
             self._paths.append(PathLeft.of(plan, spline))
 
-    def check(self, arm: Arm, options: PlanningOptions) -> None:
+    def check(self, arm: Arm, options_now: Callable[[], PlanningOptions]) -> None:
         """
         Check what is left of the path in another cell.
 
+        :param options_now: returns the options with the cell, without the changes to come.
         :raises GoalRefused: it would touch; or its joints are not known.
         """
         progress = self._progress
         time, q = (0.0, self._start) if progress is None else (progress.time, progress.desired_q)
         with self._lock:
             paths, changes = list(self._paths), [change for change, _ in self._part_changes]
+            options = options_now()
         for path in paths:  # of several, none changes the cell
             q = path.check(arm, options, q, changes, time)
             time = max(time, path.end)
