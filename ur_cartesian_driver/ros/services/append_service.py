@@ -9,10 +9,8 @@ feedback waits for the planning. The response is sent when the points are append
 
 from __future__ import annotations
 
-from concurrent.futures import Future, ThreadPoolExecutor
 from hashlib import sha256
 import pickle
-import threading
 import traceback
 from typing import Any
 
@@ -29,19 +27,11 @@ from ur_cartesian_driver.ros.goals.action_server import GoalServer
 from ur_cartesian_driver.ros.goals.goal_run import GoalRun
 from ur_cartesian_driver.ros.message_fields import AT_END
 from ur_cartesian_driver.ros.messages.goal_conversion import appended_points_from_message
-from ur_cartesian_driver.ros.services.deferred_service import DeferredService
+from ur_cartesian_driver.ros.services.deferred_service import DeferredService, RequestQueue
 from ur_cartesian_driver.srv import AppendPoints
 
 #: How long points wait for the motion of a goal to begin [s].
 BEGIN_TIMEOUT = 10.0
-
-#: Largest number of requests that wait, with their points in memory.
-MAX_WAITING_REQUESTS = 32
-
-SHUTDOWN_REFUSAL = 'The driver node is shutting down.'
-OVERLOAD_REFUSAL = (
-    f'{MAX_WAITING_REQUESTS} requests to append points wait; send this one again later.'
-)
 
 
 class AppendService:
@@ -50,29 +40,12 @@ class AppendService:
     def __init__(self, node: Node, server: GoalServer) -> None:
         """Start to serve."""
         self._logger, self._server = node.get_logger(), server
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix='append points')
-        self._slots = threading.Semaphore(MAX_WAITING_REQUESTS)
-        self._service = DeferredService(node, AppendPoints, '~/append_points', self._handle)
+        self._queue = RequestQueue('append points', self._append, _refusal)
+        self._service = DeferredService(node, AppendPoints, '~/append_points', self._queue.submit)
 
     def close(self) -> None:
         """Refuse new requests; the one that is being planned is completed."""
-        self._thread.shutdown(cancel_futures=True)
-
-    def _handle(self, request: Any) -> Future[Any]:
-        future: Future[Any] = Future()
-        if not self._slots.acquire(blocking=False):
-            future.set_result(_refusal(OVERLOAD_REFUSAL))
-            return future
-
-        def answer(done: Future[Any]) -> None:
-            self._slots.release()
-            future.set_result(_refusal(SHUTDOWN_REFUSAL) if done.cancelled() else done.result())
-
-        try:
-            self._thread.submit(self._append, request).add_done_callback(answer)
-        except RuntimeError:  # close() was called
-            future.set_result(_refusal(SHUTDOWN_REFUSAL))
-        return future
+        self._queue.close()
 
     def _append(self, request: Any) -> Any:
         """Return the response to a request."""

@@ -8,7 +8,6 @@ A separate thread reads the bodies, one request after the other: a mesh takes a 
 
 from __future__ import annotations
 
-from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 import traceback
 from typing import Any
@@ -20,7 +19,7 @@ from ur_cartesian_driver.motion.cell.cell import Cell, EMPTY_CELL
 from ur_cartesian_driver.motion.cell.cell_file import cell_from_text
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.robot.services.service_calls import failed, ServiceAnswer
-from ur_cartesian_driver.ros.services.deferred_service import completed_answer, DeferredService
+from ur_cartesian_driver.ros.services.deferred_service import DeferredService, RequestQueue
 from ur_cartesian_driver.srv import ChangeCell
 
 #: Name of the text with bodies in refusals.
@@ -33,18 +32,12 @@ class CellService:
     def __init__(self, node: Node, driver: Driver) -> None:
         """Start to serve."""
         self._logger, self._driver = node.get_logger(), driver
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix='change cell')
-        self._service = DeferredService(node, ChangeCell, '~/change_cell', self._handle)
+        self._queue = RequestQueue('change the cell', self._change, failed)
+        self._service = DeferredService(node, ChangeCell, '~/change_cell', self._queue.submit)
 
     def close(self) -> None:
-        """Refuse new requests; those that wait are completed."""
-        self._thread.shutdown()
-
-    def _handle(self, request: Any) -> Future[Any]:
-        try:
-            return self._thread.submit(self._change, request)
-        except RuntimeError:  # close() was called
-            return completed_answer('The driver node is shutting down.')
+        """Refuse new requests; the one that is being carried out is completed."""
+        self._queue.close()
 
     def _change(self, request: Any) -> ServiceAnswer:
         try:

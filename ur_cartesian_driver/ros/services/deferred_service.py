@@ -11,8 +11,9 @@ So no thread waits, with any executor and any number of pending calls.
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 import contextlib
+import threading
 from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -20,6 +21,12 @@ from rclpy.node import Node
 
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
 from ur_cartesian_driver.ros.node_endpoints import SHUT_DOWN_ERRORS
+
+
+#: Largest number of requests that wait, with all that they hold in memory.
+MAX_WAITING_REQUESTS = 32
+
+SHUTDOWN_REFUSAL = 'The driver node is shutting down.'
 
 
 class DeferredService:
@@ -59,6 +66,52 @@ class DeferredService:
         # The node, or all of ROS, may have been shut down meanwhile.
         with contextlib.suppress(*SHUT_DOWN_ERRORS):
             self._send_now(answer, header)
+
+
+class RequestQueue:
+    """Answers requests one after the other in a thread of its own; refuses too many of them."""
+
+    def __init__(
+        self, purpose: str, answer: Callable[[Any], Any], refuse: Callable[[str], Any]
+    ) -> None:
+        """
+        Create the thread.
+
+        :param purpose: what the requests are for, after "requests to".
+        :param answer: takes a request and returns the response; it raises nothing.
+        :param refuse: returns the response of a request that is not answered; takes the reason.
+        """
+        self._purpose, self._answer, self._refuse = purpose, answer, refuse
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix=purpose)
+        self._slots = threading.Semaphore(MAX_WAITING_REQUESTS)
+
+    def submit(self, request: Any) -> Future[Any]:
+        """Return the future of the response."""
+        response: Future[Any] = Future()
+        if not self._slots.acquire(blocking=False):
+            response.set_result(
+                self._refuse(
+                    f'{MAX_WAITING_REQUESTS} requests to {self._purpose} wait; send this one '
+                    'again later.'
+                )
+            )
+            return response
+
+        def respond(done: Future[Any]) -> None:
+            self._slots.release()
+            response.set_result(
+                self._refuse(SHUTDOWN_REFUSAL) if done.cancelled() else done.result()
+            )
+
+        try:
+            self._thread.submit(self._answer, request).add_done_callback(respond)
+        except RuntimeError:  # close() was called
+            response.set_result(self._refuse(SHUTDOWN_REFUSAL))
+        return response
+
+    def close(self) -> None:
+        """Complete the present request, and refuse those that wait and new ones."""
+        self._thread.shutdown(cancel_futures=True)
 
 
 def completed_answer(text: str, *, ok: bool = False) -> Future[ServiceAnswer]:
