@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The cell of a running node, changed by its service."""
 
+from concurrent.futures import Future
+import threading
+from types import SimpleNamespace
 from typing import Any
 
 from planning_scenes import box, held, pose, scene
@@ -11,8 +14,14 @@ from visualization_msgs.msg import MarkerArray
 
 from ur_cartesian_driver.motion.cell.cell import CellBody, PlacedShape
 from ur_cartesian_driver.motion.cell.shapes import Sphere
+from ur_cartesian_driver.ros.goals import planning_scene_subscriber
 from ur_cartesian_driver.ros.goals.planning_scene_subscriber import PlanningSceneSubscriber
 from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS
+from ur_cartesian_driver.ros.services.deferred_service import (
+    MAX_WAITING_REQUESTS,
+    RequestQueue,
+    SHUTDOWN_REFUSAL,
+)
 from ur_cartesian_driver.srv import ChangeCell
 
 pytestmark = pytest.mark.slow
@@ -85,6 +94,94 @@ def test_objects_of_the_planning_scene_become_bodies_beside_the_others(single_ce
         'The planning scene is not taken over',
     ]
     assert 'object "own": the cell has another body of this name' in said[1]
+
+
+class FakeNode:
+    """A node with MoveIt beside it, whose service comes and goes."""
+
+    def __init__(self, logger):
+        self.get_logger = lambda: logger
+        self.clients, self.has_service, self.requests = [], False, []
+
+    def create_subscription(self, kind, topic, callback, qos, callback_group):
+        return None
+
+    def create_client(self, kind, name, callback_group):
+        self.clients.append(name)
+        return SimpleNamespace(service_is_ready=lambda: self.has_service, call_async=self._call)
+
+    def create_timer(self, period, callback, callback_group, clock):
+        self.tick = callback
+
+    def _call(self, request):
+        self.requests.append(request.components.components)
+        answer = Future()
+        answer.set_result(
+            SimpleNamespace(scene=scene(box('first', at=pose(y=1.2)), is_diff=False))
+        )
+        return answer
+
+
+class SceneRequest:
+    """The request of moveit_msgs/GetPlanningScene, which need not be installed."""
+
+    def __init__(self):
+        self.components = SimpleNamespace(
+            ROBOT_STATE_ATTACHED_OBJECTS=4, WORLD_OBJECT_GEOMETRY=16, components=0
+        )
+
+
+@pytest.mark.parametrize(
+    ('topic', 'service'),
+    [
+        ('/monitored_planning_scene', '/get_planning_scene'),
+        ('/left/scene', '/left/get_planning_scene'),
+        ('scene', 'get_planning_scene'),
+    ],
+)
+def test_the_scene_that_moveit_has_already_comes_by_its_service(
+    single_cell, monkeypatch, topic, service
+):
+    """The topic has only what changes after the subscription."""
+    monkeypatch.setattr(
+        planning_scene_subscriber, 'class_of', lambda kind: SimpleNamespace(Request=SceneRequest)
+    )
+    driver = single_cell.node.driver
+    node = FakeNode(single_cell.node.get_logger())
+    scenes = PlanningSceneSubscriber(node, driver, single_cell.node.action_server.frames, topic)
+    try:
+        assert node.clients == [service]
+        node.tick()
+        assert node.requests == []
+        node.has_service = True
+        node.tick()
+        node.tick()
+        assert node.requests == [4 | 16]
+        single_cell.spin_until(lambda: driver.cell.names == {'first'})
+        scenes.take(scene(is_diff=False))
+        node.has_service = False
+        node.tick()
+        node.has_service = True  # MoveIt was started again
+        node.tick()
+        single_cell.spin_until(lambda: driver.cell.names == {'first'})
+        assert len(node.requests) == 2
+    finally:
+        scenes.close()
+        driver.change_cell(remove=driver.cell.names)
+
+
+def test_requests_that_wait_are_bounded_and_refused_at_the_end():
+    may_go_on = threading.Event()
+    queue = RequestQueue('wait', lambda request: may_go_on.wait() and request, lambda text: text)
+    first, *others = [queue.submit(k) for k in range(MAX_WAITING_REQUESTS)]
+    assert 'requests to wait wait' in queue.submit(-1).result(timeout=0.0)
+    closing = threading.Thread(target=queue.close)
+    closing.start()
+    assert {each.result(timeout=5.0) for each in others} == {SHUTDOWN_REFUSAL}
+    may_go_on.set()
+    closing.join()
+    assert first.result(timeout=5.0) == 0
+    assert queue.submit(-1).result(timeout=0.0) == SHUTDOWN_REFUSAL
 
 
 def test_bodies_come_as_the_text_of_a_file_and_all_or_nothing_changes(single_cell, change):

@@ -1,6 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""MoveIt's planning scene as bodies of the cell (``planning_scene_topic``)."""
+"""
+MoveIt's planning scene as bodies of the cell (``planning_scene_topic``).
+
+Only changes come by the topic, so the scene as it is comes by a service, when this appears: at the
+start of either node, and again after MoveIt was started anew.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +23,14 @@ from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.goal.known_frames import Frames
 from ur_cartesian_driver.ros.message_fields import class_of
 from ur_cartesian_driver.ros.messages.planning_scene import SceneArm, SceneBodies, updated_scene
+from ur_cartesian_driver.ros.node_endpoints import steady_timer
 
-#: The type of the topic.
-TYPE = 'moveit_msgs/msg/PlanningScene'
+#: The types of the topic and of the service.
+TYPE, SERVICE_TYPE = 'moveit_msgs/msg/PlanningScene', 'moveit_msgs/srv/GetPlanningScene'
+#: The name of the service, in the namespace of the topic.
+SERVICE = 'get_planning_scene'
+#: Time between two looks whether there is the service [s].
+_PERIOD = 1.0
 #: Each message changes the scene of those before it, so none may be lost.
 _QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 
@@ -34,20 +44,41 @@ class PlanningSceneSubscriber:
         self._driver, self._frames = driver, frames
         self._names: frozenset[str] = frozenset()
         self._thread = ThreadPoolExecutor(1, thread_name_prefix='planning scene')
-        kind = class_of(TYPE)
-        if kind is None:
+        self._had_service = False
+        kind, self._service_kind = class_of(TYPE), class_of(SERVICE_TYPE)
+        if kind is None or self._service_kind is None:
             self._logger.error(
                 f'planning_scene_topic is {topic}, but moveit_msgs is not installed: nothing of '
                 'the planning scene is checked.'
             )
             return
+        group = MutuallyExclusiveCallbackGroup()
         self._subscription = node.create_subscription(
-            kind, topic, self._received, _QOS, callback_group=MutuallyExclusiveCallbackGroup()
+            kind, topic, self._received, _QOS, callback_group=group
         )
+        namespace = topic.rpartition('/')[0]
+        self._client: Any = node.create_client(
+            self._service_kind,
+            f'{namespace}/{SERVICE}' if '/' in topic else SERVICE,
+            callback_group=group,
+        )
+        self._timer = steady_timer(node, _PERIOD, self._look_for_service, group)
 
     def close(self) -> None:
         """Take no further scene over."""
         self._thread.shutdown(cancel_futures=True)
+
+    def _look_for_service(self) -> None:
+        """Ask for the whole scene once the service is there."""
+        has_service = self._client.service_is_ready()
+        if has_service and not self._had_service:
+            request: Any = self._service_kind.Request()
+            wanted = request.components
+            wanted.components = wanted.WORLD_OBJECT_GEOMETRY | wanted.ROBOT_STATE_ATTACHED_OBJECTS
+            self._client.call_async(request).add_done_callback(
+                lambda done: self._received(done.result().scene)
+            )
+        self._had_service = has_service
 
     def _received(self, message: Any) -> None:
         with contextlib.suppress(RuntimeError):  # close() was called
