@@ -39,8 +39,8 @@ class RunningPath:
         """
         self._start, self._take_part_change = plan.start, take_part_change
         self._T_flange_active = plan.T_flange_active
-        #: Guards the attributes below, and keeps a change of the cell and its removal from the list
-        #: one step. A listener of the cell may append points meanwhile.
+        #: Guards the attributes below; a change of the cell and its removal from the list are
+        #: one step, in which a listener of the cell may append points.
         self._lock = threading.RLock()
         self._paths = [PathLeft.of(plan, spline or spline_of(plan))]
         #: The changes to come, each with the joints at its point [rad].

@@ -22,7 +22,6 @@ from rclpy.node import Node
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
 from ur_cartesian_driver.ros.node_endpoints import SHUT_DOWN_ERRORS
 
-
 #: Largest number of requests that wait, with all that they hold in memory.
 MAX_WAITING_REQUESTS = 32
 
