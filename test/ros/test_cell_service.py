@@ -147,7 +147,7 @@ def test_the_scene_that_moveit_has_already_comes_by_its_service(
         planning_scene_subscriber, 'class_of', lambda kind: SimpleNamespace(Request=SceneRequest)
     )
     driver = single_cell.node.driver
-    node = FakeNode(single_cell.node.get_logger())
+    node: Any = FakeNode(single_cell.node.get_logger())
     scenes = PlanningSceneSubscriber(node, driver, single_cell.node.action_server.frames, topic)
     try:
         assert node.clients == [service]
