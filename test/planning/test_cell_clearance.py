@@ -112,8 +112,12 @@ def test_the_first_violation_and_the_closest_pair_are_those_of_a_dense_look():
             assert least - AGREE < distance < least + max(0.001, 0.34 * least) + AGREE, number
             counts['clear'] += 1
             continue
-        row, column, distance = result.violation
+        place = result.violation
+        column, distance, row = place.pair, place.distance, place.row
         assert row <= first + 1, number
+        there = place.joints(rows[1:], tuple(rows[0].tolist()))
+        at_place = bodies.distances(column, bodies.poses(np.array([there])), inf)[0]
+        assert at_place < clearances[column] + BEND, number
         # The place is in the row, or between it and the row before.
         begin, end = motion.t[row], motion.t[row + 1]
         near = bodies.poses(motion.at(np.linspace(begin, end, 200)))

@@ -17,14 +17,14 @@ A pair that is too close at the start may separate, as for the arm itself
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
+from math import ceil, floor, inf
 from typing import NamedTuple
 
 import numpy as np
 
 from ur_cartesian_driver.kinematics.cell_distances import CARRIERS, CellDistances
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
-from ur_cartesian_driver.motion.geometry.vectors import Joints
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 
 #: Stretches in which bodies move less than this [m] are not halved any more.
 RESOLUTION = 2e-5
@@ -45,12 +45,24 @@ _CLOSEST_FRACTION, _CLOSEST_LENGTH = 0.25, 0.001
 class Place(NamedTuple):
     """A place of a path at which two bodies are close."""
 
-    #: The first checked row that is not before the place.
-    row: int
+    #: The number of the row before it, and the fraction of the way to the next; -1 = the start.
+    at: float
     #: The number of the pair in :attr:`CellDistances.pairs`.
     pair: int
     #: [m], at most 0 where the bodies touch.
     distance: float
+
+    @property
+    def row(self) -> int:
+        """The first checked row that is not before the place."""
+        return max(ceil(self.at), 0)
+
+    def joints(self, q: Floats, q_start: Joints) -> Joints:
+        """Return the joints at the place [rad]; ``q``: (n, 6) the rows that were checked."""
+        before = floor(self.at)
+        first = np.array(q_start) if before < 0 else q[before]
+        change = q[min(before + 1, len(q) - 1)] - first
+        return vector6((first + (self.at - before) * change).tolist())
 
 
 class CellResult(NamedTuple):
@@ -300,8 +312,7 @@ class _Search:
             nearer = np.flatnonzero(distances[:end] < reached[:end] - _RECEDING_TOLERANCE)
             if len(nearer):
                 k = int(nearer[0])
-                row = offset + int(np.ceil(places[k]))
-                self._violate(Place(row, column, float(distances[k])))
+                self._violate(Place(offset + places[k], column, float(distances[k])))
                 return None
             self._remember(column, places[:end], distances[:end], offset)
             self._pending[column] = float(reached[-1])
@@ -332,10 +343,9 @@ class _Search:
             bad = np.flatnonzero(sure < clearance)
             if len(bad):
                 k = int(bad[0])
-                row = offset + int(np.ceil(middle[k]))
-                self._violate(Place(row, column, float(sure[k])))
+                self._violate(Place(offset + middle[k], column, float(sure[k])))
             if self.violation is not None:
-                open_ &= stretches.begin < self.violation.row - offset
+                open_ &= stretches.begin < self.violation.at - offset
             stretches = stretches.halves(open_)
 
     def _remember(self, column: int, places: Floats, distances: Floats, offset: int) -> None:
@@ -346,11 +356,9 @@ class _Search:
         before = inf if self.closest is None else self.closest.distance
         # Distances that are enough may be smaller than they really are.
         if distances[k] < min(before, self._enough(column)):
-            row = offset + int(np.ceil(places[k]))
-            self.closest = Place(max(row, 0), column, float(distances[k]))
+            self.closest = Place(offset + float(places[k]), column, float(distances[k]))
 
     def _violate(self, place: Place) -> None:
         """Take a violation if it is the first one."""
-        place = place._replace(row=max(place.row, 0))
-        if self.violation is None or place.row < self.violation.row:
+        if self.violation is None or place.at < self.violation.at:
             self.violation = place

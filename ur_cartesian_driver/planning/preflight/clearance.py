@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.cell.cell import Cell, EMPTY_CELL
 from ur_cartesian_driver.motion.errors import CollisionPredicted, NotAvailable
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int32s
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
+from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes, Plane
 from ur_cartesian_driver.motion.goal.goal import PartChange
 from ur_cartesian_driver.planning.options import PlanningOptions
@@ -224,13 +224,15 @@ class Clearance:
         result = clearance.check(q, q_start, closest=seeks_closest)
         pairs, closest = clearance.bodies.pairs, None
         if result.closest is not None:
-            row, number, distance = result.closest
-            names = pairs[number].a, pairs[number].b
-            closest = ClosestInCell(row, names, distance, result.at_least)
+            place = result.closest
+            names = pairs[place.pair].a, pairs[place.pair].b
+            closest = ClosestInCell(place.row, names, place.distance, result.at_least)
         if result.violation is None:
             return None, closest
-        row, number, distance = result.violation
-        return _violation_in_cell(pairs[number], distance, row, vector6(q[row].tolist())), closest
+        place = result.violation
+        there = place.joints(q, q_start)
+        found = _violation_in_cell(pairs[place.pair], place.distance, place.row, there)
+        return found, closest
 
 
 def _violation_in_cell(pair: Pair, distance: float, row: int, q: Joints) -> Violation:
