@@ -15,9 +15,19 @@ from ur_cartesian_driver.kinematics.closed_form import wrist_centre
 from ur_cartesian_driver.kinematics.closed_form_rows import branch_rows, BRANCHES, TargetPoses
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.kinematics.inverse import nearest, solutions
-from ur_cartesian_driver.kinematics.inverse_rows import branch_measures, nearest_rows, solve_path
+from ur_cartesian_driver.kinematics.inverse_rows import (
+    branch_measures,
+    nearest_rows,
+    refine,
+    solve_path,
+)
 from ur_cartesian_driver.kinematics.robot_models import MODELS
-from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row, pose_rows
+from ur_cartesian_driver.motion.geometry.pose import (
+    Pose,
+    pose_from_row,
+    pose_rows,
+    quaternion_from_rotation_vector,
+)
 
 UR5E = Arm(MODELS['ur5e'])
 READY = (0.3, -1.6, 1.9, -1.8, -1.5, 0.4)
@@ -233,6 +243,20 @@ def test_rows_out_of_reach_are_passed_over(calibrated_arm):
         assert np.isnan(path.q[20:30]).all()
         assert np.isnan(path.step[20:30]).all()
         assert path.step[30] < 0.2
+
+
+def test_rows_are_exact_only_at_their_poses_also_in_singularities(singular_postures):
+    for q in (*singular_postures.values(), above_the_shoulder(UR5E)):
+        way = np.linalg.svd(UR5E.jacobian(q))[0][:, -1]  # in which no joint moves the flange
+        for distance in 0.0, *np.geomspace(1e-12, 1e-4, 17):
+            position, turn = np.split(distance * way, 2)
+            wanted = Pose(quaternion=quaternion_from_rotation_vector(tuple(turn))).matrix()
+            wanted[:3, :3] = wanted[:3, :3] @ UR5E.forward(q).matrix()[:3, :3]
+            wanted[:3, 3] = UR5E.forward(q).position + position
+            targets = TargetPoses(tuple(wanted[:3, 3:]), tuple(wanted[:3, :3].reshape(9, 1)))
+            found, exact = refine(UR5E, targets, np.array([q]))
+            miss = np.linalg.norm(UR5E.forward(found[0]).matrix() - wanted)
+            assert miss < 6e-11 if exact else distance > 1e-11
 
 
 def test_a_line_beside_the_axis_of_a_straight_wrist_takes_large_steps():

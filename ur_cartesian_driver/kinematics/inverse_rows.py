@@ -34,13 +34,20 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import pose_from_row
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 
-# Rows per block, so that the intermediate arrays stay in the CPU cache.
-_BLOCK = 1024
+# Rows per block: more would leave the CPU cache. Calls of numpy for fewer, and for the eighth of
+# them from which a calibrated arm begins, would take longer than what they compute.
+_BLOCK = 8192
 # Block size after a row that needed a search; it then grows again.
 _MIN_BLOCK = 16
 
 # Newton's method ends when the squared error (metres and radians) is below this.
 _EXACT = 1e-21
+# It ends without a look at the error, too, behind a step in which all joints together turn by less
+# than this [rad]: the error is at most half the square of the turn, times the distance of the
+# flange from a joint, or 3e-11.
+_LAST_STEP = 5e-6
+# The same for rows that need not be exact, because their shifts are interpolated.
+_NEAR_STEP = 1e-4
 # Largest turn of a joint in one Newton step [rad].
 _MAX_JOINT_STEP = 0.5
 # Number of Newton steps from a solution of the ideal arm: two suffice except near singularities.
@@ -211,15 +218,18 @@ def refine(arm: Arm, targets: TargetPoses, q: Floats) -> tuple[Floats, Flags]:
     if len(every) < 2:
         return _refine(arm, targets, q)
     # Along a path the shifts change slowly: with interpolated ones, one step is enough.
-    refined, exact = _refine(arm, targets.rows(every), q[every])
-    shift = np.where(exact[:, None], refined - q[every], 0.0)
+    refined, near = _refine(arm, targets.rows(every), q[every], _NEAR_STEP)
+    shift = np.where(near[:, None], refined - q[every], 0.0)
     place = np.minimum(np.arange(len(q)) / _STRIDE, len(every) - 1.0)
     before = np.minimum(place.astype(np.intp), len(every) - 2)
     part = (place - before)[:, None]
     return _refine(arm, targets, q + (1.0 - part) * shift[before] + part * shift[before + 1])
 
 
-def _refine(arm: Arm, targets: TargetPoses, q: Floats) -> tuple[Floats, Flags]:
+def _refine(
+    arm: Arm, targets: TargetPoses, q: Floats, last_step: float = _LAST_STEP
+) -> tuple[Floats, Flags]:
+    """Return joint positions (n, 6), and whether the last step to each was as small as this."""
     q = q.copy()
     exact = np.zeros(len(q), dtype=np.bool_)
     active = np.arange(len(q))
@@ -229,16 +239,22 @@ def _refine(arm: Arm, targets: TargetPoses, q: Floats) -> tuple[Floats, Flags]:
         errors = np.array(error)
         squares = np.einsum('in,in->n', errors, errors)
         # The orientation error is a sine, also zero at half a turn, where ``facing`` is -1.
-        done = (facing > 1.0) & (squares < _EXACT)
-        exact[active[done]] = True
-        if step == _STEPS or done.all():
+        faces = facing > 1.0
+        exact[active] = faces & (squares < _EXACT)
+        if step == _STEPS or exact.all():
             break
-        rest = np.flatnonzero(~done)
         columns = jacobian_at(frames, frames.position).T  # by joint, in one piece of memory
-        if len(rest) < len(active):
-            active, targets = active[rest], targets.rows(rest)
-            columns, errors, squares = columns[:, :, rest], errors[:, rest], squares[rest]
-        q[active] += _newton(columns, errors, squares)
+        change = _newton(columns, errors, squares)
+        change[exact[active]] = 0.0
+        q[active] += change
+        # The error to first order: in a singularity a small step may be no help.
+        left = errors - np.einsum('ikn,ni->kn', columns, change)
+        is_solved = np.einsum('in,in->n', left, left) < 0.01 * _EXACT
+        exact[active] |= faces & is_solved & (np.abs(change).sum(axis=1) < last_step)
+        rest = np.flatnonzero(~exact[active])
+        if not len(rest):
+            break
+        active, targets = active[rest], targets.rows(rest)
     return q, exact
 
 
