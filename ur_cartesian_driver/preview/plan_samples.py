@@ -9,8 +9,6 @@ times are predictions for full speed; the robot uses its own speed profile.
 
 from __future__ import annotations
 
-from bisect import bisect_left
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -19,17 +17,18 @@ from math import ceil, degrees
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.vectors import ZERO6
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.plan import Plan, PlannedSegment, ReferencePath
-from ur_cartesian_driver.motion.plan.primitive import MoveJ, OptimoveJ, OptimoveL, Spline, Stop
-
-# Times that differ by less than this [s] are the same.
-_INSTANT = 1e-9
+from ur_cartesian_driver.motion.plan.primitive import OptimoveJ, OptimoveL, Spline, Stop
+from ur_cartesian_driver.planning.preflight.planned_joints import (
+    joint_moves,
+    joints_along,
+    row_places,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -58,19 +57,15 @@ def sample(plan: Plan, arm: Arm, T_flange_tcp: Pose, period: float) -> Preview:
     reference = plan.reference
     end = float(reference.time[-1])
     time = np.minimum(np.arange(ceil(end / period - 1e-9) + 1) * period, end)
-    # If rows have the same time, the last of them is used.
-    row = np.clip(
-        np.searchsorted(reference.time, time, side='right') - 1, 0, max(len(reference.time) - 2, 0)
-    )
-    span = reference.time[np.minimum(row + 1, len(reference.time) - 1)] - reference.time[row]
-    fraction = np.clip((time - reference.time[row]) / np.where(span > 0.0, span, 1.0), 0.0, 1.0)
-    fraction[time >= end] = 1.0
-    poses = [_between(reference, int(k), float(f)) for k, f in zip(row, fraction, strict=True)]
+    places = row_places(reference, time)
+    row = np.minimum(places.astype(np.intp), max(len(reference.time) - 2, 0))
+    poses = [_between(reference, int(k), float(f)) for k, f in zip(row, places - row, strict=True)]
     tcp = T_flange_tcp if plan.T_flange_tcp is None else plan.T_flange_tcp
     if plan.execution.traits.is_spline:
         joints = _spline(plan).rows(time)[0]
     else:
-        joints = _joints(plan, arm, tcp.inverse(), poses, row + fraction)
+        flange = np.array([(pose @ tcp.inverse()).row() for pose in poses])
+        joints = joints_along(arm, flange, places, joint_moves(plan), plan.start)
     return Preview(time=time, poses=np.array([pose.row() for pose in poses]), joints=joints)
 
 
@@ -156,61 +151,3 @@ def _between(reference: ReferencePath, row: int, fraction: float) -> Pose:
     return pose_from_row(reference.poses[row]).interpolate(
         pose_from_row(reference.poses[after]), fraction
     )
-
-
-def _joints(
-    plan: Plan, arm: Arm, T_tcp_flange: Pose, poses: list[Pose], row_position: Floats
-) -> Floats:
-    """
-    Return joint positions for poses at row positions (row + fraction) of the reference path.
-
-    Each row is the solution nearest to the previous one. In joint moves, which may pass through
-    singularities where branches meet, it is the solution nearest to the straight joint line.
-    """
-    lines = _joint_moves(plan)
-    firsts = [line.first for line in lines]
-    rows = np.full((len(poses), 6), np.nan)
-    q = plan.start
-    for k, (pose, position) in enumerate(zip(poses, row_position.tolist(), strict=True)):
-        line = lines[bisect_left(firsts, position) - 1] if lines else None
-        q_near = line.at(position) if line and line.first < position <= line.last else q
-        found = nearest(arm, pose @ T_tcp_flange, q_near)
-        if found is not None:
-            rows[k] = q = found
-    return rows
-
-
-@dataclass(frozen=True, slots=True)
-class _JointMove:
-    """A joint move between two rows of the reference path; its rows are evenly spaced."""
-
-    q_start: Joints
-    q_end: Joints
-    first: int
-    last: int
-
-    def at(self, row_position: float) -> Joints:
-        u = min(1.0, max(0.0, (row_position - self.first) / max(1, self.last - self.first)))
-        return vector6(x + u * (y - x) for x, y in zip(self.q_start, self.q_end, strict=True))
-
-
-def _joint_moves(plan: Plan) -> list[_JointMove]:
-    """Return the joint moves in order."""
-    reference, planned = plan.reference, plan.rows
-    ends = np.cumsum(planned.durations)
-    # A travel has several motions to the same point; their rows are told apart by their times.
-    shared = Counter(planned.waypoints.tolist())
-    lines = []
-    q = plan.start
-    for segment, end in zip(plan.segments, ends.tolist(), strict=True):
-        if isinstance(segment.primitive, MoveJ | OptimoveJ):
-            first, last = np.searchsorted(
-                reference.point, [segment.waypoint, segment.waypoint + 1]
-            )
-            if shared[segment.waypoint] > 1:
-                times = [end - segment.duration + _INSTANT, end + _INSTANT]
-                begin, stop = np.searchsorted(reference.time, times)
-                first, last = max(first, begin), min(last, stop)
-            lines.append(_JointMove(q, segment.joints, max(0, int(first) - 1), int(last) - 1))
-        q = segment.joints
-    return lines

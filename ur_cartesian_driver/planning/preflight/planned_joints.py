@@ -1,0 +1,117 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The joints along the reference path of a plan.
+
+A plan keeps poses. Along lines and arcs the arm stays on its branch of solutions, so each solution
+is the one nearest to that before. A joint move may pass through singularities, where branches
+meet: there it is the solution nearest to the straight line between the joints at both ends.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows, solve_path
+from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
+from ur_cartesian_driver.motion.plan.plan import Plan, ReferencePath
+from ur_cartesian_driver.motion.plan.primitive import MoveJ, OptimoveJ
+
+# Times that differ by less than this [s] are the same.
+_INSTANT = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class JointMove:
+    """A joint move between two rows of the reference path; its rows are evenly spaced."""
+
+    q_start: Joints
+    q_end: Joints
+    first: int
+    last: int
+
+    def at(self, places: Floats) -> Floats:
+        """Return the joints (n, 6) [rad] on the straight line at places between rows (n,)."""
+        start = np.array(self.q_start)
+        u = np.clip((places - self.first) / max(1, self.last - self.first), 0.0, 1.0)
+        joints: Floats = start + u[:, None] * (np.array(self.q_end) - start)
+        return joints
+
+
+def joint_moves(plan: Plan) -> tuple[JointMove, ...]:
+    """Return the joint moves of a plan in order."""
+    reference, planned = plan.reference, plan.rows
+    ends = np.cumsum(planned.durations)
+    # A travel has several motions to the same point; their rows are told apart by their times.
+    shared = Counter(planned.waypoints.tolist())
+    moves = []
+    q = plan.start
+    for segment, end in zip(plan.segments, ends.tolist(), strict=True):
+        if isinstance(segment.primitive, MoveJ | OptimoveJ):
+            first, last = np.searchsorted(
+                reference.point, [segment.waypoint, segment.waypoint + 1]
+            )
+            if shared[segment.waypoint] > 1:
+                times = [end - segment.duration + _INSTANT, end + _INSTANT]
+                begin, stop = np.searchsorted(reference.time, times)
+                first, last = max(first, begin), min(last, stop)
+            moves.append(JointMove(q, segment.joints, max(0, int(first) - 1), int(last) - 1))
+        q = segment.joints
+    return tuple(moves)
+
+
+def row_places(reference: ReferencePath, time: Floats) -> Floats:
+    """
+    Return the places of times between the rows of a path: row + fraction (n,).
+
+    If rows have the same time, the last of them is used.
+
+    :param time: (n,) [s].
+    """
+    row = np.clip(
+        np.searchsorted(reference.time, time, side='right') - 1, 0, max(len(reference.time) - 2, 0)
+    )
+    span = reference.time[np.minimum(row + 1, len(reference.time) - 1)] - reference.time[row]
+    fraction = np.clip((time - reference.time[row]) / np.where(span > 0.0, span, 1.0), 0.0, 1.0)
+    fraction[time >= reference.time[-1]] = 1.0
+    places: Floats = row + fraction
+    return places
+
+
+def joints_along(
+    arm: Arm, flange_poses: Floats, places: Floats, moves: Sequence[JointMove], start: Joints
+) -> Floats:
+    """
+    Return the joints (n, 6) [rad] for poses of the flange in order; NaN where none is found.
+
+    :param flange_poses: (n, 7).
+    :param places: (n,) where they are between the rows of the reference path.
+    :param moves: the joint moves of the path.
+    :param start: the joints before the first pose [rad].
+    """
+    joints = np.empty((len(places), 6))
+    done = 0
+
+    def follow(end: int) -> None:
+        before = joints[:done][~np.isnan(joints[:done, 0])]
+        q = vector6(before[-1].tolist()) if len(before) else start
+        solved = solve_path(arm, flange_poses[done:end], q)
+        joints[done:end] = np.where(solved.found[:, None], solved.q, np.nan)
+
+    for move in moves:
+        first, end = np.searchsorted(places, [move.first, move.last], side='right').tolist()
+        if first >= end:
+            continue
+        if first > done:
+            follow(first)
+        joints[first:end] = nearest_rows(arm, flange_poses[first:end], move.at(places[first:end]))
+        done = end
+    if done < len(places):
+        follow(len(places))
+    return joints
