@@ -36,6 +36,8 @@ _PARTS = 8
 _RECEDING_TOLERANCE = 1e-4
 # How far bodies of such a pair move between two places where it is measured, at most [m].
 _LEAVING_STEP = 0.002
+# Places between two rows at which a pair that is too close there is measured.
+_LOOKS = 9
 # Larger than any distance in a cell [m].
 _FAR = 1e3
 # The smallest distance of a path is found to this fraction of itself, or to this length [m].
@@ -342,11 +344,18 @@ class _Search:
             open_ = (sure < enough + reach) & (reach > RESOLUTION)
             bad = np.flatnonzero(sure < clearance)
             if len(bad):
-                k = int(bad[0])
-                self._violate(Place(offset + middle[k], column, float(sure[k])))
+                self._violate(self._nearest(column, motion, float(middle[bad[0]]), offset))
             if self.violation is not None:
                 open_ &= stretches.begin < self.violation.at - offset
             stretches = stretches.halves(open_)
+
+    def _nearest(self, column: int, motion: _Motion, place: float, offset: int) -> Place:
+        """Return the place at which a pair is nearest between the two rows around a place."""
+        places = np.append(np.linspace(floor(place), ceil(place), _LOOKS), place)
+        sure = self._bodies.distances(column, motion.at(places), inf)
+        sure = sure - motion.bend(places, self._bodies.carriers[column])
+        k = int(np.argmin(sure))
+        return Place(offset + float(places[k]), column, float(sure[k]))
 
     def _remember(self, column: int, places: Floats, distances: Floats, offset: int) -> None:
         """Take the closest place if it is closer than all before."""
