@@ -3,11 +3,14 @@
 """Frames from touches: of tools that stand in the cell, and of parts in the hand."""
 
 import re
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from ur_cartesian_driver.cli import main
+from ur_cartesian_driver.cli.teach_command import guide
 from ur_cartesian_driver.cli.teach_frames import FixedToolLesson, HeldPartLesson
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -156,6 +159,67 @@ def test_random_frames_are_found_whatever_they_are():
 def test_what_is_missing_is_said_before_the_robot_is_connected(capsys, arguments, text):
     assert main(['teach', *arguments, '--wait', '0', '--rtde-port', '1']) == 1
     assert text in capsys.readouterr().err
+
+
+class GuidedArm:
+    """A driver whose arm is guided by hand."""
+
+    def __init__(self, states):
+        self._states = iter(states)
+
+    @property
+    def state(self):
+        return next(self._states)
+
+    def start_freedrive(self, on_begin):
+        on_begin()
+        return SimpleNamespace(
+            add_done_callback=lambda call: None,
+            done=lambda: False,
+            cancel=lambda: None,
+            result=lambda timeout: None,
+        )
+
+
+def test_touches_that_make_no_frame_are_lost_only_by_a_second_q():
+    lesson, said = FixedToolLesson('belt'), []  # type: FixedToolLesson, list[str]
+    states = [
+        touching(TOOL.position),
+        touching(TOOL.position, 0.5),
+        touching(TOOL.apply((0.0, 0.0, -0.05))),
+        touching(TOOL.apply((0.04, 0.0, -0.01))),
+    ]
+    keys = iter(['', '', 'z', 'q', 'x', 'q', 'not read'])
+    arm: Any = GuidedArm(states)
+    guide(arm, lesson, keys, said.append)
+    assert next(keys) == 'not read'
+    assert 'has 2 touches of the tip, 1 behind it and 0 towards x' in said[4]
+    assert said[4].endswith('Go on, or end without a frame by another q.')
+    assert frame_of(lesson.report()[0]).T_parent_frame.distance_to(TOOL) < 1e-6
+    keys = iter(['', 'q', 'q', 'not read'])
+    arm = GuidedArm(states)
+    guide(arm, FixedToolLesson('belt'), keys, said.append)
+    assert next(keys) == 'not read'
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'option', 'text'),
+    [
+        (['--fixed-tool', 'belt', '--speed', '0.1'], '--speed', 'for a path'),
+        (['--held-part', 'box', '--blend', '1mm'], '--blend', 'for a path'),
+        (['--fixed-tool', 'belt', '-o', 'belt.yaml'], '--output', 'for a path'),
+        (['--fixed-tool', 'belt', '--point', '0,0,0'], '--point', 'for a held part'),
+        (['--tip', '0,0,0'], '--tip', 'for a held part'),
+    ],
+)
+def test_options_of_another_lesson_are_refused(
+    capsys, tmp_path, monkeypatch, arguments, option, text
+):
+    monkeypatch.chdir(tmp_path)
+    assert main(['teach', *arguments, '--wait', '0', '--rtde-port', '1']) == 1
+    said = capsys.readouterr().err
+    assert option in said
+    assert text in said
 
 
 @pytest.mark.parametrize('wrong', ['1,2', 'x,0,0', '0,0,99'])

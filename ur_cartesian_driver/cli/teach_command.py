@@ -38,6 +38,7 @@ def teach_path(arguments: argparse.Namespace) -> int:
 
     :raises OSError: the file cannot be written any more; the goal is printed instead.
     """
+    _check_options(arguments)
     if arguments.fixed_tool or arguments.held_part:
         return teach_frame(arguments)
     lesson = Lesson(Path().at(speed=arguments.speed, blend=arguments.blend))
@@ -80,6 +81,28 @@ def teach_frame(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _check_options(arguments: argparse.Namespace) -> None:
+    """
+    Refuse options of what is not taught.
+
+    :raises InvalidGoal: one is given.
+    """
+    others: tuple[str, ...] = ()
+    if arguments.fixed_tool or arguments.held_part:
+        others = 'output', 'speed', 'blend'
+    if not arguments.held_part:
+        others = *others, 'point', 'tip'
+    for name in others:
+        if getattr(arguments, name) not in (None, []):
+            raise InvalidGoal(
+                f'--{name}',
+                'is given, but is for a held part'
+                if name in ('point', 'tip')
+                else 'is given, but is for a path, and what is taught is a frame',
+                'leave it out',
+            )
+
+
 def save(path: Path, file: str) -> None:
     """
     Write a path to a file, or print it if that fails, since nobody can take its points again.
@@ -101,6 +124,8 @@ def guide(
     """
     Keep freedrive on while keys are read, and end it afterwards, even after an error.
 
+    The key q ends a lesson that is incomplete only if it comes twice.
+
     :raises RobotNotReady: freedrive does not begin, or ends by itself.
     """
     active = threading.Event()
@@ -110,11 +135,16 @@ def guide(
         if not active.wait(FREEDRIVE_TIME):
             raise RobotNotReady('The robot has not begun freedrive.')
         say(lesson.HELP)
+        missing = ''
         for key in keys:
             if freedrive.done():
                 raise RobotNotReady(f'Freedrive has ended: {freedrive.result().text}')
             if key == 'q':
-                return
+                if missing or not (missing := lesson.missing()):
+                    return
+                say(f'{missing} Go on, or end without a frame by another q.')
+                continue
+            missing = ''
             state = driver.state
             try:
                 say('no state of the robot' if state is None else lesson.press(key, state))
@@ -133,6 +163,9 @@ class Taught(Protocol):
 
     def press(self, key: str, state: RobotState) -> str:
         """Carry out a key, and return a text about the result; InvalidGoal = not taken."""
+
+    def missing(self) -> str:
+        """Return a sentence that says what the lesson lacks; '' = it may end."""
 
 
 class Lesson:
@@ -179,6 +212,10 @@ class Lesson:
         self._paths.append(path)
         self._via = None
         return f'point {len(path) - 1}: {name} to {_place(pose)}'
+
+    def missing(self) -> str:
+        """Return '': a path may have any number of points."""
+        return ''
 
     def _undo(self) -> str:
         if self._via is not None:

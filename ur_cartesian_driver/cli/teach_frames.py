@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar
 
@@ -23,7 +24,27 @@ MIN_TIPS, MIN_POINTS = 2, 4
 _MIN_DISTANCE = 0.005
 
 
-class FixedToolLesson:
+class _FrameLesson(ABC):
+    """Touches that make a frame."""
+
+    @abstractmethod
+    def report(self) -> list[str]:
+        """
+        Return the frame as a row of ``static_frames``, and the residuals.
+
+        :raises InvalidGoal: there are too few touches, or they make no frame.
+        """
+
+    def missing(self) -> str:
+        """Return a sentence: why the touches make no frame yet; '' = they do."""
+        try:
+            self.report()
+        except InvalidGoal as error:
+            return str(error)
+        return ''
+
+
+class FixedToolLesson(_FrameLesson):
     """
     A tool that stands in the cell, touched with the TCP.
 
@@ -53,11 +74,7 @@ class FixedToolLesson:
         return f'touch {len(self._touches)}: {what}'
 
     def report(self) -> list[str]:
-        """
-        Return the frame as a row of ``static_frames``, and the residuals.
-
-        :raises InvalidGoal: there are too few touches, or they make no axes.
-        """
+        """Return the row and the residuals of the tip."""
         tips, behind, beside = (
             np.array([place for kind, place in self._touches if kind == wanted]).reshape(-1, 3)
             for wanted in ('', 'z', 'x')
@@ -89,7 +106,7 @@ class FixedToolLesson:
         ]
 
 
-class HeldPartLesson:
+class HeldPartLesson(_FrameLesson):
     """
     A part in the hand, whose known points touch the tip of a fixed tool one after the other.
 
@@ -133,11 +150,7 @@ class HeldPartLesson:
         return f'point {k + 1} of {count}, at {place} mm on the part'
 
     def report(self) -> list[str]:
-        """
-        Return the frame as a row of ``static_frames``, and the residuals.
-
-        :raises InvalidGoal: there are too few touches, or they are on a line.
-        """
+        """Return the row and the residuals of the points."""
         count = len(self._touches)
         if count < MIN_POINTS:
             raise InvalidGoal(
