@@ -24,7 +24,7 @@ from rclpy.action.client import ActionClient
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
-from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.events import Outcome, PathPlace, Progress
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY
 from ur_cartesian_driver.motion.goal.joint_goal import JointGoal, JointPoint
 from ur_cartesian_driver.motion.goal.joint_goal import JointTolerance as OurTolerance
@@ -166,6 +166,10 @@ def test_every_code_of_ours_has_one_of_the_action_and_no_failure_is_successful()
             assert result.error_string == f'{code.name}: Why.'
     assert joint_error_code(ErrorCode.COLLISION) is ErrorCode.INVALID_GOAL
     assert joint_error_code(ErrorCode.PROTECTIVE_STOP) is ErrorCode.PATH_TOLERANCE_VIOLATED
+    moved = Outcome(
+        code=ErrorCode.COLLISION, text='Why.', stopped=PathPlace(point=1, fraction=0.5)
+    )
+    assert joint_result(Result, moved).error_code == Result.PATH_TOLERANCE_VIOLATED
 
 
 class JointClient:

@@ -95,7 +95,10 @@ def joint_result(make: type[Any], outcome: Outcome) -> Message:
     """
     name = '' if outcome.succeeded else f'{outcome.code.name}: '
     message = make()
-    message.error_code = int(joint_error_code(outcome.code))
+    code = joint_error_code(outcome.code)
+    if outcome.code is ErrorCode.COLLISION and outcome.stopped is not None:
+        code = ErrorCode.PATH_TOLERANCE_VIOLATED  # the cell has changed: the arm had moved
+    message.error_code = int(code)
     message.error_string = f'{name}{outcome.text}'
     return message
 
