@@ -225,6 +225,43 @@ def test_a_part_moves_with_the_tool_from_where_it_is_taken_to_where_it_is_put_do
     assert re.search(r'<title>[^<]*part</title>', page)
 
 
+@pytest.mark.slow
+def test_a_body_on_the_active_tcp_stays_there_if_a_goal_leads_another_place_of_the_tool():
+    nozzle = CellBody(name='nozzle', shapes=(PlacedShape(Sphere(0.01)),), frame='tool0_controller')
+    start = ARM.forward(Q) @ TCP
+    behind = Pose(tuple(np.add(start.position, (0.0, 0.05, 0.0)).tolist()), start.quaternion)
+    goal = Goal(
+        waypoints=(Waypoint(pose=behind),), T_flange_controlled=TCP @ Pose((0.0, 0.0, -0.04))
+    )
+    options = PlanningOptions(cell=Cell(bodies=(nozzle,)))
+    made = plan(goal, state_at_rest(ARM, Q, TCP), ARM, options)
+    assert made.T_flange_tcp != TCP
+    for scene in scenes_of(motion_page(made, ARM, options)).values():
+        wrist = node_pose(scene, '/arm/wrist_3')
+        nozzle_pose = wrist @ TCP.matrix()
+        assert np.allclose(node_pose(scene, '/cell/0'), nozzle_pose, atol=1e-5)
+
+
+@pytest.mark.slow
+def test_a_page_without_the_options_of_the_plan_has_no_cell():
+    part = CellBody(name='part', shapes=(PlacedShape(Sphere(0.02)),), T_frame_body=PLACE)
+    start = ARM.forward(Q) @ TCP
+    goal = Goal(
+        waypoints=(
+            Waypoint(
+                pose=Pose(
+                    tuple(np.add(start.position, (0.0, 0.05, 0.0)).tolist()), start.quaternion
+                )
+            ),
+        ),
+        part_changes=(PartChange(waypoint=0, body='part'),),
+    )
+    options = PlanningOptions(cell=Cell(bodies=(part,)))
+    made = plan(goal, state_at_rest(ARM, Q, TCP), ARM, options)
+    (scene, *_) = scenes_of(motion_page(made, ARM)).values()
+    assert not any(message.get('name', '').startswith('/cell') for _, message in scene)
+
+
 def test_of_a_cloud_of_triangles_some_are_drawn():
     """None of them has two corners nearby, and none shares a corner."""
     corners = np.random.default_rng(0).uniform(-1.0, 1.0, (30_000, 3))

@@ -113,22 +113,24 @@ def motion_page(plan: Plan, arm: Arm, options: PlanningOptions = NO_BODIES) -> s
     colourings = (_by_type(plan), _by_speed(plan), _by_margin(plan, arm, preview))
     pages = {}
     tcp = plan.T_flange_tcp or plan.T_flange_active
-    cells = _cells(plan, preview, arm, tcp, options.cell)
+    cells = _cells(plan, preview, arm, options.cell)
     with serve(parse_planes(options.workspace_planes)) as server:
-        scene = scene_of_plan(server, arm, tcp, plan, options.cell)
+        scene = scene_of_plan(server, arm, tcp, plan, options.cell, plan.T_flange_active)
         for colouring in colourings:
             scene.add_path(plan.reference.poses[:, :3], colouring.colours)
             pages[colouring.name] = scene.record(preview.time, preview.joints, cells)
     texts = _preformatted((table(plan), '\n'.join(plan.report)))
-    curve = _closest_pairs(preview, cells, arm, tcp, options) if options.cell else ''
+    curve = _closest_pairs(plan, preview, cells, arm, options) if options.cell else ''
     return _page(pages, _legends(colourings) + curve + texts)
 
 
-def _cells(plan: Plan, preview: Preview, arm: Arm, tcp: Pose, cell: Cell) -> dict[int, Cell]:
+def _cells(plan: Plan, preview: Preview, arm: Arm, cell: Cell) -> dict[int, Cell]:
     """Return the cell from each row of the samples on at which the tool takes or leaves a part."""
     cells = {0: cell}
+    if not cell:  # the options of the plan are not known: nothing of its cell is drawn
+        return cells
     for change in sorted(plan.goal.part_changes, key=lambda each: each.waypoint):
-        cell = changed(cell, change, arm, joints_at(plan, change.waypoint), tcp)
+        cell = changed(cell, change, arm, joints_at(plan, change.waypoint), plan.T_flange_active)
         reference = plan.reference
         last = int(np.searchsorted(reference.point, change.waypoint, side='right')) - 1
         cells[int(np.searchsorted(preview.time, reference.time[last]))] = cell
@@ -136,9 +138,11 @@ def _cells(plan: Plan, preview: Preview, arm: Arm, tcp: Pose, cell: Cell) -> dic
 
 
 def _closest_pairs(
-    preview: Preview, cells: dict[int, Cell], arm: Arm, tcp: Pose, options: PlanningOptions
+    plan: Plan, preview: Preview, cells: dict[int, Cell], arm: Arm, options: PlanningOptions
 ) -> str:
     """Return the curves of the closest pairs over time."""
+    active = plan.T_flange_active
+    tip = plan.T_flange_tcp or active
     known = ~np.isnan(preview.joints.sum(axis=1))
     curves = ''
     titles = dict.fromkeys(title for cell in cells.values() for title in groups_of_pairs(cell))
@@ -147,7 +151,7 @@ def _closest_pairs(
         for begin, end in pairwise([*cells, len(known)]):
             rows = begin + np.flatnonzero(known[begin:end])
             cell = groups_of_pairs(cells[begin]).get(title, EMPTY_CELL)
-            clearance = Clearance(arm, tcp, replace(options, cell=cell))
+            clearance = Clearance(arm, tip, replace(options, cell=cell), active)
             distances[rows], names = clearance.closest(preview.joints[rows])
             for row, (a, b) in zip(rows.tolist(), names, strict=True):
                 pairs[row] = f'{a} and {b}'
@@ -156,10 +160,19 @@ def _closest_pairs(
 
 
 def scene_of_plan(
-    server: Server, arm: Arm, tcp: Pose, plan: Plan | None, cell: Cell = EMPTY_CELL
+    server: Server,
+    arm: Arm,
+    tcp: Pose,
+    plan: Plan | None,
+    cell: Cell = EMPTY_CELL,
+    T_flange_active: Pose | None = None,
 ) -> Scene:
-    """Return a scene with arm and cell and, if a plan is given, its points, outputs and path."""
-    scene = Scene(server, arm, tcp, cell)
+    """
+    Return a scene with arm and cell and, if a plan is given, its points, outputs and path.
+
+    :param T_flange_active: see :class:`Scene`.
+    """
+    scene = Scene(server, arm, tcp, cell, T_flange_active=T_flange_active)
     if plan is not None:
         if plan.goal.moving_frame is not None:
             scene.hold(plan.goal.moving_frame, plan.start)

@@ -62,10 +62,14 @@ class Scene:
         tcp: Pose,
         cell: Cell = EMPTY_CELL,
         touching: Collection[str] = (),
+        T_flange_active: Pose | None = None,
     ) -> None:
         """
         Draw the arm and the cell, each shape in the frame of its link.
 
+        :param tcp: the TCP to which the tool is drawn.
+        :param T_flange_active: the active TCP, which carries bodies in ``tool0_controller``; None
+            = that of the tool.
         :param touching: names of bodies, and of links as in :data:`~.cell.LINK_NAMES`, that are
             drawn in red.
         """
@@ -73,7 +77,7 @@ class Scene:
 
         self._server, self._scene = server, server.scene
         self._frames = LinkFrames(arm)
-        self._touching = touching
+        self._touching, self._active = touching, T_flange_active
         #: The node in whose frame the path is, '' = the base; the pose of this frame at the start.
         self._path_root, self._T_base_path = '', IDENTITY
         self._links = [self._scene.add_frame(name, show_axes=False) for name in _LINK_NODES]
@@ -134,7 +138,7 @@ class Scene:
         #: Of each body that the arm carries: its node, its link and ``T_link_body``.
         self._carried = []
         for node, body in zip(self._bodies, cell.bodies, strict=True):
-            link, T_link_body = T_carrier_body(body, self._frames, self._tcp)
+            link, T_link_body = T_carrier_body(body, self._frames, self._active or self._tcp)
             if link > 0:
                 self._carried.append((node, link, T_link_body))
             else:

@@ -166,10 +166,10 @@ class Clearance:
         Return how close the bodies of the cell are to the arm and to what it carries.
 
         :param q: (n, 6) [rad].
-        :returns: (n,) the smallest distance [m], infinite in an empty cell, and the pair that has
-            it.
+        :returns: (n,) the smallest distance [m], infinite if no pair is measured, and the pair
+            that has it.
         """
-        if self._cell is None:
+        if self._cell is None or not self._cell.bodies.pairs:
             return np.full(len(q), inf), [('', '')] * len(q)
         distances, numbers = self._cell.bodies.closest(q)
         pairs = self._cell.bodies.pairs
