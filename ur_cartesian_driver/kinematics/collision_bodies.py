@@ -85,8 +85,8 @@ _BODIES: tuple[tuple[Link, _Kind, int], ...] = (
 _CUT = 0.46
 # Rows per block, so that the intermediate arrays stay in the CPU cache.
 _BLOCK = 2048
-# The same where all pairs of bodies are compared at once.
-_PAIR_BLOCK = 256
+# The same for pairs of bodies, each of which has so many rows.
+_PAIR_ROWS = 12288
 # Of this many consecutive rows, the middle one bounds the distances of the others.
 _STRIDE = 16
 # Calibration makes no arm longer than its model by more than this [m].
@@ -232,11 +232,12 @@ class CollisionBodies:
         begins = np.flatnonzero(np.diff(links, prepend=-1))
         of_pair = np.repeat(np.arange(len(begins)), np.diff(begins, append=len(links)))
         result = np.empty((len(q), len(begins)))
+        block = max(1, _PAIR_ROWS // len(links))
         for begin in range(0, len(q), _BLOCK):
             start, vector, axis = self._skeletons(self._lines(q[begin : begin + _BLOCK]))
             rows = result[begin : begin + _BLOCK]
-            for row in range(0, len(rows), _PAIR_BLOCK):
-                some = slice(row, row + _PAIR_BLOCK)
+            for row in range(0, len(rows), block):
+                some = slice(row, row + block)
                 skeletons = start[..., some], vector[..., some], axis[..., some]
                 distances = self._body_distances(skeletons, one, other)
                 least = np.minimum.reduceat(distances, begins)
