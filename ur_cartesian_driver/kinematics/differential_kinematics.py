@@ -84,7 +84,10 @@ def largest_joint_rates(
     """
     at = _jacobians(arm, T_flange_tcp, q)
     inverse = np.linalg.inv(at.jacobian + _MIN_SINGULAR_VALUE * np.eye(6))
-    travel, turn = (np.linalg.norm(inverse[:, :, part], axis=2) for part in _TRAVEL_AND_TURN)
+    squares = inverse * inverse
+    travel, turn = (
+        np.sqrt(np.einsum('ijk->ij', squares[:, :, part])) for part in _TRAVEL_AND_TURN
+    )
     qd: Floats = rates[0] * travel + rates[1] * turn
     # Constant joint rates accelerate the TCP by at most the square of their sum times its reach.
     bias = qd.sum(axis=1)[:, None] ** 2

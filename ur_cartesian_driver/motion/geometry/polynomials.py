@@ -65,18 +65,18 @@ def quintic_rows(duration: Floats, start: MotionRows, end: MotionRows) -> Floats
 
 def values(coefficients: Floats, t: Floats) -> Floats:
     """
-    Return the values of polynomials, without derivatives: (m, k) or (m, c, k).
+    Return the values of polynomials, without derivatives: (m, k) or (c, m, k).
 
     :param coefficients: (m, 6, k).
-    :param t: (m,) or (m, c): one time, or c times, since each piece began [s].
+    :param t: (m,) or (c, m): one time, or c times, since each piece began [s].
     """
-    if t.ndim > 1:
-        coefficients = coefficients[:, :, None]
-    t = t[..., None]
-    x = coefficients[:, 5] * t + coefficients[:, 4]
+    # In one piece of memory: steps from row to row would take as long as several products.
+    powers = np.ascontiguousarray(coefficients.swapaxes(0, 1))
+    t = np.repeat(t[..., None], powers.shape[2], axis=-1)
+    x: Floats = powers[5] * t + powers[4]
     for power in range(3, -1, -1):
         x *= t
-        x += coefficients[:, power]
+        x += powers[power]
     return x
 
 
@@ -87,8 +87,8 @@ def evaluate(coefficients: Floats, t: Floats) -> MotionRows:
     :param coefficients: (m, 6, k).
     :param t: (m,) times since the pieces began [s].
     """
-    t = t[:, None]
     x = coefficients[:, 5].copy()
+    t = np.repeat(t[:, None], x.shape[1], axis=1)  # see values
     v, a = np.zeros_like(x), np.zeros_like(x)
     for power in range(4, -1, -1):  # Horner, with both derivatives
         a *= t

@@ -60,7 +60,7 @@ def distance_rows(a: Floats, b: Floats) -> Floats:
 def angle_rows(a: Floats, b: Floats) -> Floats:
     """Return the angles between orientations (n, 4) [rad], within [0, pi]."""
     turn = multiply_rows(conjugate_rows(a), b)
-    angle: Floats = 2.0 * np.arctan2(np.linalg.norm(turn[:, :3], axis=1), np.abs(turn[:, 3]))
+    angle: Floats = 2.0 * np.arctan2(length_rows(turn[:, :3]), np.abs(turn[:, 3]))
     return angle
 
 
@@ -141,8 +141,7 @@ def _turned_rows(a: Floats, b: Floats, fraction: Floats) -> Floats:
 
 def normalized_rows(quaternions: Floats) -> Floats:
     """Return quaternions (n, 4) scaled to length 1."""
-    lengths: Floats = np.linalg.norm(quaternions, axis=1)
-    return quaternions / lengths[:, None]
+    return quaternions / length_rows(quaternions)[:, None]
 
 
 def keep_hemisphere(poses: Floats) -> None:

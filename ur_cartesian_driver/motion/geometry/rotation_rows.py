@@ -21,7 +21,7 @@ import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.polynomials import MotionRows
-from ur_cartesian_driver.motion.geometry.pose_rows import cross_rows
+from ur_cartesian_driver.motion.geometry.pose_rows import cross_rows, length_rows
 
 # Number of terms of the series: exact up to rounding for rotations of up to two full turns.
 _TERMS = 26
@@ -34,14 +34,14 @@ _MIN_LENGTH = 1e-150
 
 def exp_rows(r: Floats) -> Floats:
     """Return the unit quaternions (n, 4) of rotation vectors (n, 3) [rad]."""
-    half = 0.5 * np.linalg.norm(r, axis=1)[:, None]
+    half = 0.5 * length_rows(r)[:, None]
     return np.concatenate([0.5 * np.sinc(half / np.pi) * r, np.cos(half)], axis=1)
 
 
 def log_rows(quaternions: Floats) -> Floats:
     """Return the rotation vectors (n, 3) of unit quaternions (n, 4), with angles in [0, pi]."""
     upper = np.where(quaternions[:, 3:] < 0.0, -1.0, 1.0) * quaternions
-    length = np.linalg.norm(upper[:, :3], axis=1)
+    length = length_rows(upper[:, :3])
     scale = np.where(
         length < 1e-9, 2.0, 2.0 * np.arctan2(length, upper[:, 3]) / np.maximum(length, _MIN_LENGTH)
     )

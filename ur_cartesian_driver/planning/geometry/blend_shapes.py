@@ -18,6 +18,7 @@ from ur_cartesian_driver.motion.geometry.pose import N
 from ur_cartesian_driver.motion.geometry.pose_rows import (
     angle_rows,
     conjugate_rows,
+    length_rows,
     multiply_rows,
     normalized_rows,
 )
@@ -79,8 +80,8 @@ class BlendShapes:
     def lengths(self) -> Floats:
         """Return the lengths of blends between lines [m]: of arcs (``fillet``) or parabolas."""
         arc = self._circle_radii() * (np.pi - self.opening)
-        there_and_back = np.linalg.norm(self.start - self.middle, axis=1) + np.linalg.norm(
-            self.end - self.middle, axis=1
+        there_and_back = length_rows(self.start - self.middle) + length_rows(
+            self.end - self.middle
         )
         lengths: Floats = np.where(
             self.fillet,
@@ -104,14 +105,14 @@ class BlendShapes:
         radius = np.maximum(fillet_radius(self.radius, self.opening), 1e-3)
         on_circle = (np.pi - self.opening) / np.sqrt(8.0 * ARC_CHORD_ERROR / radius)
         # A parabola with control points a, p, b leaves its chords by |a - 2 p + b| / (4 n^2).
-        bend = np.linalg.norm(self.start - 2.0 * self.middle + self.end, axis=1)
+        bend = length_rows(self.start - 2.0 * self.middle + self.end)
         on_parabola = np.sqrt(bend / (4.0 * CURVE_CHORD_ERROR))
         curve = np.ceil(np.where(self.fillet, on_circle, on_parabola))
         return np.maximum(2.0, np.maximum(turns, curve)).astype(np.intp)
 
     def tolerances(self) -> Floats:
         """Return the blend tolerances (n, 2) [m], [rad]."""
-        height = np.linalg.norm(self.middle - 0.5 * (self.start + self.end), axis=1)
+        height = length_rows(self.middle - 0.5 * (self.start + self.end))
         return 0.5 * np.stack((height, np.maximum(self.before, self.after)), axis=1)
 
 
@@ -119,9 +120,7 @@ def opening_rows(start: Floats, waypoint: Floats, end: Floats) -> Floats:
     """Return the angles between the two segments at the waypoints [rad], pi = straight on."""
     a, b = _units(start - waypoint), _units(end - waypoint)
     # More accurate than the arc cosine if the segments are in line.
-    opening: Floats = 2.0 * np.arctan2(
-        np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1)
-    )
+    opening: Floats = 2.0 * np.arctan2(length_rows(a - b), length_rows(a + b))
     return opening
 
 
@@ -166,5 +165,5 @@ def _parabola_lengths(start: Floats, waypoint: Floats, end: Floats) -> Floats:
 
 
 def _units(vectors: Floats) -> Floats:
-    lengths: Floats = np.linalg.norm(vectors, axis=1)
+    lengths: Floats = length_rows(vectors)
     return vectors / np.maximum(lengths, 1e-300)[:, None]

@@ -11,6 +11,7 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices, Int32s
+from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.planning.geometry.samples import group_begins, last_greatest
 from ur_cartesian_driver.planning.preflight.joint_path_solver import JointPath
@@ -111,7 +112,7 @@ def speed_bounds(
     local_time = np.where(moves, rate, np.inf)
     on_blend = np.flatnonzero(of.is_blend)
     before = np.maximum(on_blend - 1, 0)
-    distance = np.linalg.norm(of.positions[on_blend] - of.positions[before], axis=1)
+    distance = length_rows(of.positions[on_blend] - of.positions[before])
     blend_samples = BlendSamples(
         index=of.waypoint[on_blend],
         s=(of.t - 0.5 * of.step)[on_blend],

@@ -29,6 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
+from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
 
 #: E(0): deviation of a single corner from the polyline, as a fraction of jump times width.
 PEAK = 5.0 / 32.0
@@ -94,7 +95,7 @@ class RoundedPath:
         self.polyline = polyline
         slopes = polyline.slopes
         jumps = np.diff(slopes, axis=0)
-        sizes = np.linalg.norm(jumps[:, :3], axis=1), 2.0 * np.linalg.norm(jumps[:, 3:], axis=1)
+        sizes = length_rows(jumps[:, :3]), 2.0 * length_rows(jumps[:, 3:])
         corners = np.flatnonzero(np.maximum(*sizes) > _NO_JUMP) + 1
         self._slopes = slopes
         self._places = polyline.s[corners]
@@ -264,8 +265,8 @@ def _sizes(deviation: Floats) -> Floats:
     """Return distances [m] and angles [rad] (m, 2) of differences in R^7."""
     return np.stack(
         [
-            np.linalg.norm(deviation[:, :3], axis=1),
-            2.0 * np.linalg.norm(deviation[:, 3:], axis=1),
+            length_rows(deviation[:, :3]),
+            2.0 * length_rows(deviation[:, 3:]),
         ],
         axis=1,
     )

@@ -188,7 +188,7 @@ def _tool_limits(
         angle_rows(before[:, 3:], targets[:, 3:]) > _NO_TURN
     )
     segments = goal.motions
-    twists = np.linalg.norm(goal.waypoints.twists[:, :3], axis=1)
+    twists = length_rows(goal.waypoints.twists[:, :3])
     speeds = np.where(twists > 0.0, twists, options.linear_velocity)
     asked = segments.velocities > 0.0
     speeds = np.where(asked & ~turns_only, segments.velocities, speeds)

@@ -21,7 +21,7 @@ from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded, NotAvailable
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
 from ur_cartesian_driver.motion.geometry.polynomials import evaluate, MotionRows, values
-from ur_cartesian_driver.motion.geometry.pose_rows import keep_hemisphere
+from ur_cartesian_driver.motion.geometry.pose_rows import keep_hemisphere, length_rows
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import ContactEnd, Press, START_OF_MOTION
 from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, WaypointRows, zeros
@@ -274,9 +274,9 @@ def _sampled(trajectory: _Trajectory, state: RobotState, arm: Arm) -> _Samples:
     twists, accelerations = tool_rates(arm, state.T_flange_tcp, q, qd, qdd)
     count = sample_count(
         times,
-        np.linalg.norm(twists[:, :3], axis=1),
-        np.maximum(np.linalg.norm(twists[:, 3:], axis=1), np.abs(qd).max(axis=1)),
-        np.linalg.norm(accelerations[:, :3], axis=1),
+        length_rows(twists[:, :3]),
+        np.maximum(length_rows(twists[:, 3:]), np.abs(qd).max(axis=1)),
+        length_rows(accelerations[:, :3]),
         trajectory.first,
     )
     piece, number = (np.concatenate([[0], rows]) for rows in counted(count))

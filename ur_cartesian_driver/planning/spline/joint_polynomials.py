@@ -234,14 +234,14 @@ class _PieceRefinement:
     def _deviations_at(self, parts: Floats, rows: Indices) -> Floats:
         """Return the maximum deviations (n, 2) at some parts of the pieces' times."""
         begin, end = self.times[rows], self.times[rows + 1]
-        t = (end - begin)[:, None] * parts
+        t = parts[:, None] * (end - begin)
         q = values(self._coefficients(rows), t).reshape(-1, 6)
         tool = self.kinematics.pose_rows(q)
-        spline, piece = self.path.spline, np.repeat(self.piece[rows], len(parts))
-        wanted = spline.poses(piece, (begin[:, None] + t).ravel() - spline.times[piece])
+        spline, piece = self.path.spline, np.tile(self.piece[rows], len(parts))
+        wanted = spline.poses(piece, (begin + t).ravel() - spline.times[piece])
         distance = length_rows(tool[:, :3] - wanted[:, :3])
         deviation = np.stack([distance, angle_rows(wanted[:, 3:], tool[:, 3:])], axis=1)
-        largest: Floats = deviation.reshape(*t.shape, 2).max(axis=1)
+        largest: Floats = deviation.reshape(*t.shape, 2).max(axis=0)
         return largest
 
     def _halve(self, rows: Indices) -> None:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Int64s
+from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
 from ur_cartesian_driver.motion.plan.slow_stretch import (
     SlowCause,
     SLOWER_BY,
@@ -55,7 +56,7 @@ def slow_spline_stretches(
     joints = polynomials.spline.rows(times)
     tool, _ = kinematics.tool_rates(*joints)
     velocities = tool[:, :3]
-    speeds = np.linalg.norm(velocities, axis=1)
+    speeds = length_rows(velocities)
     asked = _asked_speeds(path, piece, u, twists, stretch)
     wanted = (1.0 - slower_by) * asked
     edges = np.flatnonzero(np.diff(speeds < wanted, prepend=False, append=False))
@@ -112,7 +113,7 @@ def _asked_speeds(
     lengths = np.diff(path.length[ends], prepend=0.0)
     mean = np.where(lengths > _MIN_LENGTH, stretch * lengths / np.diff(path.spline.times), 0.0)
     with np.errstate(over='ignore'):  # a goal may have any twist
-        given = np.linalg.norm(twists[:, :3], axis=1)
+        given = length_rows(twists[:, :3])
     given = np.where(np.isfinite(given) & (given > 0.0), given, np.inf)
     before, after = np.append(np.inf, given[:-1]), given
     at_begin, at_end = np.minimum(mean, before)[piece], np.minimum(mean, after)[piece]

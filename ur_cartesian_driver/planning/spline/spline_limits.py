@@ -267,7 +267,7 @@ def _worst_excess_at(
 
 def _quantities(rates: Rates, model: RobotModel, options: PlanningOptions) -> Iterator[_Quantity]:
     if options.max_tool_speed > 0.0:
-        speed = np.linalg.norm(rates.twists[:, :3], axis=1)
+        speed = length_rows(rates.twists[:, :3])
         limit, name = options.max_tool_speed, 'max_tool_speed'
         yield 'the tool', speed, limit, 1, 'm/s', name, SlowCause.TOOL_LIMIT
         if rates.carrier is not None:
@@ -277,7 +277,7 @@ def _quantities(rates: Rates, model: RobotModel, options: PlanningOptions) -> It
         (slice(0, 3), 'max_linear_acceleration', 'm/s^2'),
         (slice(3, 6), 'max_angular_acceleration', 'rad/s^2'),
     ):
-        values = np.linalg.norm(rates.accelerations[:, part], axis=1)
+        values = length_rows(rates.accelerations[:, part])
         yield 'the tool', values, getattr(options, name), 2, unit, name, cause
     bound, name = options.max_joint_acceleration, 'max_joint_acceleration'
     cause = SlowCause.JOINT_LIMIT

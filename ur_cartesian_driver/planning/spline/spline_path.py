@@ -24,7 +24,7 @@ from ur_cartesian_driver.motion.errors import (
     NearSingularity,
 )
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
-from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, keep_hemisphere
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, keep_hemisphere, length_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import Posture
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
@@ -139,7 +139,7 @@ def solve_spline_path(
     joint_path = solve_joint_path(kinematics, spline_pieces(spline, count, first, places), q_start)
     start = spline.poses(np.zeros(1, dtype=np.intp), np.zeros(1))
     poses = np.concatenate([start, joint_path.poses])
-    length = _cumulative(np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1))
+    length = _cumulative(length_rows(np.diff(poses[:, :3], axis=0)))
     angle = _cumulative(angle_rows(poses[:-1, 3:], poses[1:, 3:]))
     measures = singularity_distance_rows(kinematics.arm, joint_path.q)
     leaving = is_leaving_rows(measures, length[1:], angle[1:], rests=rests)
@@ -185,9 +185,9 @@ def _measured_count(kinematics: TcpKinematics, spline: ToolSpline, first: int) -
     twists, accelerations = spline.rates(*coarse)
     return sample_count(
         spline.times,
-        np.linalg.norm(twists[:, :3], axis=1),
-        np.linalg.norm(twists[:, 3:], axis=1),
-        np.linalg.norm(accelerations[:, :3], axis=1),
+        length_rows(twists[:, :3]),
+        length_rows(twists[:, 3:]),
+        length_rows(accelerations[:, :3]),
         first,
     )
 
@@ -247,7 +247,7 @@ def _check_sizes(
     detour = np.linalg.norm(np.diff(x, axis=1), axis=2).sum(axis=1) - np.linalg.norm(
         x[:, -1] - x[:, 0], axis=1
     )
-    angles = np.linalg.norm(turn, axis=1).reshape(n, _COARSE_SAMPLES)
+    angles = length_rows(turn).reshape(n, _COARSE_SAMPLES)
     k = int(np.argmax(angles[:, -1]))
     if angles[k, -1] > pi - HALF_TURN:
         raise InvalidGoal(
