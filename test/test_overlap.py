@@ -4,11 +4,12 @@
 
 import os
 from pathlib import Path
+import re
 
 import pytest
 
 pytest.importorskip('xdist')
-from overlap import COMPUTING, is_for_computing, LOW_PRIORITY
+from overlap import COMPUTING, is_for_computing, LOW_PRIORITY, rank
 from small_suite import run_small_suite
 
 HERE = Path(__file__).resolve().parent
@@ -26,6 +27,17 @@ def test_where_it_runs(number):
 @pytest.mark.parametrize('path', COMPUTING)
 def test_what_is_named_as_computing_exists(path):
     assert (HERE.parent / path).exists()
+
+
+def test_acceptance_tests_in_virtual_time_are_named_as_computing():
+    for module in sorted((HERE / 'acceptance').glob('test_*.py')):
+        text = module.read_text()
+        is_virtual = re.search(r'\b(run_cell|RobotInMemory)\b', text)
+        reads_clocks = re.search(
+            r'ur_sim|subprocess|threading|\bdriver[,)]|import time|SimulatedRobot', text
+        )
+        if is_virtual and not reads_clocks:
+            assert rank(f'test/acceptance/{module.name}') >= 0, module.name
 
 
 @pytest.mark.slow
