@@ -16,6 +16,8 @@ _CHUNKS = (128, 1024, 8192)
 # Directions along which triangles are compared, beside that of the nearest corners.
 _DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if d > (0.0, 0.0, 1.0)])
 _TINY = 1e-300
+# The corner behind each corner.
+_NEXT = [1, 2, 0]
 
 
 def triangle_distance(one, other):
@@ -86,31 +88,39 @@ def _pair_distances(p, q):
     edges = p[:, of_p], p[:, of_p - 2], q[:, of_q], q[:, of_q - 2]
     best = _segment_distances(*edges).min(axis=1)
     for one, other in ((p, q), (q, p)):
-        normal = np.cross(other[:, 1] - other[:, 0], other[:, 2] - other[:, 0])
+        edges = other[:, _NEXT] - other
+        normal = _cross(edges[:, 0], edges[:, 1])
         length = np.linalg.norm(normal, axis=1)
+        has_face = length >= _TINY  # a point or a line has none
         normal = normal / np.maximum(length, _TINY)[:, None]
+        inwards = _cross(normal[:, None], edges)
         heights = np.einsum('nkc,nc->nk', one - other[:, :1], normal)
-        heights[length < _TINY] = np.inf  # a point or a line has no face
         for k in range(3):
-            above = _is_inside(one[:, k], other, normal)
+            above = has_face & _is_inside(one[:, k], other, inwards)
             best = np.where(above, np.minimum(best, np.abs(heights[:, k])), best)
             start, end = heights[:, k], heights[:, k - 2]
-            crossing = np.flatnonzero(np.isfinite(start) & (start * end < 0.0))
+            crossing = np.flatnonzero(has_face & (start * end < 0.0))
             part = (start[crossing] / (start[crossing] - end[crossing]))[:, None]
             edge = one[crossing, k - 2] - one[crossing, k]
             point = one[crossing, k] + part * edge
-            best[crossing[_is_inside(point, other[crossing], normal[crossing])]] = 0.0
+            best[crossing[_is_inside(point, other[crossing], inwards[crossing])]] = 0.0
     return best
 
 
-def _is_inside(points, corners, normals):
-    """Whether points (n, 3) are above or below their triangles (n, 3, 3)."""
-    inside = np.linalg.norm(normals, axis=1) > 0.5
-    for k in range(3):
-        edge = corners[:, k - 2] - corners[:, k]
-        across = np.cross(edge, points - corners[:, k])
-        inside &= np.einsum('nc,nc->n', across, normals) >= 0.0
-    return inside
+def _cross(a, b):
+    """Return cross products (..., 3); numpy's takes ten times as long for few of them."""
+    (ax, ay, az), (bx, by, bz) = ([each[..., k] for k in range(3)] for each in (a, b))
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
+def _is_inside(points, corners, inwards):
+    """
+    Whether points (n, 3) are above or below their triangles (n, 3, 3).
+
+    :param inwards: (n, 3, 3) of each edge the direction in the plane that leads inwards.
+    """
+    beyond = np.einsum('nkc,nkc->nk', points[:, None] - corners, inwards)
+    return (beyond >= 0.0).all(axis=1)
 
 
 def _segment_distances(a, a_end, b, b_end):
