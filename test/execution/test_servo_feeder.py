@@ -57,7 +57,7 @@ NOZZLE = Pose((0.0, 0.0, 0.1), (0.0, 0.0, 0.0, 1.0))
 BOUND = 10.0
 
 
-def machine(T_flange_tcp=None):
+def machine(T_flange_tcp=None, **fields):
     poses = np.array([[LENGTH * part, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0] for part in (0.0, 0.5, 1.0)])
     spline = JointSpline.of(
         REST,
@@ -76,6 +76,7 @@ def machine(T_flange_tcp=None):
                 poses=poses, point=np.zeros(3, dtype=np.int32), time=np.linspace(0.0, DURATION, 3)
             ),
             goal_tolerance=Tolerance(position=(0.001,) * 3),
+            **fields,
         ),
     )
 
@@ -221,6 +222,28 @@ def test_a_cancel_is_written_at_once_and_answered_by_leaving(event, code):
     assert cell.goal.state is GoalState.COMING_TO_REST
     cell.until(GoalState.ENDED)
     assert cell.outcome.code is code
+
+
+@pytest.mark.parametrize('answer_first', [True, False])
+def test_a_goal_with_points_is_cancelled_when_the_program_has_answered_and_left(answer_first):
+    """Else the next goal would enter a servo that the program is still to leave."""
+    cell = Cell(machine(has_stops=True)).until(GoalState.MOVING)
+    for _ in range(20):
+        cell.cycle()
+    cell.event(CancelRequested())
+    answer = TrajectoryEnded(result=TrajectoryResult.CANCELED)
+    if answer_first:
+        cell.event(answer)
+    else:
+        for _ in range(5):
+            cell.cycle()
+    assert cell.goal.state is GoalState.CANCELLING
+    if answer_first:
+        cell.cycle(speed=1.0)
+    else:
+        cell.event(answer)
+    assert cell.goal.state is GoalState.COMING_TO_REST
+    assert cell.until(GoalState.ENDED).outcome.code is ErrorCode.CANCELLED
 
 
 def test_a_program_that_leaves_by_itself_ends_the_goal():

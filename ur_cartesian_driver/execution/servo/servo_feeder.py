@@ -90,7 +90,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         self._spline = monitor.job.spline
         self._max_servo_lag = MAX_LAG_LOOKAHEADS * stream.settings.lookahead_time
         self._last_read, self._last_answer = -1, -inf
-        self._has_filled = self._has_left = False
+        self._has_filled = self._has_left = self._is_cancelled = False
         #: Sends what the robot program does along the path; None = nothing.
         self._points = PointFeeder(monitor) if monitor.job.has_events else None
         self._holds = deque(monitor.job.holds)
@@ -200,7 +200,9 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         if self._points is None and isinstance(event, TrajectoryEnded):
             # All others are the results of an earlier goal.
             return None if event.result is TrajectoryResult.TOUCHED else NO_MEANING
-        if not isinstance(event, ServoReceived):
+        if state is GoalState.CANCELLING and isinstance(event, TrajectoryEnded):
+            self._is_cancelled |= event.result is TrajectoryResult.CANCELED
+        elif not isinstance(event, ServoReceived):
             return None
         if self.stream.phase is ServoPhase.ARRIVED and state is GoalState.MOVING:
             # The robot program may still have something to do.
@@ -208,7 +210,10 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         if self.stream.phase is not ServoPhase.LEFT:
             return NO_MEANING
         if state is GoalState.CANCELLING:
-            return GoalSignal.CANCELED, ''
+            # A program that still discards points has not read yet that it is to leave the servo:
+            # it would read the set-points of the next goal, and then leave.
+            is_done = self._points is None or self._is_cancelled
+            return (GoalSignal.CANCELED, '') if is_done else NO_MEANING
         if state in INTERRUPTIBLE_STATES:
             # A program that is about to end leaves the servo; the reason may follow in a moment.
             return GoalSignal.PROGRAM_STOPPED, (
