@@ -199,7 +199,8 @@ def test_fixed_points_keep_their_orientation():
     assert 'point 4 turned by' in free_remark(made)
 
 
-def test_the_wrist_unwinds_where_it_may():
+@pytest.mark.parametrize('corner', [0.0, 5e-4], ids=['stops', 'rounded'])
+def test_the_wrist_unwinds_where_it_may(corner):
     """With the rotation as given the last joint turns beyond its range."""
     q = (*HOME[:5], 2.0 * pi - 0.2)
     state = state_at_rest(ARM, q)
@@ -218,7 +219,7 @@ def test_the_wrist_unwinds_where_it_may():
         )
         for k in range(1, 9)
     )
-    goal = Goal(waypoints=waypoints, segments=(Segment(),) * 8)
+    goal = Goal(waypoints=waypoints, segments=(Segment(),) * 8, corner_deviation=corner)
     with pytest.raises(JointLimitExceeded):
         plan(goal, state, ARM, PlanningOptions())
     free = replace(goal, segments=(Segment(free_axis=FreeAxis.Z),) * 8)

@@ -363,15 +363,6 @@ REFUSALS = [
         'presses is not empty, but the path is on a part that the arm holds',
     ),
     (
-        replace(
-            PLAIN,
-            moving_frame=HELD,
-            segments=(Segment(free_axis=FreeAxis.Z),) * len(PLAIN.waypoints),
-        ),
-        NotAvailable,
-        'segments[0].free_axis is Z, but on a part that the arm holds rotations are not chosen',
-    ),
-    (
         replace(PLAIN, moving_frame=replace(HELD, T_base_tool=Pose((nan, 0.0, 0.0)))),
         InvalidGoal,
         'the pose of trajectory.controlled_frame contains nan',

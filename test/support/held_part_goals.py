@@ -66,17 +66,23 @@ def held_case(random, path_of):
     )
     # The tool stands where the path begins; its origin in the URDF comes from numbers alone.
     T_base_tool = arm.forward(q) @ origin_pose(part) @ at
-    tool = [*T_base_tool.position, *_roll_pitch_yaw(T_base_tool)]
-    frame = MovingFrame(T_flange_frame=origin_pose(part), T_base_tool=origin_pose(tool))
+    frame, urdf = frame_and_urdf(arm, origin_pose(part), T_base_tool)
     goal = replace(path_of(random, at), moving_frame=frame, controlled_frame='tool')
-    urdf = UrdfArm(urdf_of(arm.geometry, {'part': ('tool0', part), 'tool': ('base', tool)}))
     seen = frame.seen(state_at_rest(arm, q))
     return HeldCase(arm, seen, goal, frame, urdf)
 
 
-def _roll_pitch_yaw(pose):
+def frame_and_urdf(arm, T_flange_part, T_base_tool):
+    """Return a part that the arm holds before a fixed tool, and pinocchio's view of the three."""
+    part, tool = map(_origin, (T_flange_part, T_base_tool))
+    frame = MovingFrame(T_flange_frame=origin_pose(part), T_base_tool=origin_pose(tool))
+    return frame, UrdfArm(urdf_of(arm.geometry, {'part': ('tool0', part), 'tool': ('base', tool)}))
+
+
+def _origin(pose):
     R = pose.matrix()
     return (
+        *pose.position,
         float(np.arctan2(R[2, 1], R[2, 2])),
         float(np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))),
         float(np.arctan2(R[1, 0], R[0, 0])),

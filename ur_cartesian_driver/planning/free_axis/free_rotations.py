@@ -51,6 +51,7 @@ from ur_cartesian_driver.planning.geometry.curves import goal_arcs
 from ur_cartesian_driver.planning.geometry.samples import counted
 from ur_cartesian_driver.planning.options import MAX_CLEARANCE, PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import Clearance
+from ur_cartesian_driver.planning.preflight.held_part_kinematics import kinematics_of
 from ur_cartesian_driver.planning.request.controlled_frame import is_same_tcp
 from ur_cartesian_driver.planning.request.goal_fields import (
     IS_JOINT_MOVE,
@@ -136,7 +137,7 @@ def choose_rotations(
         between samples.
     :raises NoRotation: the arm cannot follow the whole path with any choice of rotations.
     """
-    path = _FreePath(goal, state, options, density)
+    path = _FreePath(goal, state, arm, options, density)
     if not path.is_open.any():  # every range is a single rotation
         return as_named(goal), ()
     if not path.can_turn:
@@ -144,7 +145,7 @@ def choose_rotations(
             f'free axis {path.name}: rotations as given, because a frame other than the active '
             'TCP must not turn (allow_tcp_change is false)',
         )
-    lattice = path.lattice(arm)
+    lattice = path.lattice()
     found = _search_without_collisions(lattice, path)
     turns = path.turns(lattice.layers, found)
     chosen = _turned(goal, turns)
@@ -179,14 +180,20 @@ def _search_without_collisions(lattice: RotationLattice, path: _FreePath) -> Rot
 
 
 class _FreePath:
-    """The path of a goal with a free axis, in base."""
+    """The path of a goal with a free axis, in base, or in the frame of a held part."""
 
     def __init__(
-        self, goal: GoalTable, state: RobotState, options: PlanningOptions, density: int
+        self,
+        goal: GoalTable,
+        state: RobotState,
+        arm: Arm,
+        options: PlanningOptions,
+        density: int,
     ) -> None:
         self.goal, self.options, self.density = goal, options, density
         T_flange_controlled = goal.T_flange_controlled or state.T_flange_tcp
         T_tcp_controlled = state.T_flange_tcp.inverse() @ T_flange_controlled
+        self.kinematics = kinematics_of(goal.moving_frame, arm, T_flange_controlled)
         segments = goal.segments
         free = segments.free_axes != FreeAxis.NONE
         first = int(np.argmax(free))
@@ -195,7 +202,6 @@ class _FreePath:
         self.can_turn = options.allow_tcp_change or is_same_tcp(T_tcp_controlled, IDENTITY)
         #: The active TCP first, and the controlled frame if it is another one.
         self.tool_tips = tuple(dict.fromkeys((state.T_flange_tcp, T_flange_controlled)))
-        self.T_controlled_flange = T_flange_controlled.inverse()
         self.q_start = state.actual_q
         self.name = FreeAxis(int(segments.free_axes[first])).name.lower()
         self.axis = _AXES[int(segments.free_axes[first])]
@@ -206,7 +212,8 @@ class _FreePath:
         #: (n,) whether there is more than one rotation to choose from.
         self.is_open = free & (self.is_any | (self.high > self.low))
         poses = transform_rows(goal.T_base_frame, goal.waypoints.poses)
-        self.start = state.actual_tcp_pose @ T_tcp_controlled
+        seen = state if goal.moving_frame is None else goal.moving_frame.seen(state)
+        self.start = seen.actual_tcp_pose @ T_tcp_controlled
         starts = np.concatenate([[self.start.row()], poses[:-1]])
         # At ends of FIXED arcs, the poses become those in which the arcs arrive.
         self.arc_rows, self.arcs, _ = goal_arcs(goal.segments, goal.T_base_frame, starts, poses)
@@ -241,7 +248,7 @@ class _FreePath:
 
     # -- the lattice -----------------------------------------------------------------------------
 
-    def lattice(self, arm: Arm) -> RotationLattice:
+    def lattice(self) -> RotationLattice:
         """Return the lattice of the path, with a layer for each of the ``knots``."""
         before = np.concatenate([[self.start.row()], self.poses[:-1]])
         lengths = distance_rows(before, self.poses)
@@ -274,9 +281,8 @@ class _FreePath:
             times=self._times(lengths)[row] / counts[row],
         )
         return RotationLattice(
-            arm=arm,
+            kinematics=self.kinematics,
             axis=self.axis,
-            T_controlled_flange=self.T_controlled_flange,
             samples=samples,
             layers=self._layers(layer_ends, whole, tilts),
             q_start=self.q_start,

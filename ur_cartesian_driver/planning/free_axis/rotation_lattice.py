@@ -35,10 +35,10 @@ from ur_cartesian_driver.kinematics.closed_form_rows import (
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int64s
-from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, multiply_rows
+from ur_cartesian_driver.motion.geometry.pose_rows import multiply_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.preflight.tightest_margins import (
     singularity_distance_rows,
     SINGULARITY_MEASURES,
@@ -118,7 +118,7 @@ class Layer:
 class RotationSamples:
     """The samples of a path; columns (n,)."""
 
-    #: (n, 7) the reference pose of the controlled frame in base.
+    #: (n, 7) the reference pose of the controlled frame in the frame of the path.
     poses: Floats
     #: Fractions, in (0, 1], of the way from the previous layer to the next one.
     fractions: Floats
@@ -179,13 +179,12 @@ class RotationLattice:
     """
     The lattice of one path.
 
+    :param kinematics: those of the controlled frame, which has the free axis.
     :param axis: unit vector of the free axis in the controlled frame.
-    :param T_controlled_flange: the flange in the controlled frame.
     """
 
-    arm: Arm
+    kinematics: TcpKinematics
     axis: tuple[float, float, float]
-    T_controlled_flange: Pose
     samples: RotationSamples
     layers: Sequence[Layer]
     q_start: Joints
@@ -259,6 +258,11 @@ class RotationLattice:
         return path.branches[self._layer]
 
     @property
+    def arm(self) -> Arm:
+        """The arm, of which the ideal one is used."""
+        return self.kinematics.arm
+
+    @property
     def _start(self) -> int:
         return int(branch_measures(self.arm, np.array([self.q_start])).branch[0])
 
@@ -270,7 +274,7 @@ class RotationLattice:
         turn = np.concatenate([np.sin(half) * np.array(self.axis), np.cos(half)], axis=1)
         rows = self.samples.poses[samples].copy()
         rows[:, 3:] = multiply_rows(rows[:, 3:], turn)
-        return compose_rows(rows, self.T_controlled_flange)
+        return self.kinematics.flange_rows(rows)
 
     def _tables(
         self, first: Floats, step: float, count: int, branches: tuple[int, ...] | Int64s

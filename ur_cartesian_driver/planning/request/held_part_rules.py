@@ -5,10 +5,8 @@
 from __future__ import annotations
 
 from ur_cartesian_driver.motion.errors import NotAvailable
-from ur_cartesian_driver.motion.goal.goal import FreeAxis
-from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, rows_where
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.goal_fields import segment_field
 from ur_cartesian_driver.planning.request.mode_rules import check_mode, GOAL_RULES
 
 
@@ -16,8 +14,7 @@ def check_held_part(goal: GoalTable, options: PlanningOptions) -> None:
     """
     Refuse what a held part does not allow.
 
-    :raises NotAvailable: the goal presses, leaves a rotation free, or asks for moves of the
-        controller.
+    :raises NotAvailable: the goal presses, or asks for moves of the controller.
     """
     if goal.moving_frame is None:
         return
@@ -27,13 +24,5 @@ def check_held_part(goal: GoalTable, options: PlanningOptions) -> None:
             'is not empty, but the path is on a part that the arm holds, which only splines '
             'follow exactly, and these follow joint positions, which do not give way',
             'let the fixed tool give way, or hold the tool and fix the part',
-        )
-    for i in rows_where(goal.segments.free_axes != FreeAxis.NONE)[:1]:
-        raise NotAvailable(
-            segment_field(i, 'free_axis'),
-            f'is {FreeAxis(goal.segments.free_axes[i]).name}, but on a part that the arm holds '
-            'rotations are not chosen',
-            'set it to NONE, and turn the points about the fixed tool yourself where the arm '
-            'needs it',
         )
     check_mode(goal, GOAL_RULES['moving_frame'])

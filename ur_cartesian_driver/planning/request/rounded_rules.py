@@ -10,7 +10,6 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.goal.goal import (
     DEFAULT_CORNER_ANGLE,
-    FreeAxis,
     Segment,
     SegmentType,
 )
@@ -67,7 +66,6 @@ def check_rounded(goal: GoalTable, options: PlanningOptions) -> None:
         )
     segments = goal.segments
     wrong = ~TAKES_TOOL_SPEED[segments.types] | (segments.blend_radii > 0.0)
-    wrong |= segments.free_axes != FreeAxis.NONE
     for i in rows_where(wrong)[:1]:
         _refuse_segment(i, segments[i])
 
@@ -101,13 +99,6 @@ def _refuse_segment(index: int, segment: Segment) -> None:
             segment_field(index, 'blend_radius'),
             f'is {segment.blend_radius:g} m, but corner_deviation rounds the corners of this goal',
             'set one of them to 0',
-        )
-    if segment.free_axis != FreeAxis.NONE:
-        raise InvalidGoal(
-            segment_field(index, 'free_axis'),
-            f'is {FreeAxis(segment.free_axis).name}, but orientations are not chosen along '
-            'rounded corners',
-            'set it to NONE, or use blends',
         )
     raise InvalidGoal(
         segment_field(index, 'type'),
