@@ -476,8 +476,8 @@ def test_a_joint_trajectory_with_one_point_keeps_its_time(tmp_path):
 @pytest.mark.parametrize(
     ('options', 'sentence'),
     [
-        ({'frame': 'part'}, 'joint positions have no frame; give no frame, origin or scale'),
-        ({'scale': 2.0}, 'joint positions have no frame; give no frame, origin or scale'),
+        ({'frame': 'part'}, 'joint positions have no frame; give no frame, tool, origin or scale'),
+        ({'scale': 2.0}, 'joint positions have no frame; give no frame, tool, origin or scale'),
     ],
 )
 def test_joint_positions_have_no_frame(tmp_path, options, sentence):

@@ -706,11 +706,11 @@ def test_a_program_cannot_take_all_time_or_memory(tmp_path, monkeypatch, text):
 def test_joint_positions_of_a_program_cannot_be_moved(tmp_path, option):
     line, sentence = refusal(tmp_path, f'movel({A})\nmovej({Q})\n', **option)
     assert line == 2
-    assert 'joint positions have no frame; give no frame, origin or scale' in sentence
+    assert 'joint positions have no frame; give no frame, tool, origin or scale' in sentence
     assert len(places(imported(tmp_path, f'movel({A})\nmovel({B})\n', **option))) == 2
     line, sentence = refusal(tmp_path, f'movel({A})\nmovel({Q})\n', **option)
     assert line == 2
-    assert 'joint positions have no frame; give no frame, origin or scale' in sentence
+    assert 'joint positions have no frame; give no frame, tool, origin or scale' in sentence
     solved = f'movej(get_inverse_kin({A}, qnear={Q}))\n'
     assert len(places(imported(tmp_path, solved, **option))) == 1
     # What was solved for a pose of the file is that pose.

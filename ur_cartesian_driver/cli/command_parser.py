@@ -461,6 +461,9 @@ def _add_import(command: CommandParser) -> None:
         '--frame', default='', help='frame of the points; by default that of the file, else base'
     )
     command.add_argument(
+        '--tool', default='', help='controlled frame, such as a fixed tool; by default the TCP'
+    )
+    command.add_argument(
         '--origin',
         type=argument_types.pose,
         metavar='X,Y,Z,RX,RY,RZ',

@@ -123,6 +123,9 @@ class ImportOptions:
 
     #: The frame of the points; empty = the frame of the file, else the robot's base.
     frame: str = ''
+    #: The frame that follows the path, such as a fixed tool before a held part; empty = the
+    #: active TCP.
+    tool: str = ''
     #: The pose of the file's origin in the frame.
     origin: Pose = IDENTITY
     #: Unit of lengths that have none; overrides that of a DXF drawing. Empty: a file that lacks a
@@ -163,7 +166,8 @@ class ImportOptions:
     @property
     def moves_path(self) -> bool:
         """Whether an option moves or scales the path, which joint positions cannot follow."""
-        return self.frame not in ('', 'base') or self.origin != IDENTITY or self.scale != 1.0
+        moved = self.frame not in ('', 'base') or self.origin != IDENTITY
+        return moved or bool(self.tool) or self.scale != 1.0
 
     def __post_init__(self) -> None:
         """

@@ -131,6 +131,7 @@ def goal_of_path(path: ImportedPath, options: ImportOptions, remarks: ImportNote
         ),
         segments=segments,
         frame_id=options.frame or path.frame,
+        controlled_frame=options.tool,
         corner_deviation=corner,
         io_commands=path.outputs,
         input_waits=path.waits,

@@ -39,7 +39,7 @@ _OPTIONAL = {
 #: Largest distance [m] of a point from the origin; no arm reaches farther. A larger distance
 #: means, for example, that millimetres were read as metres.
 MAX_DISTANCE = 20.0
-JOINTS_HAVE_NO_FRAME = 'joint positions have no frame; give no frame, origin or scale'
+JOINTS_HAVE_NO_FRAME = 'joint positions have no frame; give no frame, tool, origin or scale'
 UNKNOWN3: Vector3 = (nan, nan, nan)
 #: The types of motions whose speed an option can give.
 TYPES_WITH_SPEED = (SegmentType.LINEAR, SegmentType.CIRCULAR, SegmentType.PROCESS)
