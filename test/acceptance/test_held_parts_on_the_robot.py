@@ -3,184 +3,69 @@
 """
 A part is led along a fixed tool, in virtual time, whatever happens on the way.
 
-RTDE's target joints are turned into poses of the fixed tool on the part by pinocchio, on a URDF
-that the tests write; the path on the part is the tests' own. ``INTERRUPTIONS`` is the number of
-places at which it is interrupted.
+``INTERRUPTIONS`` is the number of places at which it is interrupted.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import os
 import runpy
-from typing import Any
 
 from checkout import CHECKOUT, needs_checkout
 from curve_distance import distances
-from held_part_goals import origin_pose
+from held_part_bench import (
+    ARM,
+    Bench,
+    BESIDE,
+    check,
+    CLOSE,
+    DEVIATION,
+    edges,
+    FRAME,
+    OFF,
+    ON,
+    OPTIONS,
+    PRIMITIVES,
+    programmed,
+    Q,
+    SERVO,
+    SPLINE,
+    START,
+    URDF,
+)
+from held_part_goals import frame_and_urdf
 import numpy as np
-from plain_clients import RtdeRecorder
 import pytest
 from random_cases import random_of
-from recorded_goal import SETUP
-from robot_cell import CYCLE, RTDE, run_cell
-from urdf_arm import urdf_of, UrdfArm
-from virtual_network import HOST
+from robot_cell import CYCLE, run_cell
 import yaml
 
 from ur_cartesian_driver.driver.ipc.channel import SetPathOffset
-from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.geometry.pose import (
-    multiply,
-    Pose,
-    quaternion_from_rotation_vector,
-)
-from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.errors import ErrorCode, JointLimitExceeded
+from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import (
-    Goal,
-    IOCommand,
-    OutputKind,
+    FreeAxis,
     PathOffset,
-    SafeOutput,
-    Segment,
-    SegmentType,
+    Press,
+    PressFrame,
     Tolerance,
     Waypoint,
 )
-from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
 from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.path import Frames, Path, resume, StaticFrame
-from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning import plan
+from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.resources import share_path
+from ur_cartesian_driver.sim import rtde_output_values
+from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 
 pytest.importorskip('pinocchio')
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
+COMPUTED = rtde_output_values.COMPUTED
 PLACES = int(os.environ.get('INTERRUPTIONS', '2'))
-SPLINE, SERVO = ExecutionMode.SPLINE, ExecutionMode.SERVO
-ARM = Arm(robot_model('ur5e'))
-OPTIONS = PlanningOptions(self_collision='off')
-Q = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
-PART = (0.03, -0.02, 0.1, 0.3, -0.2, 0.5)
-DEVIATION, SPEED, PIN, ON, OFF = 5e-4, 0.04, 2, 0, 3
-#: How far the tool may be beside the set-points [m]: servoj's filter cuts corners.
-BESIDE = {SPLINE: 2e-5, SERVO: 1e-3}
-#: Where the path leads from its start on the part [m], and how the tool is turned there [rad].
-OFFSETS = np.array([[0.03, 0, 0], [0.03, 0.03, 0], [0.06, 0.03, 0.01], [0.06, 0, 0.01], [0, 0, 0]])
-TURNS = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.4), (0.0, 0.1, 0.4), (0.0, 0.0, 0.2), (0.0, 0.0, 0.0)]
-#: How close the path and its places are followed: RTDE says it once in a cycle [m].
-CLOSE = SPEED * CYCLE + 2e-4
-START = Pose((0.04, 0.02, -0.01), quaternion_from_rotation_vector((2.8, 0.3, 0.2)))
 
 
-def _tool():
-    T = ARM.forward(Q) @ origin_pose(PART) @ START
-    R = T.matrix()
-    return (
-        *T.position,
-        float(np.arctan2(R[2, 1], R[2, 2])),
-        float(np.arcsin(-R[2, 0])),
-        float(np.arctan2(R[1, 0], R[0, 0])),
-    )
-
-
-TOOL = _tool()
-FRAME = MovingFrame(T_flange_frame=origin_pose(PART), T_base_tool=origin_pose(TOOL))
-URDF = UrdfArm(urdf_of(ARM.geometry, {'part': ('tool0', PART), 'tool': ('base', TOOL)}))
-
-
-def edges(execution=SPLINE, **fields):
-    """Return the edges of a part, with a turn from corner to corner, and an output along them."""
-    poses = [
-        Pose(
-            tuple((np.array(START.position) + offset).tolist()),
-            multiply(quaternion_from_rotation_vector(turn), START.quaternion),
-        )
-        for offset, turn in zip(OFFSETS, TURNS, strict=True)
-    ]
-    return Goal(
-        frame_id='part',
-        controlled_frame='belt',
-        moving_frame=FRAME,
-        waypoints=tuple(Waypoint(pose=pose) for pose in poses),
-        segments=(Segment(type=SegmentType.LINEAR, velocity=SPEED),) * len(poses),
-        corner_deviation=DEVIATION,
-        execution=execution,
-        path_tolerance=Tolerance(position=(0.004,) * 3),
-        io_commands=(switch(ON, 1.0), switch(OFF, 0.0)),
-        safe_outputs=(
-            SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=PIN, value=0.0, restore=True),
-        ),
-        **fields,
-    )
-
-
-def switch(waypoint, value):
-    return IOCommand(
-        waypoint=waypoint,
-        offset=0.0,
-        output=OutputKind.STANDARD_DIGITAL,
-        pin=PIN,
-        value=value,
-    )
-
-
-def programmed():
-    """Return the corners (n, 3) of the path on the part."""
-    return np.concatenate([[np.zeros(3)], OFFSETS]) + START.position
-
-
-@dataclass
-class Bench:
-    """The robot, and the readings of it."""
-
-    cell: Any
-
-    async def connect(self):
-        self.recorder = RtdeRecorder()
-        loop = self.cell.loop
-        connection, _ = await loop.create_connection(lambda: self.recorder, HOST, RTDE)
-        connection.write(self.recorder.codec.requests(1.0 / CYCLE))
-        return self
-
-    async def begin(self, goal):
-        self.cell.robot.controller.motion.teleport(Q)
-        await self.cell.sleep(0.1)
-        return self.start(goal)
-
-    def start(self, goal):
-        self.made = plan(goal, self.cell.memory.read(), ARM, OPTIONS)
-        self.recorder.rows.clear()
-        return self.cell.owner.start(self.made, arm=SETUP)
-
-    async def end(self, motion):
-        await self.cell.until(lambda: motion.outcome is not None, 120.0)
-        await self.cell.until(self.cell.at_rest)
-        return motion.outcome
-
-    def readings(self):
-        """Return the places of the tool on the part (n, 3), and whether the output was on (n,)."""
-        q = np.array([row.target_q for row in self.recorder.rows])
-        on = np.array([bool(row.digital_outputs & (1 << PIN)) for row in self.recorder.rows])
-        return URDF.relative('tool', 'part', q)[:, :3, 3], on
-
-
-def check(bench, execution):
-    """See that the tool was on the path on the part, all of it, and the output on along it."""
-    places, on = bench.readings()
-    path = programmed()
-    assert distances(places, [path]).max() < DEVIATION + BESIDE[execution]
-    for corner in path:
-        assert np.linalg.norm(places - corner, axis=1).min() < 2.0 * DEVIATION + BESIDE[execution]
-    changes = np.flatnonzero(np.diff(on.astype(int)))
-    assert len(changes) == 2
-    for row, point in zip(changes.tolist(), (ON, OFF), strict=True):
-        assert (
-            np.linalg.norm(places[row] - path[point + 1]) < CLOSE + DEVIATION + BESIDE[execution]
-        )
-
-
-@pytest.mark.parametrize('execution', [SPLINE, SERVO])
+@pytest.mark.parametrize('execution', [SPLINE, SERVO, PRIMITIVES])
 def test_the_path_on_the_part_is_kept_while_the_slider_moves(execution):
     async def body(cell):
         random, bench = random_of('held slider', execution.name), await Bench(cell).connect()
@@ -297,8 +182,111 @@ def test_the_examples_lead_their_parts(name):
         motion = await bench.begin(from_file)
         outcome = await bench.end(motion)
         assert outcome.code is ErrorCode.SUCCESSFUL, outcome
-        seen = motion.progress[-1].actual_pose
-        assert seen.distance_to(goal.waypoints[-1].pose) < 1e-4
-        assert seen.angle_to(goal.waypoints[-1].pose) < 1e-3
+        seen, end = motion.progress[-1].actual_pose, goal.waypoints[-1].pose
+        assert seen.distance_to(end) < 1e-4
+        if name == 'deburr_ring':  # only the axis of the brush is given
+            axes = [pose.matrix()[:3, 2] for pose in (seen, end)]
+            assert np.linalg.norm(np.cross(*axes)) < 1e-3
+            return
+        assert seen.angle_to(end) < 1e-3
+
+    run_cell(body)
+
+
+@needs_checkout
+def test_a_free_rotation_leads_around_a_ring_that_a_given_one_does_not():
+    """The brush touches the whole edge, its axis against it; pinocchio sees it from the ring."""
+    module = runpy.run_path(str(CHECKOUT / 'examples' / 'deburr_ring.py'))
+    frames = Frames(static_frames=module['FRAMES'])
+    goal = module['deburr_ring'](None).goal(frames)
+    _, urdf = frame_and_urdf(ARM, goal.moving_frame.T_flange_frame, goal.moving_frame.T_base_tool)
+    given = tuple(replace(each, free_axis=FreeAxis.NONE) for each in goal.segments)
+    start = state_at_rest(ARM, Q)
+    with pytest.raises(JointLimitExceeded, match=r'wrist_3_joint .* \(free_axis\)'):
+        plan(replace(goal, segments=given), start, ARM, OPTIONS)
+
+    async def body(cell):
+        bench = await Bench(cell).connect()
+        assert (await bench.end(await bench.begin(goal))).code is ErrorCode.SUCCESSFUL
+        q = np.array([row.target_q for row in bench.recorder.rows])
+        tool = urdf.relative('tool', 'part', q)
+        x, y, z = tool[:, :3, 3].T
+        radius, lean = np.hypot(x, y), np.pi / 3
+        edge = (np.abs(z - 0.01) < 5e-5) & (np.abs(radius - 0.04) < 2e-4)
+        turn = np.unwrap(np.arctan2(y[edge], x[edge]))
+        assert turn[-1] - turn[0] == pytest.approx(np.radians(380.0), abs=0.01)
+        out = np.stack([x, y], axis=1) / radius[:, None] * np.cos(lean)
+        normal = np.column_stack([out, np.full(len(x), np.sin(lean))])[edge]
+        assert np.degrees(np.arccos(-np.sum(normal * tool[edge, :3, 2], axis=1))).max() < 2.0
+        along = np.stack([-np.sin(turn), np.cos(turn), 0.0 * turn], axis=1)
+        turned = np.degrees(np.arccos(np.clip(np.sum(along * tool[edge, :3, 0], axis=1), -1, 1)))
+        assert np.ptp(turned) > 90.0  # as given it would be 0 all the way
+
+    run_cell(body)
+
+
+@pytest.mark.parametrize('frame', list(PressFrame))
+def test_a_part_is_pressed_against_the_fixed_tool(frame):
+    """The tool goes into the part along its z until it pushes with its force, and nowhere else."""
+    force, gap, deep = 20.0, 0.003, 0.001  # the body of the simulator gives way by 1 mm
+    R_tool = FRAME.T_base_tool.matrix()[:3, :3]
+    # The axis of the press that is nearest to z of the tool, and the way of the force along it.
+    axes = {
+        PressFrame.TOOL: np.eye(3),
+        PressFrame.GOAL: R_tool.T @ FRAME.frame_under(START).matrix()[:3, :3],
+        PressFrame.BASE: R_tool.T,
+    }[frame]
+    k = int(np.abs(axes[2]).argmax())
+    normal = axes[:, k] * np.sign(axes[2, k])  # of the push, in the axes of the tool
+
+    async def body(cell):
+        # A plane in the way of the TCP, which stands across the push of the tool.
+        bench = await Bench(cell).connect()
+        towards = -R_tool @ normal  # the way of the part
+        at = np.array(ARM.forward(Q).position) + gap * towards
+        contact = cell.robot.controller.contact
+        contact.bodies = (ContactBody('plane', tuple(at), tuple(-towards), friction=0.0),)
+        side = np.cross(normal, (0.0, 1.0, 0.0) if abs(normal[1]) < 0.9 else (1.0, 0.0, 0.0))
+        side /= np.linalg.norm(side)
+        ways = (0.02, 0.08, 0.1)
+        goal = replace(
+            edges(PRIMITIVES),
+            waypoints=tuple(
+                Waypoint(pose=START @ Pose(tuple((way * side).tolist()))) for way in ways
+            ),
+            segments=(edges(PRIMITIVES).segments[0],) * len(ways),
+            io_commands=(),
+            presses=(
+                Press(
+                    first_waypoint=0,
+                    last_waypoint=1,
+                    frame=frame,
+                    axes=('xyz'[k],),
+                    forces=(force * float(np.sign(axes[2, k])),),
+                ),
+            ),
+            path_tolerance=Tolerance(position=(0.0005,) * 3, orientation=(0.01,) * 3),
+        )
+        motion, rows = await bench.begin(goal), []
+
+        def ended():
+            controller = cell.robot.controller
+            rows.append(
+                (*COMPUTED['actual_q'](controller), *COMPUTED['actual_TCP_force'](controller))
+            )
+            return motion.outcome
+
+        await cell.until(ended, 60.0)
+        assert motion.outcome.succeeded, motion.outcome
+        table = np.array(rows)
+        # The place of the tool on the part, in the axes of the tool.
+        places = URDF.relative('tool', 'part', table[:, :6])[:, :3, 3] - START.position
+        places = places @ START.matrix()[:3, :3]
+        along = places @ side
+        pressed = (along > 0.04) & (along < 0.075)
+        assert places[pressed] @ normal == pytest.approx(gap + deep, abs=2e-4)
+        assert np.linalg.norm(table[pressed, 6:9], axis=1) == pytest.approx(force, abs=0.5)
+        assert np.abs(places @ np.cross(normal, side)).max() < 5e-4
+        assert places[-1] == pytest.approx(0.1 * side, abs=5e-4)
 
     run_cell(body)

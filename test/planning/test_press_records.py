@@ -3,14 +3,21 @@
 """The records of a press for the robot program, and presses that a robot cannot do."""
 
 from dataclasses import replace
+from math import pi
 
 import pytest
 
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import NotAvailable
-from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose import (
+    IDENTITY,
+    Pose,
+    quaternion_from_rotation_vector,
+)
 from ur_cartesian_driver.motion.goal.goal import ContactEnd, Goal, Press, PressFrame, Waypoint
 from ur_cartesian_driver.motion.goal.goal_columns import goal_table
+from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
+from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.planning.request.point_events.presses import press_records, Presses
 
 PRESS = Press(first_waypoint=0, last_waypoint=1, axes=('rx', 'z'), forces=(0.5, 20.0))
@@ -30,6 +37,35 @@ def test_forces_and_limits_come_to_their_axes():
     assert note == (
         'presses with 0.5 Nm about x and 20 N along z of the goal frame from there to point 1'
     )
+
+
+def test_a_fixed_tool_presses_with_the_opposite_force_of_the_part():
+    """Both act at the tool; the tool stands in base, so nothing has to follow it."""
+    held = MovingFrame(
+        T_flange_frame=Pose((0.0, 0.0, 0.1)),
+        T_base_tool=Pose((0.5, 0.0, 0.3), quaternion_from_rotation_vector((0.0, pi / 2, 0.0))),
+    )
+    # The axes of the part are turned against those of the tool by a quarter about z.
+    quarter = quaternion_from_rotation_vector((0.0, 0.0, pi / 2))
+    points = tuple(Waypoint(pose=Pose((x, 0.0, 0.0), quarter)) for x in (0.1, 0.2))
+    records = {}
+    for frame in PressFrame:
+        goal = goal_table(
+            Goal(
+                waypoints=points,
+                presses=(replace(PRESS, axes=('z',), forces=(20.0,), frame=frame),),
+                moving_frame=held,
+            )
+        )
+        *_, law, begin = (stop.stop for stop in Presses().stops(goal, PlanningOptions()))
+        assert law.wrench == (0.0, 0.0, -20.0, 0.0, 0.0, 0.0)
+        assert not begin.follows_tool
+        records[frame] = begin.T_base_task
+    assert records[PressFrame.TOOL] == held.T_base_tool
+    assert records[PressFrame.GOAL].position == held.T_base_tool.position
+    part = held.T_base_tool @ Pose((0.0,) * 3, quarter).inverse()
+    assert records[PressFrame.GOAL].angle_to(part) < 1e-9
+    assert records[PressFrame.BASE] == IDENTITY
 
 
 def test_contact_is_named_in_the_report():

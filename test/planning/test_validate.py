@@ -347,20 +347,40 @@ REFUSALS = [
     (replace(PLAIN, age=-61.0), InvalidGoal, 'trajectory.header.stamp is 61.0 s in the future'),
     # a part in the hand
     (
-        replace(PLAIN, moving_frame=HELD),
+        with_segment(replace(PLAIN, moving_frame=HELD), 1, type=SegmentType.JOINT),
         NotAvailable,
-        'header.frame_id is on a part that the arm holds, but the moves of the controller, which '
-        'PRIMITIVES sends, are straight in base, and curves on a part that turns; set execution '
-        'to SPLINE or SERVO, with times or a corner_deviation.',
+        'segments[1].type is JOINT, which turns the part that the arm holds, and the moves of the '
+        'controller, which PRIMITIVES sends, lead a part only without turning it; use LINEAR, '
+        'PROCESS or an UNCONSTRAINED arc, or set execution to SPLINE or SERVO, with times or a '
+        'corner_deviation.',
     ),
     (
-        replace(
-            PLAIN,
-            moving_frame=HELD,
-            presses=(GRIND,),
+        with_segment(
+            replace(PLAIN, moving_frame=HELD),
+            2,
+            type=SegmentType.CIRCULAR,
+            via=Pose((0.25, 0.1, 0.0)),
+            arc_mode=ArcMode.FIXED,
         ),
         NotAvailable,
-        'presses is not empty, but the path is on a part that the arm holds',
+        'segments[2].arc_mode is FIXED, which turns the part that the arm holds, and the moves',
+    ),
+    (
+        replace(PLAIN, moving_frame=HELD, allow_travel=True),
+        NotAvailable,
+        'allow_travel is set, but the path is on a part that the arm holds, and a travel turns '
+        'it; lead there by a goal of its own.',
+    ),
+    (
+        replace(PLAIN, moving_frame=HELD, path_offset=PathOffset(limits=SIDEWAYS, timeout=1.0)),
+        NotAvailable,
+        'path_offset is set, but the path is on a part that the arm holds, and the controller, '
+        'which offsets PRIMITIVES, knows nothing of the frame on the part; set execution to SERVO',
+    ),
+    (
+        replace(SPLINE, moving_frame=HELD, presses=(GRIND,)),
+        NotAvailable,
+        'presses is not empty, but SPLINE follows joint positions, which do not give way',
     ),
     (
         replace(PLAIN, moving_frame=replace(HELD, T_base_tool=Pose((nan, 0.0, 0.0)))),

@@ -127,7 +127,9 @@ class _Resumption:
         self.curves, self.faults = curves_of(
             table.motions, IDENTITY, np.concatenate([poses[:1], poses[:-1]]), poses.copy()
         )
-        self.moves_joints = self.spline is None and not self.rounded
+        # Joint motions would turn a held part.
+        by_moves = self.spline is None and not self.rounded
+        self.moves_joints = by_moves and goal.moving_frame is None
         self.stopped = place.point + place.fraction
         self.begin = self._begin(place, overlap)
 

@@ -88,6 +88,10 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     is_timed,
     resolve_execution_mode,
 )
+from ur_cartesian_driver.planning.request.held_part_rules import (
+    check_part_keeps_orientation,
+    with_advice_for_part,
+)
 from ur_cartesian_driver.planning.request.ignored_fields import ignored_remarks
 from ur_cartesian_driver.planning.request.joint_points import check_for_arm
 from ur_cartesian_driver.planning.request.point_events.registry import (
@@ -169,7 +173,9 @@ def _plan_fixed(
         planner = GoalPlanner(retargeted, state.T_flange_tcp, arm, options, running)
         plan = PLANNERS[planner.mode](planner)
     except GoalRefused as refusal:
-        hinted = with_exchanged_frames(refusal, table, state)
+        of_part = table.moving_frame is not None
+        advised = with_advice_for_part(refusal) if of_part else refusal
+        hinted = with_exchanged_frames(advised, table, state)
         if hinted is refusal:
             raise
         raise hinted from None
@@ -213,6 +219,8 @@ def _plan_free(table: GoalTable, state: RobotState, arm: Arm, options: PlanningO
 def plan_moves(planner: GoalPlanner) -> Plan:
     """Return the plan of a goal whose points are connected by motion commands of the robot."""
     goal, state, arm, options = planner.goal, planner.state, planner.arm, planner.options
+    if planner.kinematics.frame_moves:
+        check_part_keeps_orientation(goal, planner.targets, state.actual_tcp_pose)
     first = planner.first_target()
     if options.laws.blend_begin < 1.0 and goal.segments.blend_radii.any():
         # A measured law must not let a goal pass that was refused: the path of the assumed blends
@@ -387,15 +395,20 @@ def _with_offset_band(plan: Plan, planner: GoalPlanner) -> Plan:
 def _held_part_remark(plan: Plan, planner: GoalPlanner) -> str:
     """Return a line about the arm behind a held part: how fast it is where it is fastest."""
     goal, time = plan.goal, plan.reference.time
+    led = (
+        f'held part: {goal.frame_id or "the part"} is led along '
+        f'{goal.controlled_frame or "the fixed tool"}'
+    )
+    if not plan.execution.traits.is_spline:
+        return f'{led} without turning, so that all speeds are those on the part and of the TCP'
     q, qd, _ = plan.joint_spline.rows(time)
     tcp = planner.kinematics.carrier_speeds(q, qd)
     assert tcp is not None
     parts = np.abs(qd) / planner.arm.model.max_joint_speed
     row, joint = divmod(int(np.argmax(parts)), 6)
     return (
-        f'held part: {goal.frame_id or "the part"} is led along '
-        f'{goal.controlled_frame or "the fixed tool"}, and all speeds are those on the part; in '
-        f'base the TCP reaches {tcp.max():.3f} m/s, and {JOINT_NAMES[joint]} '
+        f'{led}, and all speeds are those on the part; in base the TCP reaches '
+        f'{tcp.max():.3f} m/s, and {JOINT_NAMES[joint]} '
         f'{100.0 * parts[row, joint]:.0f} % of its speed limit, {time[row]:.2f} s after the start'
     )
 

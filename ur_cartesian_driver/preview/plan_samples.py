@@ -24,6 +24,7 @@ from ur_cartesian_driver.motion.geometry.vectors import ZERO6
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import OptimoveJ, OptimoveL, Spline, Stop
+from ur_cartesian_driver.planning.preflight.held_part_kinematics import kinematics_of
 from ur_cartesian_driver.planning.preflight.planned_joints import (
     joint_moves,
     joints_along,
@@ -60,11 +61,11 @@ def sample(plan: Plan, arm: Arm, T_flange_tcp: Pose, period: float) -> Preview:
     places = row_places(reference, time)
     row = np.minimum(places.astype(np.intp), max(len(reference.time) - 2, 0))
     poses = [_between(reference, int(k), float(f)) for k, f in zip(row, places - row, strict=True)]
-    tcp = T_flange_tcp if plan.T_flange_tcp is None else plan.T_flange_tcp
     if plan.execution.traits.is_spline:
         joints = _spline(plan).rows(time)[0]
     else:
-        flange = np.array([(pose @ tcp.inverse()).row() for pose in poses])
+        kinematics = kinematics_of(plan.goal.moving_frame, arm, plan.T_flange_tcp or T_flange_tcp)
+        flange = kinematics.flange_rows(np.array([pose.row() for pose in poses]))
         joints = joints_along(arm, flange, places, joint_moves(plan), plan.start)
     return Preview(time=time, poses=np.array([pose.row() for pose in poses]), joints=joints)
 

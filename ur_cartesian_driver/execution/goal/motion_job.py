@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.execution.monitoring.press_window import PressWindow
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int32s
-from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose import conjugate, IDENTITY, Pose, Quaternion
 from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import (
@@ -24,6 +24,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     DEFAULT_STALL_TIMEOUT,
     DEFAULT_YIELDS,
     FeedOverride,
+    Goal,
     OnPathTolerance,
     OutputKind,
     PRESS_AXES,
@@ -313,7 +314,7 @@ def _press_windows(plan: Plan) -> Iterator[PressWindow]:
             q_base_task={
                 PressFrame.TOOL: None,
                 PressFrame.GOAL: goal.T_base_frame.quaternion,
-                PressFrame.BASE: IDENTITY.quaternion,
+                PressFrame.BASE: _base_seen(goal, press.last_waypoint),
             }[press.frame],
             max_yields=(
                 press.max_yield or DEFAULT_YIELDS[0],
@@ -321,6 +322,13 @@ def _press_windows(plan: Plan) -> Iterator[PressWindow]:
             ),
             ends_at_contact=press.contact != ContactEnd.NONE,
         )
+
+
+def _base_seen(goal: Goal, waypoint: int) -> Quaternion:
+    """Return the axes of the base as seen from the frame of the path, with the tool at a point."""
+    if goal.moving_frame is None:
+        return IDENTITY.quaternion
+    return conjugate(goal.moving_frame.frame_under(goal.waypoints[waypoint].pose).quaternion)
 
 
 def _feed_override(wanted: FeedOverride) -> FeedOverride | None:

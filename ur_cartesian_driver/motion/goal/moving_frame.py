@@ -36,9 +36,13 @@ class MovingFrame:
         """Return the pose of the tool in the frame."""
         return self.frame(T_base_flange).inverse() @ self.T_base_tool
 
+    def frame_under(self, T_frame_tool: Pose) -> Pose:
+        """Return the frame in base where the tool is at a pose in the frame."""
+        return self.T_base_tool @ T_frame_tool.inverse()
+
     def flange(self, T_frame_tool: Pose) -> Pose:
         """Return the pose of the flange in base that leads the tool to a pose in the frame."""
-        return self.T_base_tool @ T_frame_tool.inverse() @ self.T_flange_frame.inverse()
+        return self.frame_under(T_frame_tool) @ self.T_flange_frame.inverse()
 
     def flange_shift(self, T_base_flange: Pose, shift: Vector3) -> Vector3:
         """Return the shift of the flange in base [m] that shifts the tool in the frame."""

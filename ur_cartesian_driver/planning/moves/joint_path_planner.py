@@ -93,7 +93,7 @@ class JointPathPlanner:
     """
     Plans the joint paths of the segments of one goal in order, beginning at the robot's pose.
 
-    :param targets: the poses of all waypoints in base (n, 7).
+    :param targets: the poses of all waypoints in the frame of the path (n, 7).
     :param remarks: list to which remarks on changed or ignored fields are appended.
     :param reasons: for each waypoint, the list to which reasons for a special primitive are added.
     """
@@ -115,16 +115,17 @@ class JointPathPlanner:
         self.goal, self.targets, self.kinematics, self.options = goal, targets, kinematics, options
         self.remarks, self.reasons = remarks, reasons
         self._max_path_length = max_path_length(kinematics)
-        self._replaces = options.on_posture_change == 'movej'
+        # A joint move would turn a held part.
+        self._replaces = options.on_posture_change == 'movej' and not kinematics.frame_moves
         self._laws = options.laws
         self._blend_uncertainty = blend_uncertainty(options)
 
-    def geometries(self, begin: int, T_base_tcp: Pose, q: Joints) -> SegmentGeometries:
+    def geometries(self, begin: int, T_frame_tool: Pose, q: Joints) -> SegmentGeometries:
         """
         Return every segment with its curve, its blends and the configuration at its end.
 
         :param begin: index of the first waypoint with a motion.
-        :param T_base_tcp: pose of the tool at the start.
+        :param T_frame_tool: pose of the tool in the frame of the path at the start.
         :param q: joint positions at the start [rad].
         :raises GoalRefused: the arm cannot follow the path.
         """
@@ -132,7 +133,7 @@ class JointPathPlanner:
         self._parts: list[PathSamples] = []
         self._sample_count = 0
         self._drafts = SegmentDrafts(
-            self.goal, self.targets, begin, T_base_tcp, self.options, self.remarks
+            self.goal, self.targets, begin, T_frame_tool, self.options, self.remarks
         )
         self._path = self._drafts.path
         n = len(self._drafts)

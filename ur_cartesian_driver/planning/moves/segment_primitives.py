@@ -75,13 +75,17 @@ def segment_primitives(
     :raises InvalidPosture: the arm would not pass a via in the configuration of the via's posture.
     """
     kinds, vias = geometries.kinds, geometries.segments.vias
+    targets, kinematics = paths.targets[geometries.begin :], paths.kinematics
     arcs = np.flatnonzero(IS_ARC[kinds])
     if len(arcs):
         vias = vias.copy()
         vias[arcs] = transform_rows(paths.goal.T_base_frame, vias[arcs])
+        if kinematics.frame_moves:  # a held part passes its vias without turning, too
+            vias[arcs, 3:] = targets[arcs, 3:]
+        vias[arcs] = kinematics.tcp_poses(vias[arcs])
     moves = MoveRows(
         kinds=_MOVE_OF[kinds],
-        targets=paths.targets[geometries.begin :],
+        targets=kinematics.tcp_poses(targets),
         q_near=geometries.joints,
         has_q_near=IS_JOINT_MOVE[kinds],
         vias=vias,
@@ -102,7 +106,7 @@ class _SpecialPrimitives:
         self, paths: JointPathPlanner, geometries: SegmentGeometries, moves: MoveRows
     ) -> None:
         self._paths, self._geometries, self._moves = paths, geometries, moves
-        self._options, self._kinematics = paths.options, paths.kinematics
+        self._options, self._kinematics = paths.options, paths.kinematics.of_tcp
         self._postures = geometries.waypoints.postures
 
     def by_row(self) -> Mapping[int, Primitive]:

@@ -68,6 +68,15 @@ class HeldPartKinematics(TcpKinematics):
         """Return the pose of the TCP in base for a pose of the tool in the frame."""
         return self.flange(T_frame_tool) @ self.T_flange_tcp
 
+    def tcp_poses(self, poses: Floats) -> Floats:
+        """Return the poses of the TCP in base (n, 7) for poses of the tool in the frame (n, 7)."""
+        return compose_rows(self.flange_rows(poses), self.T_flange_tcp)
+
+    @property
+    def of_tcp(self) -> TcpKinematics:
+        """The kinematics of the TCP in base, whose poses the robot receives."""
+        return TcpKinematics(self.arm, self.T_flange_tcp)
+
     def pose_rows(self, q: Floats) -> Floats:
         """Return the poses of the tool in the frame (n, 7) at joint positions (n, 6) [rad]."""
         T_base_frame = tcp_rows(self.arm, self._frame.T_flange_frame, q)

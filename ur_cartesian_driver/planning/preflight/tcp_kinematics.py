@@ -91,6 +91,15 @@ class TcpKinematics:
         """Return the pose of the TCP in base for a pose of the tool."""
         return T_base_tcp
 
+    def tcp_poses(self, poses: Floats) -> Floats:
+        """Return the poses of the TCP in base (n, 7) for poses of the tool (n, 7)."""
+        return poses
+
+    @property
+    def of_tcp(self) -> TcpKinematics:
+        """The kinematics of the TCP in base, whose poses the robot receives."""
+        return self
+
     def pose_rows(self, q: Floats) -> Floats:
         """Return the poses of the tool (n, 7) at joint positions (n, 6) [rad]."""
         return tcp_rows(self.arm, self.T_flange_tcp, q)

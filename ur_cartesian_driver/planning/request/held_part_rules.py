@@ -1,28 +1,104 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Rules about goals whose frame is on a part that the arm holds."""
+"""
+Rules about goals whose frame is on a part that the arm holds.
+
+Splines lead the part along any path. The controller's lines and arcs are those of the TCP in base:
+they are lines and arcs of the tool on the part, too, if the part does not turn, because then all
+its points move alike, and the tool moves on the part the opposite way.
+"""
 
 from __future__ import annotations
 
-from ur_cartesian_driver.motion.errors import NotAvailable
-from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
+from math import degrees
+import re
+
+import numpy as np
+
+from ur_cartesian_driver.motion.errors import GoalRefused, NotAvailable
+from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows
+from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
+from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.mode_rules import check_mode, GOAL_RULES
+from ur_cartesian_driver.planning.request.goal_fields import (
+    IS_JOINT_MOVE,
+    point_field,
+    resolve_execution_mode,
+    segment_field,
+)
+
+#: Turns of the part up to this angle [rad] on a line or an arc are neglected: the tool leaves a
+#: line of a length L on the part by L angle / 4, which is 25 um for a metre.
+MAX_TURN = 1e-4
+_JOINT_ADVICE = re.compile(
+    r'use (PRIMITIVES with )?a JOINT segment(, or set on_posture_change to movej)?'
+)
+_SPLINES = 'set execution to SPLINE or SERVO, with times or a corner_deviation'
 
 
 def check_held_part(goal: GoalTable, options: PlanningOptions) -> None:
     """
-    Refuse what a held part does not allow.
+    Refuse motions on a held part that the moves of the controller cannot lead.
 
-    :raises NotAvailable: the goal presses, or asks for moves of the controller.
+    :raises NotAvailable: a goal of PRIMITIVES has joint motions, arcs that turn the part, travels,
+        or offsets.
     """
-    if goal.moving_frame is None:
+    if goal.moving_frame is None or resolve_execution_mode(goal).traits.is_spline:
         return
-    if goal.presses:
-        raise NotAvailable(
-            'presses',
-            'is not empty, but the path is on a part that the arm holds, which only splines '
-            'follow exactly, and these follow joint positions, which do not give way',
-            'let the fixed tool give way, or hold the tool and fix the part',
+    segments = goal.motions
+    turns = IS_JOINT_MOVE[segments.types] | (segments.arc_modes == ArcMode.FIXED)
+    for i in rows_where(turns)[:1]:
+        kind = SegmentType(segments.types[i]).name
+        field, value = (
+            ('type', kind) if IS_JOINT_MOVE[segments.types[i]] else ('arc_mode', 'FIXED')
         )
-    check_mode(goal, GOAL_RULES['moving_frame'])
+        raise NotAvailable(
+            segment_field(i, field),
+            f'is {value}, which turns the part that the arm holds, and the moves of the '
+            'controller, which PRIMITIVES sends, lead a part only without turning it',
+            f'use LINEAR, PROCESS or an UNCONSTRAINED arc, or {_SPLINES}',
+        )
+    if goal.allow_travel:
+        raise NotAvailable(
+            'allow_travel',
+            'is set, but the path is on a part that the arm holds, and a travel turns it',
+            'lead there by a goal of its own',
+        )
+    if goal.path_offset:
+        raise NotAvailable(
+            'path_offset',
+            'is set, but the path is on a part that the arm holds, and the controller, which '
+            'offsets PRIMITIVES, knows nothing of the frame on the part',
+            'set execution to SERVO, with times or a corner_deviation',
+        )
+
+
+def with_advice_for_part(refusal: GoalRefused) -> GoalRefused:
+    """Return the refusal of a path on a held part, which has no JOINT segments."""
+    advice = 'let the tool turn about an axis of its own (free_axis)'
+    return refusal.reworded(_JOINT_ADVICE.sub(advice, str(refusal)))
+
+
+def check_part_keeps_orientation(goal: GoalTable, targets: Floats, start: Pose) -> None:
+    """
+    Refuse a goal of PRIMITIVES that turns the held part.
+
+    :param targets: the points in the frame on the part, rows (n, 7).
+    :param start: pose of the tool in that frame at the start.
+    :raises NotAvailable: a segment turns the part.
+    """
+    before = np.concatenate([[start.row()], targets[:-1]])
+    angles = angle_rows(before[:, 3:], targets[:, 3:])
+    for i in rows_where(angles > MAX_TURN)[:1]:
+        whence = f'points[{i - 1}]' if i else 'where the arm stands'
+        least = 'keep the orientation' if i else 'bring the arm there by a goal of its own'
+        presses = ', and only these give way to presses' if goal.presses else ''
+        raise NotAvailable(
+            point_field(i, 'pose.orientation'),
+            f'turns the part that the arm holds by {degrees(angles[i]):.3g} degrees from '
+            f'{whence}, but the moves of the controller, which PRIMITIVES sends, are straight in '
+            f'base, and curves on a part that turns{presses}',
+            least if goal.presses else f'{least}, or {_SPLINES}',
+        )

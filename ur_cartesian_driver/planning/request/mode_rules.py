@@ -24,8 +24,6 @@ class ModeRule:
     problem: str
     #: A second remedy, appended to the advice to choose a mode that can honour the field.
     remedy: str = ''
-    #: The name of the field in refusals; '' = ``field``.
-    name: str = ''
 
 
 #: Rules for fields of the goal as a whole; those for events at points are in ``point_events``.
@@ -64,14 +62,6 @@ GOAL_RULES = {
             '{mode}',
             ', or lead there by a goal of its own, such as that of Path.travel_to()',
         ),
-        ModeRule(
-            'moving_frame',
-            lambda traits: traits.is_spline,
-            'is on a part that the arm holds, but the moves of the controller, which {mode} '
-            'sends, are straight in base, and curves on a part that turns',
-            ', with times or a corner_deviation',
-            name='trajectory.header.frame_id',
-        ),
     )
 }
 
@@ -89,7 +79,7 @@ def check_mode(goal: GoalTable, rule: ModeRule | None) -> None:
     if not rule.is_able(mode.traits):
         able = [each.name for each, traits in EXECUTION_MODES.items() if rule.is_able(traits)]
         raise NotAvailable(
-            rule.name or rule.field,
+            rule.field,
             rule.problem.format(mode=mode.name, value=value),
             f'set execution to {" or ".join(able)}{rule.remedy}',
         )

@@ -152,7 +152,7 @@ class Presses(PointEvent[Press]):
         for press in goal.presses:
             what = 'pressing' if press.axes else 'watching for contact'
             yield PlacedStop(press.last_waypoint, EndPress(), f'stops {what} there', order=-1)
-            for record, note in press_records(press, goal.T_base_frame):
+            for record, note in press_records(press, *_task_frames(goal, press)):
                 yield PlacedStop(press.first_waypoint, record, note, order=2)
 
     def left(self, events: Sequence[Press], rest: GoalRest) -> Sequence[Press]:
@@ -163,13 +163,33 @@ class Presses(PointEvent[Press]):
         )
 
 
-def press_records(press: Press, T_base_frame: Pose) -> Iterator[tuple[PressLaw | BeginPress, str]]:
-    """Yield the records with which a press begins, each with its note for the report."""
+def _task_frames(goal: GoalTable, press: Press) -> tuple[Pose, Pose | None]:
+    """Return the frame of the goal, and the fixed tool if the arm holds the part."""
+    held = goal.moving_frame
+    if held is None:
+        return goal.T_base_frame, None
+    part = held.frame_under(goal.waypoints.pose(press.last_waypoint))
+    return Pose(held.T_base_tool.position, part.quaternion), held.T_base_tool
+
+
+def press_records(
+    press: Press, T_base_frame: Pose, T_base_tool: Pose | None = None
+) -> Iterator[tuple[PressLaw | BeginPress, str]]:
+    """
+    Yield the records with which a press begins, each with its note for the report.
+
+    :param T_base_frame: the frame of the goal; of a held part its axes, at the fixed tool.
+    :param T_base_tool: the fixed tool before a held part, on which the arm acts with the opposite
+        of what the tool does to the part; None = the arm holds the tool.
+    """
+    # TOOL has no fixed frame while the arm holds the tool: the robot program follows it.
+    task = {PressFrame.TOOL: T_base_tool or IDENTITY, PressFrame.GOAL: T_base_frame}
+    sign = 1.0 if T_base_tool is None else -1.0
     wrench, limits = [0.0] * 6, []
     for k, axis in enumerate(PRESS_AXES):
         if axis in press.axes:
             at = press.axes.index(axis)
-            wrench[k] = press.forces[at]
+            wrench[k] = sign * press.forces[at]
             limits.append(_speed_limit(press, at))
         else:
             given = press.max_deviation_angle if is_turn(axis) else press.max_deviation
@@ -183,9 +203,9 @@ def press_records(press: Press, T_base_frame: Pose) -> Iterator[tuple[PressLaw |
         contact=press.contact,
     )
     begin = BeginPress(
-        T_base_task=T_base_frame if press.frame is PressFrame.GOAL else IDENTITY,
+        T_base_task=task.get(press.frame, IDENTITY),
         compliant=vector6(float(axis in press.axes) for axis in PRESS_AXES),
-        follows_tool=press.frame is PressFrame.TOOL,
+        follows_tool=press.frame is PressFrame.TOOL and T_base_tool is None,
     )
     yield law, ''
     yield begin, _note(press)
