@@ -36,6 +36,7 @@ from ur_cartesian_driver.motion.goal.goal import (
 from ur_cartesian_driver.motion.plan.primitive import MoveC
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
+from ur_cartesian_driver.preview import sample
 
 pytest.importorskip('pinocchio')
 
@@ -124,8 +125,12 @@ def test_lines_and_arcs_of_the_tcp_are_those_of_the_tool_on_a_part_that_does_not
         # The joints that are told of the end are those with the tool there.
         end = case.relative(np.array([made.segments[-1].joints]))[0]
         np.testing.assert_allclose(end, case.goal.waypoints[-1].pose.matrix(), atol=1e-6)
-        last = case.relative(np.array([made.start]))[0]
-        np.testing.assert_allclose(made.reference.poses[0, :3], last[:3, 3], atol=1e-9)
+        first = case.relative(np.array([made.start]))[0]
+        np.testing.assert_allclose(made.reference.poses[0, :3], first[:3, 3], atol=1e-9)
+        # The joints of a preview lead the tool where it says.
+        shown = sample(made, case.arm, TCP, 0.2)
+        tool = case.relative(shown.joints)[:, :3, 3]
+        np.testing.assert_allclose(tool, shown.poses[:, :3], atol=1e-6)
     assert refused <= 0.6 * count + 2
 
 
