@@ -76,13 +76,11 @@ def samples(curves: Iterable[np.ndarray]) -> np.ndarray:
 
 
 def _dense(curve):
-    lengths = np.linalg.norm(np.diff(curve, axis=0), axis=1)
-    counts = 1 + (lengths / SPACING).astype(int)
-    parts = [
-        curve[i] + np.arange(n)[:, None] / n * (curve[i + 1] - curve[i])
-        for i, n in enumerate(counts)
-    ]
-    return np.vstack([*parts, curve[-1:]])
+    spans = np.diff(curve, axis=0)
+    counts = 1 + (np.linalg.norm(spans, axis=1) / SPACING).astype(int)
+    row = np.repeat(np.arange(len(spans)), counts)
+    part = (np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[row]
+    return np.vstack([curve[row] + part[:, None] * spans[row], curve[-1:]])
 
 
 def places_along(curve: np.ndarray, positions: np.ndarray, reach: float):
