@@ -18,8 +18,16 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal.goal import Goal, IOCommand, OutputKind, SafeOutput, Waypoint
+from ur_cartesian_driver.motion.goal.goal import (
+    Goal,
+    IOCommand,
+    OutputKind,
+    SafeOutput,
+    Segment,
+    Waypoint,
+)
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
@@ -157,6 +165,52 @@ def test_a_pause_makes_outputs_safe_and_only_those_that_may_be_are_restored(rest
                 'A pause has changed the standard digital output 3, which safe_outputs does not '
                 'name as one to be restored'
             )
+
+    run_cell(scenario)
+
+
+def test_an_output_that_a_goal_switches_where_the_arm_coasts_into_a_pause_is_not_restored():
+    """The place at which it goes off lies where the arm brakes: off it stays."""
+
+    async def scenario(cell):
+        outputs = cell.robot.controller.io.digital_out.standard
+        state = cell.memory.read()
+        (x, y, z), turned = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
+        goal = Goal(
+            waypoints=tuple(
+                Waypoint(pose=Pose((x, y + dy, z), turned)) for dy in (0.01, 0.06, 0.12)
+            ),
+            segments=(Segment(velocity=0.1, acceleration=1.0, blend_radius=0.004),) * 3,
+            io_commands=tuple(
+                IOCommand(waypoint=k, offset=0.0, output=GLUE, pin=3, value=value)
+                for k, value in ((0, 1.0), (1, 0.0))
+            ),
+            safe_outputs=(SafeOutput(output=GLUE, pin=3, value=0.0, restore=True),),
+        )
+        motion = cell.owner.start(plan(goal, state, ARM, PlanningOptions()))
+
+        def at():
+            return cell.memory.read().actual_tcp_pose.position[1] - y
+
+        await cell.until(lambda: at() > 0.059)
+        assert outputs[3]
+        for _ in range(2):  # before the first one is over for the driver
+            cell.robot.inject('pause')
+            await cell.until(lambda: not outputs[3])
+            await cell.until(lambda: cell.memory.read().runtime_state is RuntimeState.PAUSED)
+            cell.robot.play_program()
+            await cell.until(lambda: cell.memory.read().runtime_state is RuntimeState.PLAYING)
+        assert 0.06 < at() < 0.1
+        seen = []
+
+        def ended():
+            seen.append(bool(outputs[3]))
+            return motion.outcome
+
+        await cell.until(ended)
+        assert motion.outcome.succeeded, motion.outcome
+        assert not seen[-1]
+        assert sum(seen) <= 2
 
     run_cell(scenario)
 

@@ -56,8 +56,7 @@ class Scene:
         monkeypatch.setattr(output_securer, 'RETRY_PERIOD', 0.001)
         config: Any = SimpleNamespace(robot_ip='', rtde_port=0)
         link: Any = SimpleNamespace(report_error=self.errors.append)
-        pipe: Any = SimpleNamespace(log=lambda level, text: self.errors.append(text))
-        self.securer = OutputSecurer(config, link, pipe, self.spawn, self.reported.append)
+        self.securer = OutputSecurer(config, link, self.spawn, self.reported.append)
 
     def spawn(self, work) -> None:
         """Run a coroutine concurrently."""
@@ -112,18 +111,14 @@ def test_a_second_pause_knows_what_the_first_one_has_changed(run):
     run(scenario)
 
 
-def test_a_restore_that_a_second_pause_replaces_is_not_lost(run):
+def test_outputs_that_were_given_back_are_not_written_again(run):
     async def scenario(scene):
+        scene.robot.failures = [FAILED, FAILED]
         scene.securer.secure((GLUE,))
+        await asyncio.sleep(0.0)
+        scene.securer.give_back()
         await scene.settled()
-        scene.securer.restore(scene.last.changed)
-        scene.securer.secure((GLUE,))  # before anything is written
-        await scene.settled()
-        assert scene.robot.writes == [(0.0,), (0.0,)]
-        assert scene.last.changed == (replace(GLUE, value=1.0),)
-        scene.securer.restore(scene.last.changed)
-        await scene.settled()
-        assert scene.robot.values[2] == 1.0
+        assert scene.robot.writes == [(0.0,)]
         scene.robot.values[2] = 0.0  # the program has switched it off
         scene.securer.secure((GLUE,))
         await scene.settled()
@@ -132,14 +127,14 @@ def test_a_restore_that_a_second_pause_replaces_is_not_lost(run):
     run(scenario)
 
 
-@pytest.mark.parametrize('other', ['restore', 'secure'])
-def test_the_end_of_a_motion_waits_for_the_first_attempt_and_no_longer(run, other):
+@pytest.mark.parametrize(('other', 'outputs'), [('give_back', ()), ('secure', ((GAS,),))])
+def test_the_end_of_a_motion_waits_for_the_first_attempt_and_no_longer(run, other, outputs):
     async def scenario(scene):
         done = []
         scene.robot.free.clear()
         scene.securer.secure((GLUE,))
         await asyncio.sleep(0.0)  # its write waits
-        getattr(scene.securer, other)((GAS,))
+        getattr(scene.securer, other)(*outputs)
         scene.securer.when_done(lambda: done.append(True))
         await asyncio.sleep(0.0)
         assert not done

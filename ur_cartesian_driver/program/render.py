@@ -413,6 +413,7 @@ def _output_constants() -> Iterator[str]:
     # Indices in the list that the robot reads; its length, command, action and token come first.
     yield 'SAFE_DIGITAL = 4'
     yield f'SAFE_ANALOG = {4 + script_command.DIGITAL_OUTPUTS}'
+    yield f'SAFE_LAST = {3 + script_command.DIGITAL_OUTPUTS + 2 * script_command.ANALOG_OUTPUTS}'
     yield f'DIGITAL_OUTPUTS = {script_command.DIGITAL_OUTPUTS}'
     yield f'ANALOG_OUTPUTS = {script_command.ANALOG_OUTPUTS}'
     for kind in (OutputKind.CONFIGURABLE_DIGITAL, OutputKind.TOOL_DIGITAL):

@@ -131,9 +131,7 @@ class MotionRunner:
             config.record_max_size,
             partial(_call_soon, asyncio.get_running_loop(), pipe.log, logging.WARNING),
         )
-        self._outputs = OutputSecurer(
-            config, link, pipe, spawn, lambda event: self.handle_event(event)
-        )
+        self._outputs = OutputSecurer(config, link, spawn, lambda event: self.handle_event(event))
         self._ends = EndReporter(link, pipe, self._recorder, self._outputs)
 
     @property
@@ -295,8 +293,8 @@ class MotionRunner:
                     )
                 case SecureOutputs(outputs=outputs):
                     self._outputs.secure(outputs)
-                case RestoreOutputs(outputs=outputs):
-                    self._outputs.restore(outputs)
+                case RestoreOutputs():
+                    self._outputs.give_back()
                 case StopProgram(reason=reason):
                     self._link.control.stop(reason)
                 case ReportProgress(progress=progress):

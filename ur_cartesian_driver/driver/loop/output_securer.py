@@ -6,11 +6,9 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine
-import logging
 from typing import Any
 
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
-from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
 from ur_cartesian_driver.motion.events import OutputsSecured
 from ur_cartesian_driver.motion.goal.goal import SafeOutput
 from ur_cartesian_driver.robot.link import RobotLink
@@ -28,7 +26,6 @@ class OutputSecurer:
         self,
         config: DriverConfig,
         link: RobotLink,
-        pipe: OwnerPipe,
         spawn: Callable[[Coroutine[None, None, None]], None],
         on_event: Callable[[OutputsSecured], None],
     ) -> None:
@@ -38,7 +35,7 @@ class OutputSecurer:
         :param spawn: runs a coroutine concurrently.
         :param on_event: called with the result of securing the running motion's outputs.
         """
-        self._config, self._link, self._pipe = config, link, pipe
+        self._config, self._link = config, link
         self._spawn, self._on_event = spawn, on_event
         #: Numbers of the newest order, and of the first one of this motion.
         self._newest = self._first = 0
@@ -46,7 +43,7 @@ class OutputSecurer:
         self._pending = 0
         #: The changed outputs with their values before the first change, until they are restored.
         self._originals: dict[tuple[int, int], SafeOutput] = {}
-        #: Allows only one write at a time: a late restore must not undo a safe value.
+        #: Allows only one write at a time.
         self._lock = asyncio.Lock()
         #: Why outputs of the motion are not safe, as a sentence; empty = no failure is known.
         self.failure = ''
@@ -58,10 +55,10 @@ class OutputSecurer:
         self._pending += 1
         self._spawn(self._secure(outputs, self._newest))
 
-    def restore(self, outputs: tuple[SafeOutput, ...]) -> None:
-        """Write the values that outputs had before a pause."""
+    def give_back(self) -> None:
+        """Write nothing more for the last pause, after which the robot program restores values."""
         self._newest += 1
-        self._spawn(self._restore(outputs, self._newest))
+        self._originals = {}
 
     def forget(self) -> None:
         """Drop the orders of the previous motion, because another motion begins."""
@@ -112,17 +109,6 @@ class OutputSecurer:
         if not self._pending and self._on_done is not None:
             done, self._on_done = self._on_done, None
             done()
-
-    async def _restore(self, outputs: tuple[SafeOutput, ...], number: int) -> None:
-        async with self._lock:
-            if number != self._newest:
-                return  # another pause has begun; they stay safe, and are restored after it
-            result = await self._write(outputs, {})
-            if number >= self._first and not result.failure:
-                for output in outputs:
-                    self._originals.pop((output.output, output.pin), None)
-        if result.failure:
-            self._pipe.log(logging.WARNING, f'not restored after the pause: {result.failure}')
 
     async def _write(
         self, outputs: tuple[SafeOutput, ...], before: dict[str, Any]

@@ -64,7 +64,7 @@ class RestoreTcp(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SendSafeOutputs(GoalCommand):
-    """Have the robot program store the safe values of outputs, set them, or forget them."""
+    """Have the robot program store, set or forget safe values, or restore outputs."""
 
     action: SafeOutputsAction
     token: int
@@ -80,9 +80,7 @@ class SecureOutputs(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RestoreOutputs(GoalCommand):
-    """Write back the values that the robot's outputs had before a pause."""
-
-    outputs: tuple[SafeOutput, ...]
+    """Write no safe values any more, because the robot program restores the outputs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

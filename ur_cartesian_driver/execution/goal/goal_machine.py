@@ -423,7 +423,7 @@ class GoalMachine:
 
     def _secure_unconfirmed(self) -> list[GoalCommand]:
         """Write the safe outputs of a failed goal, unless the program has confirmed them."""
-        is_safe = self._has_entered_restoring and self._guard.is_safe(self._packet)
+        is_safe = self._has_entered_restoring and self._guard.is_confirmed(self._packet)
         if self.outcome.succeeds or is_safe:
             return []
         # On entering RESTORING, the machine has already released the outputs.

@@ -52,8 +52,6 @@ class OutputGuard:
         self._is_ordered = False
         #: The outputs that the driver's write has changed, with their previous values.
         self._changed: tuple[SafeOutput, ...] = ()
-        #: Whether the driver was told to restore outputs, which it may finish after the goal ends.
-        self._has_restored = False
 
     def __bool__(self) -> bool:
         """Return whether the goal has safe outputs."""
@@ -77,16 +75,16 @@ class OutputGuard:
         """Return whether the robot program has carried out the last order."""
         return not self or (packet is not None and packet.safe_outputs_token == self._token)
 
-    def is_safe(self, packet: RobotState | None) -> bool:
-        """Return whether after :meth:`release` the outputs are safe and will stay so."""
-        return self.is_confirmed(packet) and not self._has_restored
-
-    def _order(self, action: SafeOutputsAction) -> list[GoalCommand]:
+    def _order(
+        self, action: SafeOutputsAction, outputs: tuple[SafeOutput, ...] | None = None
+    ) -> list[GoalCommand]:
+        """Return an order to the robot program; None = about all outputs of the goal."""
         if not self:
             return []
         # The token wraps around within an int32; 0 is the token of a new program.
         self._token = self._token % (2**31 - 1) + 1
-        return [SendSafeOutputs(action=action, token=self._token, outputs=self._outputs)]
+        given = self._outputs if outputs is None else outputs
+        return [SendSafeOutputs(action=action, token=self._token, outputs=given)]
 
     # ---- the driver ---------------------------------------------------------------------------
 
@@ -140,5 +138,4 @@ class OutputGuard:
         )
         if not restored:
             return []
-        self._has_restored = True
-        return [RestoreOutputs(outputs=restored)]
+        return [RestoreOutputs(), *self._order(SafeOutputsAction.RESTORE, restored)]

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Writes the safe values of outputs if the robot program is paused or gone, or restores old values.
+Writes the safe values of outputs if the robot program is paused or gone.
 
 Each kind of output is written separately: if another client holds the inputs of one kind, the
 other kinds are still set.
