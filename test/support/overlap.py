@@ -31,6 +31,7 @@ COMPUTING = (
     'test/acceptance/test_gcode_programs.py',
     'test/acceptance/test_hand_back.py',
     'test/acceptance/test_held_part_seams.py',
+    'test/acceptance/test_held_parts_disturbed.py',
     'test/acceptance/test_held_parts_on_the_robot.py',
     'test/acceptance/test_input_waits.py',
     'test/acceptance/test_io_commands.py',
