@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from random_cells import CellJudge
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -48,11 +49,14 @@ def test_a_part_does_not_move_when_it_is_taken_or_put_down(frame):
     tcp = Pose((0.0, 0.0, 0.1))
     cell = Cell(bodies=(FLOOR, CellBody(name='part', shapes=BOX, frame=frame, T_frame_body=PLACE)))
     held = attached(cell, 'part', arm, q, tcp)
-    if frame == 'base':
-        np.testing.assert_allclose(place_in_base(arm, held, q), PLACE.matrix(), atol=1e-12)
-    if frame == 'base_link':  # turned by half a turn about z
-        turn = np.diag([-1.0, -1.0, 1.0, 1.0])
-        np.testing.assert_allclose(place_in_base(arm, held, q), turn @ PLACE.matrix(), atol=1e-9)
+    T_base_frame = {
+        'base': np.eye(4),
+        'base_link': np.diag([-1.0, -1.0, 1.0, 1.0]),  # turned by half a turn about z
+        'forearm_link': CellJudge(arm, tcp, Cell()).frames(q)[3],  # by pinocchio
+    }[frame]
+    np.testing.assert_allclose(
+        place_in_base(arm, held, q), T_base_frame @ PLACE.matrix(), atol=1e-9
+    )
     put = released(held, 'part', arm, later, tcp)
     assert put.body('part').frame == 'base'
     np.testing.assert_allclose(
