@@ -55,6 +55,22 @@ def test_a_secondary_program_stops_the_robot_and_the_code_and_state_come_at_once
         assert client.await_('state')['stamp'] - stopped['stamp'] <= 100_000
 
 
+def test_a_secondary_program_sets_the_slider_through_a_socket_to_the_robot_itself(make_robot):
+    # Published programs of a laboratory with a UR10e do so.
+    robot = make_robot()
+    host, port = robot.config.host, robot.ports.realtime
+    with primary(robot) as client:
+        client.send(
+            f'sec slow():\n  textmsg(socket_open("{host}", {port}))\n'
+            '  socket_send_line("set speed 0.5")\n  socket_close()\nend\n'
+        )
+        assert client.await_('text')['text'] == 'True'
+        client.await_('state', fraction=0.5)
+        client.send('sec waits():\n  socket_open("no.such.host.invalid", 80)\nend\n')
+        error = client.await_('key', title='SECONDARY_PROGRAM_EXCEPTION_XXX')
+        assert 'socket_open takes time' in error['text']
+
+
 def test_a_line_unlocks_without_the_wait_of_the_dashboard_but_not_within_a_millisecond(make_robot):
     robot = make_robot(rate=1.0)
     with primary(robot) as client, dashboard(robot) as board:

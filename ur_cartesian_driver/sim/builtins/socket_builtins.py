@@ -59,6 +59,8 @@ class SocketBuiltins(BuiltinGroup):
             self._sockets.close(name)
             return False
         self._sockets.open(name, text(address, 'address'), port_)
+        # A peer on the same computer is connected by now.
+        self._sockets.poll()
         deadline = self._now + CONNECT_TIMEOUT
         while self._sockets.state(name) is SocketState.CONNECTING:
             if self._now >= deadline:
@@ -117,16 +119,16 @@ class SocketBuiltins(BuiltinGroup):
     def socket_read_ascii_float(
         self, number: Value, socket_name: Value = 'socket_0', timeout: Value = 2
     ) -> Generator[None, None, list[float]]:
-        """Return numbers written as `(1.4, 2)` as [n, v1 .. vn]; on failure [0, nan .. nan]."""
+        """Return `(1.4, 2)` as [2, 1.4, 2]; missing numbers are nan, on failure all of them."""
         count = _count(number)
         data = yield from self._wait(socket_name, timeout, _through(b')'))
         try:
             values = [float(item) for item in (data or b'').decode().strip('() \r\n').split(',')]
         except ValueError:
             values = []
-        if len(values) != count:
-            return [0.0] + [float('nan')] * count
-        return [float(count), *values]
+        if len(values) > count:
+            values = []
+        return [float(len(values)), *values] + [float('nan')] * (count - len(values))
 
     def socket_read_string(
         self,

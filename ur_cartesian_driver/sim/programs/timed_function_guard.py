@@ -18,6 +18,9 @@ Builtins = Mapping[str, Any]
 #: Functions that act at once and then wait, if at all; a secondary program can call them, but does
 #: not wait.
 ACT_AT_ONCE = frozenset({'popup', 'protective_stop'})
+#: Functions that a secondary program can call if they have nothing to wait for. Published
+#: secondary programs open a socket to the robot itself.
+_MAY_END_AT_ONCE = frozenset({'socket_open'})
 
 
 def refuse_timed_functions(builtins: Builtins) -> Builtins:
@@ -30,10 +33,15 @@ def refuse_timed_functions(builtins: Builtins) -> Builtins:
 
 def _without_time(name: str, function: Any) -> Any:
     @functools.wraps(function)
-    def act_or_refuse(*arguments: Any, **named: Any) -> None:
+    def act_or_refuse(*arguments: Any, **named: Any) -> Any:
+        if name in ACT_AT_ONCE | _MAY_END_AT_ONCE:
+            try:
+                next(function(*arguments, **named))
+            except StopIteration as end:
+                return end.value
         if name not in ACT_AT_ONCE:
             raise RuntimeException(f'{name} takes time, which a secondary program does not have.')
-        next(function(*arguments, **named), None)
+        return None
 
     # Keep the function's signature, but not its mark as a generator.
     act_or_refuse.__signature__ = inspect.signature(  # type: ignore[attr-defined]  # all have it
