@@ -112,7 +112,7 @@ def test_software_that_lacks_a_command_does_not_parse_it():
     assert DashboardServerCodec((5, 3)).feed(b'safetystatus\n') == ['safetystatus']
 
 
-@pytest.mark.parametrize('line', ['brake_release', 'play it', 'load', '', 'Play'])
+@pytest.mark.parametrize('line', ['brake_release', 'play it', 'load', '', 'Playing'])
 def test_a_line_that_is_not_a_command_is_returned_and_answered(line):
     assert DashboardServerCodec().feed(line.encode() + b'\r\n') == [line]
     answer = not_understood(line).decode().rstrip('\n')

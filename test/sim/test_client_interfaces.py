@@ -112,6 +112,8 @@ def test_programs_and_control_lines_are_taken(robot, interface):
         )
         connection.sendall(b'set speed 0.5\n')
         until(lambda: robot.state().speed_slider == 0.5)
+        connection.sendall(b'set speed0.25\n')  # the forum's way of doing it from a program
+        until(lambda: robot.state().speed_slider == 0.25)
         connection.sendall(b'stop program\n')
         until(lambda: robot.state().runtime_state is RuntimeState.STOPPED)
         connection.sendall(b'power off\n')

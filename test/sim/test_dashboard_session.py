@@ -140,13 +140,28 @@ def test_the_table_is_complete():
         ('pause', 'Failed to execute: pause'),
         ('addToLog', 'No log message to add'),
         ('set operational mode dancing', 'could not understand: "set operational mode dancing"'),
-        ('Play', 'could not understand: "Play"'),
         ('play now', 'could not understand: "play now"'),
         ('', 'could not understand: ""'),
     ],
 )
 def test_what_cannot_be_done_is_said(command, answer):
     assert DashboardUser(5, 21).ask(command) == answer
+
+
+@pytest.mark.parametrize(
+    ('command', 'answer'),
+    [
+        ('polyscopeVersion', 'URSoftware 5.21.0.0 (Jan 01 2026)'),
+        ('Load A.urp', 'File not found: A.urp'),
+        ('ROBOTMODE', 'Robotmode: RUNNING'),
+        ('Pause', 'Failed to execute: pause'),
+        ('popup Hold ON', 'showing popup'),
+    ],
+)
+def test_capital_letters_make_no_difference_in_commands(command, answer):
+    user = DashboardUser(5, 21)
+    assert user.ask(command) == answer
+    assert [popup.text for popup in user.controller.popups] in ([], ['Hold ON'])
 
 
 def test_the_name_of_a_program_may_stand_in_quotation_marks():

@@ -273,16 +273,17 @@ class DashboardServerCodec:
         """
         Take bytes from a client (``b''`` = end of stream) and return its commands.
 
-        A line that is not a command is returned as text; such a line needs a reply, too
-        (:func:`not_understood`).
+        Capital letters make no difference in the name of a command. A line that is not a command
+        is returned as text; such a line needs a reply, too (:func:`not_understood`).
 
         :raises RemoteProtocolError: a line is too long, or the stream ended inside one.
         """
         return [self._request(line.strip()) for line in self._lines.feed(data)]
 
     def _request(self, line: str) -> DashboardRequest | str:
+        words = line.lower()
         for name in self._names:
-            if line == name or line.startswith(name + ' '):
+            if words == (known := name.lower()) or words.startswith(known + ' '):
                 with suppress(LocalProtocolError):
                     return DashboardRequest(name=name, argument=line[len(name) :].strip())
         return line

@@ -21,6 +21,8 @@ from ur_cartesian_driver.sim.programs.script_upload import (
 #: Error code of a script port that is read-only.
 READ_ONLY = 210
 
+#: Published programs send the number behind it without a blank.
+_SET_SPEED = 'set speed'
 _CONTROL: Mapping[str, Callable[[Controller], object]] = {
     'power on': Controller.power_on,
     'power off': Controller.power_off,
@@ -53,8 +55,8 @@ def execute_command(controller: Controller, item: UploadedItem, *, may_send: boo
         refusal = _CONTROL[item.text](controller)
         if refusal:
             controller.messages.text(f'{item.text}: refused, {refusal}.')
-    elif item.text.startswith('set speed '):
-        _set_speed(controller, item.text.removeprefix('set speed '))
+    elif item.text.startswith(_SET_SPEED):
+        _set_speed(controller, item.text.removeprefix(_SET_SPEED).strip())
     else:
         controller.programs.submit(f'def unnamed():\n{item.text}\nend\n', line_offset=1)
 
