@@ -26,7 +26,10 @@ VERSION = ControllerVersion(major=5, minor=21, bugfix=0)
 
 
 def server(**options):
-    return RtdeServerCodec(VERSION, set(), **options)
+    controller = RtdeServerCodec(VERSION, set(), **options)
+    controller.feed(RequestProtocolVersion(version=2).encode())
+    controller.data_to_send()
+    return controller
 
 
 def test_a_new_output_recipe_takes_the_place_of_the_one_before():
@@ -53,6 +56,12 @@ def test_in_version_1_there_is_one_output_recipe_without_id():
     )
     assert len(controller.output.recipe.pack(((0.0,) * 6,))) == 3 + 48
     assert controller.data_to_send().endswith(b'OVECTOR6D')
+
+
+def test_a_client_that_asks_for_no_version_gets_version_1():
+    controller = RtdeServerCodec(VERSION, set())
+    controller.feed(b'\0\x15Otimestamp,target_q' + b'\0\3S')
+    assert controller.data_to_send() == b'\0\x12ODOUBLE,VECTOR6D' + b'\0\4S\1'
 
 
 def test_a_client_with_one_recipe_may_use_any_id():

@@ -92,7 +92,8 @@ class RtdeServerCodec:
         self.output: OutputStream | None = None
         self._inputs: list[Recipe] = []
         self._version = version
-        self._protocol = LATEST_PROTOCOL_VERSION
+        # Assumed: the request exists because older clients, which do not know it, are served too.
+        self._protocol = 1
         self._taken = taken_inputs
         self._frequency = frequency
         self._output_types = output_types
