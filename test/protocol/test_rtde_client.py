@@ -216,6 +216,17 @@ def test_text_messages_are_accepted_at_any_time(place):
     assert events.count(TEXT) == 10
 
 
+@pytest.mark.parametrize('versions', [[ACCEPTED[V]], [REFUSED, ACCEPTED[V]]])
+def test_a_text_of_version_1_is_accepted_before_a_version_is_agreed(versions):
+    client = RtdeClientCodec(['timestamp'])
+    client.start()
+    (text,) = client.feed(b'\0\x0cM\2Fieldbus')
+    assert (text.text, text.level) == ('Fieldbus', 2)
+    for step in [*versions, VERSION]:
+        client.feed(step.encode())
+    assert client.state is RtdeState.OUTPUTS
+
+
 @pytest.mark.parametrize('place', range(4))
 def test_five_unexpected_packages_are_tolerated_in_each_state(place):
     foreign = SetupInputsReply(types=('DOUBLE',))

@@ -14,6 +14,8 @@ from virtual_network import HOST, VirtualLoop
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.protocol.program.script_sender import REQUEST
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
+from ur_cartesian_driver.protocol.rtde.rtde_server import RtdeServerCodec
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.program.program_sockets import ProgramCallbacks, ProgramSockets
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
@@ -137,6 +139,29 @@ def test_who_answers_in_the_place_of_the_robot_is_left_within_seconds(answer):
         connection.close()
         assert asyncio.get_running_loop().time() - begin < 5.0
         assert values == []
+
+    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
+        runner.run(scene())
+
+
+def test_a_robot_may_take_its_time_for_each_answer():
+    # A controller that boots, or one behind a slow network: seven seconds for the handshake.
+    async def scene():
+        robot = RtdeServerCodec(ControllerVersion(major=5, minor=13, bugfix=0), set())
+
+        async def serve(reader, writer):
+            with contextlib.closing(writer):
+                while data := await reader.read(4096):
+                    robot.feed(data)
+                    await asyncio.sleep(1.8)
+                    writer.write(robot.data_to_send())
+
+        await asyncio.start_server(serve, HOST, RTDE_PORT)
+        connection = RtdeConnection(
+            RtdeClientCodec(outputs=['timestamp'], frequency=125.0), lambda *_: None
+        )
+        assert (await connection.open(HOST, RTDE_PORT)).release == (5, 13, 0)
+        connection.close()
 
     with asyncio.Runner(loop_factory=VirtualLoop) as runner:
         runner.run(scene())

@@ -407,13 +407,12 @@ def _require_min_size(data: bytes, payload: bytes, size: int) -> bytes:
 
 
 def _text_message(data: bytes, payload: bytes, version: int) -> RtdeTextMessage:
+    """Return a text; one whose lengths do not fit version 2 was sent before that was agreed."""
     _require_min_size(data, payload, 1)
-    if version == 1:
-        return RtdeTextMessage(text=decode_text(payload[1:]), level=payload[0])
     end = 1 + payload[0]
-    _require_min_size(data, payload, end + 2)
-    source_end = end + 1 + payload[end]
-    _require_min_size(data, payload, source_end + 1)
+    source_end = end + 1 + payload[end] if end < len(payload) else len(payload)
+    if version == 1 or source_end >= len(payload):
+        return RtdeTextMessage(text=decode_text(payload[1:]), level=payload[0])
     return RtdeTextMessage(
         text=decode_text(payload[1:end]),
         source=decode_text(payload[end + 1 : source_end]),

@@ -19,7 +19,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion, R
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe, RtdeValue, RtdeValues
 from ur_cartesian_driver.robot.transport import dial, ignore, TcpConnection
 
-#: Longest duration of the handshake [s].
+#: Longest time between a request of the handshake and its answer [s].
 ANSWER_TIMEOUT = 2.0
 #: Silence of the stream after which the robot is lost [s].
 SILENCE_TIMEOUT = 1.0
@@ -58,6 +58,7 @@ class RtdeConnection:
         #: Shortest time between a request of the handshake and its answer [s].
         self.round_trip = inf
         self._version: ControllerVersion | None = None
+        self._patience = asyncio.timeout(ANSWER_TIMEOUT)
         self._answered = asyncio.Event()  # the handshake is done, or the connection closed
         self._closed: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         self._connection = TcpConnection(self._on_data, self._on_closed)
@@ -80,9 +81,9 @@ class RtdeConnection:
             port.
         """
         await dial(self._connection, host, port)
-        self._send_request(self._client.start())
         try:
-            async with asyncio.timeout(ANSWER_TIMEOUT):
+            async with self._patience:
+                self._send_request(self._client.start())
                 await self._answered.wait()
         except TimeoutError:
             raise OSError(
@@ -139,6 +140,7 @@ class RtdeConnection:
         """Send the next request of the handshake, if any."""
         if data:
             self._last_request = asyncio.get_running_loop().time()
+            self._patience.reschedule(self._last_request + ANSWER_TIMEOUT)
             self._connection.send(data)
 
     def _take(self, event: RtdeEvent) -> None:
