@@ -67,7 +67,7 @@ class TargetPoses:
         px, py, pz, x, y, z, w = np.ascontiguousarray(poses.T, dtype=np.float64)
         return cls((px, py, pz), rotation_from_quaternion((x, y, z, w)))
 
-    def rows(self, index: Int64s) -> TargetPoses:
+    def rows(self, index: Int64s | slice) -> TargetPoses:
         """Return the poses at these indices."""
         px, py, pz = (p[index] for p in self.position)
         return TargetPoses((px, py, pz), tuple(r[index] for r in self.rotation))

@@ -37,6 +37,8 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 # Rows per block: more would leave the CPU cache. Calls of numpy for fewer, and for the eighth of
 # them from which a calibrated arm begins, would take longer than what they compute.
 _BLOCK = 8192
+# The same for Newton's method, which needs a hundred numbers for each row.
+_NEWTON_BLOCK = 4096
 # Block size after a row that needed a search; it then grows again.
 _MIN_BLOCK = 16
 
@@ -223,7 +225,10 @@ def refine(arm: Arm, targets: TargetPoses, q: Floats) -> tuple[Floats, Flags]:
     place = np.minimum(np.arange(len(q)) / _STRIDE, len(every) - 1.0)
     before = np.minimum(place.astype(np.intp), len(every) - 2)
     part = (place - before)[:, None]
-    return _refine(arm, targets, q + (1.0 - part) * shift[before] + part * shift[before + 1])
+    starts = q + (1.0 - part) * shift[before] + part * shift[before + 1]
+    blocks = [slice(row, row + _NEWTON_BLOCK) for row in range(0, len(q), _NEWTON_BLOCK)]
+    found = [_refine(arm, targets.rows(block), starts[block]) for block in blocks]
+    return np.concatenate([q for q, _ in found]), np.concatenate([exact for _, exact in found])
 
 
 def _refine(
