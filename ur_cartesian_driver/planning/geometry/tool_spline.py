@@ -39,6 +39,9 @@ from ur_cartesian_driver.motion.geometry.rotation_rows import (
     rotation_rates,
 )
 
+# Rows per block, so that their coefficients stay in the CPU cache.
+_BLOCK = 2048
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ToolPoints:
@@ -128,7 +131,10 @@ class ToolSpline:
     def rates(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
         """Return the twists and the accelerations that :meth:`rows` returns, (m, 6) each."""
         twists, accelerations = np.zeros((2, len(piece), 6))
-        _, twists[:, :3], accelerations[:, :3] = evaluate(self.positions[piece], t)
+        for begin in range(0, len(piece), _BLOCK):
+            some = slice(begin, begin + _BLOCK)
+            _, v, a = evaluate(self.positions[piece[some]], t[some])
+            twists[some, :3], accelerations[some, :3] = v, a
         rows = self._turning(piece)
         if len(rows):
             turn = evaluate(self.turns[piece[rows]], t[rows])

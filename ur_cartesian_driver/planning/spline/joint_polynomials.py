@@ -239,10 +239,8 @@ class _PieceRefinement:
         tool = self.kinematics.pose_rows(q)
         spline, piece = self.path.spline, np.tile(self.piece[rows], len(parts))
         wanted = spline.poses(piece, (begin + t).ravel() - spline.times[piece])
-        distance = length_rows(tool[:, :3] - wanted[:, :3])
-        deviation = np.stack([distance, angle_rows(wanted[:, 3:], tool[:, 3:])], axis=1)
-        largest: Floats = deviation.reshape(*t.shape, 2).max(axis=0)
-        return largest
+        sizes = length_rows(tool[:, :3] - wanted[:, :3]), angle_rows(wanted[:, 3:], tool[:, 3:])
+        return np.stack([size.reshape(t.shape).max(axis=0) for size in sizes], axis=1)
 
     def _halve(self, rows: Indices) -> None:
         begin, end = self.times[rows], self.times[rows + 1]

@@ -183,13 +183,8 @@ def _measured_count(kinematics: TcpKinematics, spline: ToolSpline, first: int) -
     coarse = coarse_samples(spline.times)
     _check_sizes(kinematics, spline, coarse, first)
     twists, accelerations = spline.rates(*coarse)
-    return sample_count(
-        spline.times,
-        length_rows(twists[:, :3]),
-        length_rows(twists[:, 3:]),
-        length_rows(accelerations[:, :3]),
-        first,
-    )
+    speed, turn_rate = length_rows(twists[:, :3]), length_rows(twists[:, 3:])
+    return sample_count(spline.times, speed, turn_rate, length_rows(accelerations[:, :3]), first)
 
 
 def _check_path(
@@ -244,9 +239,8 @@ def _check_sizes(
     n = len(spline.positions)
     x, turn = spline.vectors(*coarse)
     x = x.reshape(n, _COARSE_SAMPLES, 3)
-    detour = np.linalg.norm(np.diff(x, axis=1), axis=2).sum(axis=1) - np.linalg.norm(
-        x[:, -1] - x[:, 0], axis=1
-    )
+    steps = length_rows(np.diff(x, axis=1).reshape(-1, 3)).reshape(n, -1)
+    detour = steps.sum(axis=1) - length_rows(x[:, -1] - x[:, 0])
     angles = length_rows(turn).reshape(n, _COARSE_SAMPLES)
     k = int(np.argmax(angles[:, -1]))
     if angles[k, -1] > pi - HALF_TURN:
