@@ -104,6 +104,10 @@ class KinematicsBuiltins(BuiltinGroup):
         """Return the actual pose of the TCP."""
         return script_pose(self._controller.actual.T_base_tcp)
 
+    def tool_pose(self) -> ScriptPose:
+        """Return the actual pose of the TCP, in programs that PolyScope saves."""
+        return self.get_actual_tcp_pose()
+
     def get_target_tcp_pose(self) -> ScriptPose:
         """Return the target pose of the TCP."""
         return script_pose(self._controller.target.T_base_tcp)
