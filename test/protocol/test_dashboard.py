@@ -120,6 +120,28 @@ def test_a_line_that_is_not_a_command_is_returned_and_answered(line):
 
 
 @pytest.mark.parametrize(
+    ('name', 'line', 'value'),
+    [
+        # In the words of CB robots, and of a pendant in Chinese.
+        ('isProgramSaved', 'True', 'True'),
+        ('isProgramSaved', 'False a.urp', 'False a.urp'),
+        ('programState', 'STOPPED <\u672a\u547d\u540d>', 'STOPPED <\u672a\u547d\u540d>'),
+        (
+            'PolyscopeVersion',
+            'URSoftware 5.21.3.1 (\u4e09\u6708 14 2025)',
+            '5.21.3.1 (\u4e09\u6708 14 2025)',
+        ),
+    ],
+)
+def test_other_words_of_robots_are_understood(name, line, value):
+    client = DashboardClientCodec()
+    client.feed(encode_line(BANNER))
+    client.send(name)
+    (reply,) = client.feed(encode_line(line))
+    assert reply.value == value
+
+
+@pytest.mark.parametrize(
     ('name', 'argument'),
     [('fly', ''), ('load', ''), ('play', 'now'), ('popup', 'two\nplay'), ('addToLog', 'a\rb')],
 )

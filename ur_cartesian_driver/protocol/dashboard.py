@@ -122,7 +122,8 @@ COMMAND_SPECS: Mapping[str, CommandSpec] = {
 #: Patterns for the valid values of some replies, mainly of replies that are only a value.
 _VALUE_PATTERNS: Mapping[str, re.Pattern[str]] = {
     'running': re.compile('true|false'),
-    'isProgramSaved': re.compile(r'(?:true|false)(?: .*)?'),
+    # The page for CB robots has True and False.
+    'isProgramSaved': re.compile(r'(?i:true|false)(?: .*)?'),
     'programState': re.compile(r'(?:STOPPED|PLAYING|PAUSED)(?: .*)?'),
     'version': re.compile(r'\d+(?:\.\d+){1,3}'),
     'getUserRole': re.compile('PROGRAMMER|OPERATOR|NONE|LOCKED|RESTRICTED'),

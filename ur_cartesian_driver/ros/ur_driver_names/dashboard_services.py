@@ -91,7 +91,7 @@ def _running(response: Message, value: str) -> None:
 
 def _saved(response: Message, value: str) -> None:
     saved, response.program_name = _split(value)
-    response.program_saved = saved == 'true'
+    response.program_saved = saved.lower() == 'true'
 
 
 def _remote_control(response: Message, value: str) -> None:
