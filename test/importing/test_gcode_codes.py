@@ -62,6 +62,13 @@ EFFECTS: dict[str, tuple[str, list[tuple[float, float, float]]]] = {
     ';': ('X3 ;X4', [HERE, (3, 1, 1)]),
     '*': ('N3 X3*71', [HERE, (3, 1, 1)]),
 }
+#: What is said of these programs.
+EFFECTS_SAID = {
+    'P': ['line 3: P of an arc: turns in all, as in LinuxCNC; Marlin adds them to the arc'],
+    'M2': ['line 4: a line: the program ends in line 3 without it'],
+    'M30': ['line 4: a line: the program ends in line 3 without it'],
+    '%': ['line 5: a line: the program ends in line 4 without it'],
+}
 #: Modes that are the default, or end a mode that is refused anyway: they change nothing.
 CANCELS = (
     *('G13.1', 'G15', 'G23', 'G40', 'G49', 'G50', 'G50.1', 'G67', 'G69', 'G94', 'G97'),
@@ -87,8 +94,7 @@ def test_a_row_has_its_effect(tmp_path, name):
     found = imported(tmp_path, BEFORE + text + '\n')
     assert positions(found)[: len(expected)] == pytest.approx(np.array(expected), abs=1e-6)
     assert name == 'P' or len(positions(found)) == len(expected)
-    turns = 'line 3: P of an arc: turns in all, as in LinuxCNC; Marlin adds them to the arc'
-    assert remarks(found) == ([turns] if name == 'P' else [])
+    assert remarks(found) == EFFECTS_SAID.get(name, [])
 
 
 def test_a_feed_is_a_speed(tmp_path):

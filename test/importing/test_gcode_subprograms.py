@@ -94,6 +94,24 @@ def test_the_end_of_an_endless_main_program_is_said(tmp_path):
     assert 'line 3: M99 in the main program: it is executed once' in remarks(found)
 
 
+@pytest.mark.parametrize(
+    ('text', 'said'),
+    [
+        (
+            'M98 P1\nM30\n(part)\nO1 (a)\nX1\nM99\nO2\nX5\nM99\n%\n',
+            'lines 8-10: a line: the program ends in line 3 without it',
+        ),
+        # Two programs in one file, as when files are joined.
+        (
+            'X1\nM30\n%\n%\nO2\nX9\nM30\n%\n',
+            'lines 6-8: a line: the program ends in line 3 without it',
+        ),
+    ],
+)
+def test_lines_that_are_never_executed_are_said(tmp_path, text, said):
+    assert said in remarks(imported(tmp_path, BEGIN + text))
+
+
 def test_the_number_of_the_main_program_is_passed_by(tmp_path):
     found = imported(tmp_path, '%\nO0001 (name)\n' + BEGIN + 'X4\nM30\n%\n')
     assert positions(found)[-1, 0] == pytest.approx(4.0)

@@ -183,10 +183,11 @@ def test_commands_of_printers_own_their_words(tmp_path, line):
 
 
 @pytest.mark.parametrize('end', ['M2', 'M30', 'm02', 'N99 M30', '%', 'G1 X3 M30'])
-def test_nothing_behind_the_end_is_read(tmp_path, end):
-    found = imported(tmp_path, f'%\n{HERE}{end}\nG1 X9\nthis is [no] G-code\n')
+def test_what_stands_behind_the_end_is_said_and_not_read(tmp_path, end):
+    text = f'%\n{HERE}{end}\nG1 X9\n(comment)\n\n%\nthis is [no] G-code\n'
+    found = imported(tmp_path, text)
     assert positions(found)[-1, 0] == (3.0 if 'X3' in end else 1.0)
-    assert remarks(found) == []
+    assert remarks(found) == ['lines 5, 9: a line: the program ends in line 4 without it']
 
 
 def test_a_percent_sign_begins_a_program_once(tmp_path):
@@ -203,6 +204,14 @@ def test_lines_under_a_condition_of_a_printer_are_left_out(tmp_path):
     said = remarks(found)
     assert 'lines 5-6: a line under a condition: whether its condition holds is not known' in said
     assert 'line 8: a move: the position in Y and Z is not known since line 4' in said
+@pytest.mark.parametrize('line', ['%wait', '%global.x=5', '%_N_L10_SPF'])
+def test_a_percent_sign_with_a_text_is_no_end(tmp_path, line):
+    assert refusal(tmp_path, f'%100\n{HERE}{line}\nG1 X2\n') == (
+        f"line 4: '{line}' ends no program; % alone does."
+    )
+    assert len(positions(imported(tmp_path, f'{HERE}N9 % (end)\nG1 X2\n'))) == 1
+
+
     assert refusal(tmp_path, HERE + 'M622 J1\nG1 X5\n') == (
         'line 3: M622 begins a condition, and no M623 ends it.'
     )

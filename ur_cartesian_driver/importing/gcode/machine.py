@@ -29,6 +29,7 @@ from ur_cartesian_driver.importing.gcode.words import Block, COMMENT, read_line
 from ur_cartesian_driver.importing.import_format import Treatment
 from ur_cartesian_driver.importing.import_options import ImportOptions, LENGTH_UNITS
 from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
+from ur_cartesian_driver.importing.text_file import quoted
 
 _MOTIONS = frozenset(('G0', 'G1', 'G2', 'G3'))
 _OF_MOTION = frozenset('XYZIJKRP')
@@ -100,6 +101,10 @@ class GcodeMachine:
         if self._condition:
             raise BrokenFile(self._condition, 'M622 begins a condition, and no M623 ends it')
         self._outputs.finish()
+        for line in self._sequence.never_executed():
+            self._into.remarks.add(
+                line, 'a line', f'the program ends in line {self._sequence.end_line} without it'
+            )
         for line in self._powered_travels if not self._path.coordinates.is_named('Z') else ():
             self._into.remarks.add(
                 line, 'G0 while S is on', 'the output stays on; a laser mode would switch it off'
@@ -427,6 +432,9 @@ class GcodeMachine:
         if self._has_begun or self._seen_percent:
             self._sequence.end()
         self._seen_percent = True
+            text = COMMENT.sub('', self._lines[self._line - 1]).strip()
+            if not text.endswith('%'):
+                raise self._fail(f'{quoted(text)} ends no program; % alone does')
 
     def _number(self, _: str, own: _Words) -> None:
         self._sequence.check_program_number(

@@ -42,6 +42,9 @@ class LineSequence:
         self._next = 0
         self._calls: list[_Call] = []
         self._in_subprograms = 0
+        self._is_executed = bytearray(len(lines))
+        #: The line that ended the program; 0 = the last one.
+        self.end_line = 0
 
     def __iter__(self) -> Iterator[tuple[int, str]]:
         """Yield the number (from 1) and the text of each line that is executed."""
@@ -53,6 +56,7 @@ class LineSequence:
                     raise BrokenFile(
                         self._next, f'subprograms would execute more than {_MAX_LINES} lines'
                     )
+            self._is_executed[self._next - 1] = True
             yield self._next, self._lines[self._next - 1]
         if self._calls:
             raise BrokenFile(
@@ -61,8 +65,17 @@ class LineSequence:
 
     def end(self) -> None:
         """Execute no further line."""
+        self.end_line = self._next
         self._calls.clear()
         self._next = len(self._lines)
+
+    def never_executed(self) -> Iterator[int]:
+        """Yield the numbers of the lines with words that were not executed."""
+        row = self._is_executed.find(False)
+        while row >= 0:
+            if _COMMENT.sub('', self._lines[row]).strip(' \t%'):
+                yield row + 1
+            row = self._is_executed.find(False, row + 1)
 
     def check_program_number(self, line: int, number: int, *, is_first: bool) -> None:
         """Accept an O number at the program's beginning; refuse to run into a later O number."""
@@ -94,6 +107,7 @@ class LineSequence:
             raise BrokenFile(line, f'O{number:g} is not in the file, and other files are not read')
         if len(self._calls) == _MAX_DEPTH:
             raise BrokenFile(line, f'subprograms are nested more than {_MAX_DEPTH} deep')
+        self._is_executed[first - 1] = True  # its O number
         if repeats:
             self._calls.append(_Call(int(number), first, self._next, int(repeats) - 1))
             self._next = first
