@@ -69,7 +69,8 @@ def read_line(number: int, line: str) -> Block | None:
     if not text:
         return None
     if _MARK in text:
-        if _DIVIDED_WORD.search(text):
+        plain = text.replace(_MARK, '')
+        if _DIVIDED_WORD.search(text) and not _is_one_command(line, plain):
             raise BrokenFile(number, 'a comment divides a word')
         text = text.replace(_MARK, '')
         if message := _MESSAGE.search(line):
@@ -121,6 +122,14 @@ def _printer_code(text: str) -> str | None:
     rest = text[match.end() :]
     plain = _BLOCK.fullmatch(rest) or re.search(r'G[0-9]', _QUOTED.sub('', rest))
     return name if entry.text or (entry.alone and not plain) else None
+
+
+def _is_one_command(line: str, text: str) -> bool:
+    """Return whether a command owns its whole line, such as ``M486 Alid(1).stl``."""
+    named = _NAME.match(line)
+    return _printer_code(text) is not None or (
+        named is not None and code_named(named[1].upper()) is not None
+    )
 
 
 def _odd_block(number: int, line: str, text: str) -> Block:
