@@ -71,8 +71,8 @@ EFFECTS_SAID = {
 }
 #: Modes that are the default, or end a mode that is refused anyway: they change nothing.
 CANCELS = (
-    *('G13.1', 'G15', 'G23', 'G40', 'G49', 'G50', 'G50.1', 'G67', 'G69', 'G94', 'G97'),
-    *('G98', 'G99', 'G54'),
+    *('G13.1', 'G15', 'G23', 'G40', 'G40.1', 'G49', 'G50', 'G50.1', 'G67', 'G69', 'G94'),
+    *('G97', 'G98', 'G99', 'G54'),
 )
 #: The first work offset is the frame of the file.
 FRAMES = tuple(name for name in CODES if CODES[name].group == 'frame' and name != 'G54')

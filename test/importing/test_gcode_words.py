@@ -99,8 +99,12 @@ def test_a_number_is_read_as_the_grammar_says(tmp_path, line, x):
         ('L X+10 Y+5 R0 FMAX', 'has no number'),
         ('G1 X10 FMAX', 'F has no number'),
         ('MSG("hello")', 'is no G-code'),
-        ('G70', 'G70 is not read'),
-        ('G71', 'G71 is not read'),
+        ('G70', 'G70 is not read: a cycle; let the CAM write single moves; or inches: write G20'),
+        ('G71', 'or millimetres: write G21'),
+        ('G5 X5 P2', 'G5 is not read: splines'),
+        ('0  BEGIN PGM 12 MM', "'0  BEGIN PGM 12 MM' begins with a number without a letter"),
+        ('T0 P0', 'P0 belongs to no code of its line'),
+        ('M3 P100 S255', 'P100 belongs to no code of its line'),
         ('G1 X5 F0', 'F0 is no feed'),
         ('G1 X5 F-10', 'F-10 is no feed'),
         ('G0 G1 X5', 'G0 and G1 exclude each other'),
@@ -112,7 +116,7 @@ def test_a_number_is_read_as_the_grammar_says(tmp_path, line, x):
         ('G4 G1 X5', 'G4 and a motion cannot share X'),
         ('G2 X2 I0.5 G64 P2', 'G64 and a motion cannot share P'),
         ('G61 G64 P0.1', 'G61 and G64 exclude each other'),
-        ('G61 P0.1', 'G1 is a line, and has no P'),
+        ('G61 P0.1', 'P0.1 belongs to no code of its line'),
         ('G64 P-0.1', 'G64 P-0.1 is no tolerance'),
         ('G64 P0.1 Q-1', 'G64 Q-1 is no tolerance'),
         ('M62 P1 G64', 'P could belong to G64 or M62; give it a line of its own'),
@@ -150,13 +154,13 @@ def test_what_cannot_be_meant_is_one_sentence_with_its_line(tmp_path, line, said
         'M900 K0.05',
         'M301 P19.86 I1.0 D98.93',
         'M486 AName',
+        'M486 Alid(1).stl',
+        'M117 layer 1(2)3',
+        'EXCLUDE_OBJECT_START NAME=lid(1).stl',
         'M84 X Y E',
         'M84XYE',
         'N5 M84 X Y',
         'M204 S5000',
-        'M486 Alid(1).stl',
-        'M117 layer 1(2)3',
-        'EXCLUDE_OBJECT_START NAME=lid(1).stl',
         'M204 P1250 R1250 T1250',
         'M104 S215',
         'M73 P0 R10',
@@ -200,13 +204,6 @@ def test_a_percent_sign_begins_a_program_once(tmp_path):
     assert len(positions(imported(tmp_path, f'{HERE}%\nG1 X2\n'))) == 1
 
 
-def test_lines_under_a_condition_of_a_printer_are_left_out(tmp_path):
-    text = HERE + 'M1002 judge_flag x\nM622 J1\n  G1 X5 {what}\n  G29\nM623\nX2\nG1 X3 Y1 Z1\n'
-    found = imported(tmp_path, text)
-    assert positions(found) == pytest.approx(np.array([[1, 1, 1], [3, 1, 1]]))
-    said = remarks(found)
-    assert 'lines 5-6: a line under a condition: whether its condition holds is not known' in said
-    assert 'line 8: a move: the position in Y and Z is not known since line 4' in said
 @pytest.mark.parametrize('line', ['%wait', '%global.x=5', '%_N_L10_SPF'])
 def test_a_percent_sign_with_a_text_is_no_end(tmp_path, line):
     assert refusal(tmp_path, f'%100\n{HERE}{line}\nG1 X2\n') == (
@@ -215,6 +212,13 @@ def test_a_percent_sign_with_a_text_is_no_end(tmp_path, line):
     assert len(positions(imported(tmp_path, f'{HERE}N9 % (end)\nG1 X2\n'))) == 1
 
 
+def test_lines_under_a_condition_of_a_printer_are_left_out(tmp_path):
+    text = HERE + 'M1002 judge_flag x\nM622 J1\n  G1 X5 {what}\n  G29\nM623\nX2\nG1 X3 Y1 Z1\n'
+    found = imported(tmp_path, text)
+    assert positions(found) == pytest.approx(np.array([[1, 1, 1], [3, 1, 1]]))
+    said = remarks(found)
+    assert 'lines 5-6: a line under a condition: whether its condition holds is not known' in said
+    assert 'line 8: a move: the position in Y and Z is not known since line 4' in said
     assert refusal(tmp_path, HERE + 'M622 J1\nG1 X5\n') == (
         'line 3: M622 begins a condition, and no M623 ends it.'
     )

@@ -22,8 +22,10 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats
 WORDS = {
     'G4': 'P2 X3',
     'G64 Q': '0.2 P0.1',
+    'G5 P': '10000',
     'G5.1 Q': '1',
     'G8 P': '1',
+    'G103': 'P1',
     'G187': 'P2',
     'A': '90',
     'B': '90',

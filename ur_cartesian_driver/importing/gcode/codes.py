@@ -4,7 +4,8 @@
 The table of codes and words: the treatment of each, and the words that belong to a code.
 
 Sources: RS274/NGC (NIST IR 6556) and the G-code pages of LinuxCNC 2.9; the lists of commands of
-GRBL 1.1, Marlin, RepRapFirmware, Klipper, Prusa and Bambu; Fanuc's codes for mills and lathes.
+GRBL 1.1, Marlin, RepRapFirmware, Klipper, Prusa, Bambu, MakerBot and Ultimaker; Fanuc's codes for
+mills and lathes.
 """
 
 from __future__ import annotations
@@ -111,7 +112,12 @@ _MOTION = (
         'motion', 'the option simplify merges points', 'G64 Q', words='PQ', group=PATH_CONTROL
     ),
     _left_out('motion', 'the options blend and corner say where the tool stops', 'G9', words='PQ'),
-    _left_out('motion', 'the robot looks ahead by itself', 'G5.1 Q', 'G8 P', 'G187', words='EPQR'),
+    _left_out(
+        'motion',
+        'the robot looks ahead by itself',
+        *('G5 P', 'G5.1 Q', 'G8 P', 'G103', 'G187'),
+        words='EPQR',
+    ),
     _left_out('motion', _NO_AXIS, 'A', 'B', 'C', 'U', 'V'),
     _left_out('motion', _NO_EXTRUDER, 'E'),
     _refused('motion', 'on a lathe it is a step along X or Z; write these', 'W'),
@@ -120,7 +126,9 @@ _MOTION = (
         'splines; let the CAM write lines or arcs',
         *('G5', 'G5.1', 'G5.2', 'G5.3', 'G6', 'G6.2'),
     ),
-    _refused('motion', _CYCLE, 'G12', 'G13', *_numbers('G', (70, 76), (81, 89))),
+    _refused('motion', _CYCLE, 'G12', 'G13', *_numbers('G', (72, 76), (81, 89))),
+    _refused('motion', f'{_CYCLE}; or inches: write G20', 'G70'),
+    _refused('motion', f'{_CYCLE}; or millimetres: write G21', 'G71'),
     _refused('motion', _THREAD, 'G33', 'G33.1', 'G35', 'G36'),
     _refused('motion', _THREAD, 'G32 X', 'G32 Z', 'G34 X', 'G34 Z'),
     _refused(
@@ -137,9 +145,8 @@ _MODES = (
     _honoured('modes', '', 'G7', 'G8', group='diameter'),
     _honoured('modes', '', 'G94', group='feed'),
     _honoured('modes', '', 'G98', 'G99', group='return'),
-    _honoured(
-        'modes', '', 'G13.1', 'G15', 'G23', 'G40', 'G49', 'G50', 'G50.1', 'G67', 'G69', 'G97'
-    ),
+    _honoured('modes', '', 'G13.1', 'G15', 'G23', 'G40', 'G40.1', 'G49', 'G50', 'G50.1'),
+    _honoured('modes', '', 'G67', 'G69', 'G97'),
     _refused('modes', 'give feeds in lengths per minute (G94)', 'G93', 'G95'),
     _refused('modes', 'polar coordinates', 'G12.1', 'G16'),
     _refused('modes', 'a cylinder as the plane', 'G7.1', 'G107'),
@@ -242,8 +249,8 @@ _PRINTERS = (
     _left_out(
         'printers',
         _HOME,
-        *('G27', 'G29', 'G32', 'G34', 'G39', 'G80 H', 'G80 W', 'G150', 'G380', 'G382', 'G383'),
-        *('G425', 'M125'),
+        *('G27', 'G29', 'G32', 'G34', 'G39', 'G80 H', 'G80 W', 'G150', 'G161', 'G162', 'G280'),
+        *('G380', 'G382', 'G383', 'G425', 'M125'),
         words='XYZABCDEFHIJKLNOPQRSTUVW',
         bare='XYZABCDEFHIJKLNOPQRSTUVW',
         stage=Stage.OFFSET,
@@ -318,6 +325,8 @@ def code_on_line(name: str, words: Mapping[str, float]) -> Code | None:
     if name in _CHANGED_BY_WORDS:
         if name == 'G10' and 'L' in words:
             return CODES.get(f'G10 L{words["L"]:g}')
+        if name == 'G5' and words.keys() != {'P'}:
+            return CODES[name]  # a spline has a P, too
         for letter in words:
             if row := CODES.get(f'{name} {letter}'):
                 return row

@@ -293,6 +293,8 @@ class GcodeMachine:
                 self._omit(f'word {letter}', row.reason)
 
     def _move(self, words: _Words) -> None:
+        if words.keys() == {'P'}:
+            raise self._fail(f'P{words["P"]:g} belongs to no code of its line')
         if self._path.motion == 'G0' and self._outputs.drives_power:
             self._powered_travels.append(self._line)
         self._path.move(self._line, words)
@@ -430,11 +432,11 @@ class GcodeMachine:
 
     def _percent(self, *_: object) -> None:
         if self._has_begun or self._seen_percent:
-            self._sequence.end()
-        self._seen_percent = True
             text = COMMENT.sub('', self._lines[self._line - 1]).strip()
             if not text.endswith('%'):
                 raise self._fail(f'{quoted(text)} ends no program; % alone does')
+            self._sequence.end()
+        self._seen_percent = True
 
     def _number(self, _: str, own: _Words) -> None:
         self._sequence.check_program_number(

@@ -72,7 +72,7 @@ def read_line(number: int, line: str) -> Block | None:
         plain = text.replace(_MARK, '')
         if _DIVIDED_WORD.search(text) and not _is_one_command(line, plain):
             raise BrokenFile(number, 'a comment divides a word')
-        text = text.replace(_MARK, '')
+        text = plain
         if message := _MESSAGE.search(line):
             block = _block(number, line, text) if text else Block([], {})
             return block._replace(codes=[*block.codes, f'({message[1].upper()},'])
@@ -165,6 +165,11 @@ def _odd_block(number: int, line: str, text: str) -> Block:
         raise BrokenFile(number, f'{_shown(line)} has a number with two points')
     if '(' in rest or ')' in rest:
         raise BrokenFile(number, f'{_shown(line)} has a parenthesis without the other one')
+    if rest[0].isdigit() and rest == text:
+        raise BrokenFile(
+            number,
+            f'{_shown(line)} begins with a number without a letter; let the CAM write G-code',
+        )
     if rest[0].isdigit():
         raise BrokenFile(number, f'{_shown(line)} has a number of more than 15 digits')
     if re.match(r'[A-Z]([^A-Z_]|$)', rest) or (not named and 'A' <= rest[0] <= 'Z'):
