@@ -113,6 +113,35 @@ def test_the_unit_of_a_unix_time_is_said(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ('stamp', 'next_stamp', 'seconds'),
+    [
+        ('4102444800', '4102444800.5', None),
+        ('4102444700', '4102444700.5', 0.5),
+        ('946684800000', '946684800500', 0.5),  # 2000 in ms
+        ('1767225600000000', '1767225600500000', 0.5),
+        ('1767225600000000000', '1767225600500000000', 0.5),
+        ('85123456789012', '85123956789012', None),  # a day of ns
+        ('851234567890', '851234667890', None),  # ten days of us
+        ('638712345000000000', '638712345005000000', None),  # .NET: 100 ns since the year 1
+        ('133712345000000000', '133712345005000000', None),  # Windows: 100 ns since 1601
+    ],
+)
+def test_a_time_without_a_unit_is_of_this_century(tmp_path, stamp, next_stamp, seconds):
+    text = f'stamp,x [m],y [m],z [m]\n{stamp},0,0,0\n{next_stamp},0.1,0,0\n'
+    if seconds is None:
+        with pytest.raises(BrokenFile) as caught:
+            imported(tmp_path, text)
+        assert str(caught.value) == (
+            f'line 3: the time {next_stamp} has no unit, and is of no year from 2000 to 2100 in '
+            's, ms, us or ns; write the unit, such as stamp [ns].'
+        )
+        text = text.replace('stamp,', 'stamp [ns],')
+        seconds = 1e-9 * (float(next_stamp) - float(stamp))
+    times = imported(tmp_path, text).goal.waypoints.times
+    assert times[1] - times[0] == pytest.approx(seconds, rel=1e-3)
+
+
+@pytest.mark.parametrize(
     ('cell', 'sentence'),
     [
         ('01:30', "'01:30' is no number (time)"),

@@ -28,9 +28,11 @@ _CERTAIN_COMMA = re.compile(r'^(?!\s*[-+]?[1-9]\d{0,2},\d{3}\s*$).*,.*$', re.MUL
 #: Matches a time of day with two colons; 01:30 could be minutes and seconds.
 _MOMENT = re.compile(r'\d:\d\d:\d')
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-#: Above these bounds a time without a unit is in ns, us or ms since 1970: in seconds it would be
-#: thousands of years.
-_UNIX_UNITS = ((1e17, 1e-9, 'ns'), (1e14, 1e-6, 'us'), (1e11, 1e-3, 'ms'))
+#: The years 2000 to 2100 [s since 1970]. Clocks that count from elsewhere, such as the ns since a
+#: computer was switched on or the ticks of .NET, are not within them in any of the units.
+_CENTURY = (946_684_800.0, 4_102_444_800.0)
+#: Units of times without one that are above these years.
+_UNIX_UNITS = ((1e-9, 'ns'), (1e-6, 'us'), (1e-3, 'ms'))
 
 
 def cell_values(
@@ -86,17 +88,24 @@ def _times(
     """
     Return the times of a column in its unit; the cells are numbers, or dates and times of day.
 
-    :raises BrokenFile: a cell is neither.
+    :raises BrokenFile: a cell is neither, or the unit is not certain.
     """
     if _MOMENT.search(cells[0]):
         return _moments(cells, lines)
     times = _numbers(column, cells, lines)
-    if not column.has_unit:
-        for bound, factor, unit in _UNIX_UNITS:
-            if np.abs(times).max() > bound:
-                remarks.add(0, f'the times of {column.title!r}', f'read as {unit} since 1970')
-                return times * factor
-    return times
+    row = int(np.abs(times).argmax())
+    latest = abs(times[row])
+    if column.has_unit or latest <= _CENTURY[1]:
+        return times
+    for factor, unit in _UNIX_UNITS:
+        if _CENTURY[0] <= latest * factor <= _CENTURY[1]:
+            remarks.add(0, f'the times of {column.title!r}', f'read as {unit} since 1970')
+            return times * factor
+    raise BrokenFile(
+        lines[row],
+        f'the time {cells[row].strip()} has no unit, and is of no year from 2000 to 2100 in s, '
+        f'ms, us or ns; write the unit, such as {column.title} [ns]',
+    )
 
 
 def _moments(cells: Sequence[str], lines: Sequence[int]) -> Floats:
