@@ -65,6 +65,16 @@ def test_text_before_the_header_is_said(tmp_path):
     )
 
 
+def test_a_number_alone_is_no_row(tmp_path):
+    # As Vicon Nexus writes the trajectories of markers: their rate comes before the header.
+    text = 'Trajectories\n100\n,,Arm:M1,,\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n'
+    found = imported(tmp_path, text + '1,0,1,2.5,-3\n2,0,4,5,6\n')
+    assert np.array(found.goal.waypoints.poses)[:, :3] == pytest.approx(np.array(POINTS))
+    assert found.remarks[0].text() == (
+        'lines 1-3: text before the header: it is no part of the table'
+    )
+
+
 def test_three_columns_without_a_header_need_a_unit(tmp_path):
     found = imported(tmp_path, '1 2.5 -3\n4 5 6\n', unit='mm')
     assert np.array(found.goal.waypoints.poses)[:, :3] == pytest.approx(np.array(POINTS))

@@ -199,9 +199,9 @@ def _cells(line: str, delimiter: str | None) -> list[str]:
 
 
 def _is_numeric(line: str) -> bool:
-    """Return whether more than half of the cells of a line are numbers."""
+    """Return whether more than half of the cells of a line, at least three, are numbers."""
     cells = re.findall(r'[^;,\s"]+', line)
-    return 2 * sum(map(_is_number, cells)) > len(cells)
+    return len(cells) > 2 and 2 * sum(map(_is_number, cells)) > len(cells)
 
 
 def _is_number(cell: str) -> bool:
