@@ -239,6 +239,15 @@ def test_a_column_that_cannot_be_meant_is_refused(tmp_path, extra, sentence):
         imported(tmp_path, ['x [m]', 'y [m]', 'z [m]', *extra], ['1' * (3 + len(extra))])
 
 
+@pytest.mark.parametrize('forces', [['Fx', 'Fy', 'Fz'], ['fx [N]', 'fy [N]', 'fz (N)']])
+def test_torques_are_no_positions(tmp_path, forces):
+    names = ['time', *forces, 'Tx', 'Ty', 'Tz']
+    with pytest.raises(BrokenFile, match="columns 'Tx', 'Ty', 'Tz' can be torques"):
+        imported(tmp_path, names, [['1'] * 7], unit='mm')
+    found = imported(tmp_path, [*names, 'x', 'y', 'z'], [['1'] * 7 + ['2'] * 3], unit='m')
+    assert found.goal.waypoints.poses[0][:3] == pytest.approx([2.0, 2.0, 2.0])
+
+
 @pytest.mark.parametrize(
     ('extra', 'said'),
     [
@@ -249,7 +258,7 @@ def test_a_column_that_cannot_be_meant_is_refused(tmp_path, extra, sentence):
         (['rx', 'ry', 'rz'], "columns 'rx', 'ry', 'rz': no unit: read as a rotation vector [rad]"),
         (['q0', 'q1', 'q3', 'q4', 'q5'], "columns 'q0', 'q1', 'q3' to 'q5': a path has no such"),
         (['joint_1 [deg]', 'J2 [deg]'], "columns 'joint_1 [deg]', 'J2 [deg]': a path has no such"),
-        (['', 'note'], "column 'note': a path has no such quantity"),
+        (['Zeit'], "column 'Zeit': a path has no such quantity, or its name is not known"),
         (['', 'note'], 'column 4 without a name: a path has no such quantity'),
     ],
 )

@@ -82,7 +82,7 @@ FIXED_UNITS: Mapping[str, Mapping[str, str]] = {
 }
 
 
-_WORDS = 'a path has no such quantity'
+NO_QUANTITY = 'a path has no such quantity'
 #: The braces mean each letter within them in turn. Of several groups with the same kind of values,
 #: the first one in TERMS is used.
 TERMS = term_table(
@@ -140,10 +140,10 @@ TERMS = term_table(
     honoured(BLEND, 'blend', 'blend_radius'),
     left_out(BLEND, 'name it blend if the arm is to pass the point', 'radius'),
     left_out(OTHER, 'joints follow from the pose', 'actual_q_{012345}'),
-    left_out(OTHER, _WORDS, '{rgb}', 'intensity', 'index', 'frame', 'seq', 'speed_scaling'),
+    left_out(OTHER, NO_QUANTITY, '{rgb}', 'intensity', 'index', 'frame', 'seq', 'speed_scaling'),
 )
 #: The reason why columns with unknown names are left out.
-OTHERS_REASON = _WORDS
+OTHERS_REASON = f'{NO_QUANTITY}, or its name is not known'
 
 #: Words in a name that suggest an orientation.
 _ORIENTATION_WORDS = frozenset(

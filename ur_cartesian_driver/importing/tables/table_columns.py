@@ -17,7 +17,10 @@ from ur_cartesian_driver.importing.tables.column_names import (
     FIXED_UNITS,
     is_orientation,
     KINDS,
+    letters,
+    NO_QUANTITY,
     OTHERS_REASON,
+    POSITION,
     QUANTITIES,
     read_title,
     ROLES,
@@ -103,6 +106,7 @@ def find_columns(
             taken.append(_column(title.text, index, role, unit or fixed, line, options))
     if _POSITION not in reasons:
         _refuse_header(titles, line)
+    _check_torques(taken, titles, line)
     _check_w(titles, is_oriented=_ORIENTATION in reasons or _NORMAL in reasons, line=line)
     _check_bodies([titles[column.index] for column in taken if _is_of_pose(column)], line)
     if unitless := [titles[c.index] for c in taken if _is_turn(c) and not c.has_unit]:
@@ -113,7 +117,7 @@ def find_columns(
     )
     unnamed = [str(i + 1) for i, title in enumerate(titles) if not title.text]
     if unnamed:
-        remarks.add(line, f'column {", ".join(unnamed)} without a name', OTHERS_REASON)
+        remarks.add(line, f'column {", ".join(unnamed)} without a name', NO_QUANTITY)
     return taken
 
 
@@ -123,6 +127,16 @@ _KINDS = {
     for name, term in TERMS.items()
     if term.treatment is Treatment.HONOURED
 }
+
+
+def _check_torques(taken: Sequence[Column], titles: Sequence[Title], line: int) -> None:
+    """Refuse positions tx, ty and tz beside forces fx, fy and fz: they are torques."""
+    group = [titles[column.index] for column in taken if column.role in ROLES[POSITION]]
+    names = {letters(title.text.partition('[')[0].partition('(')[0]) for title in titles}
+    if names.issuperset(('fx', 'fy', 'fz')) and group[0].name == 'tx':
+        raise BrokenFile(
+            line, f'{_listed(group)} can be torques beside the forces; name them x, y, z'
+        )
 
 
 def _check_w(titles: Sequence[Title], *, is_oriented: bool, line: int) -> None:
