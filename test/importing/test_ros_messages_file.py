@@ -295,6 +295,24 @@ def straight_line_of_joints(count=40, length=0.2):
     """Return a trajectory that echo prints, of a line along y, and the line's ends."""
     arm = Arm(robot_model('ur5e'))
     begin, q, points = arm.forward(HOME), vector6(HOME), []
+def test_joints_in_degrees_are_refused(tmp_path):
+    text = echo(joint_trajectory()).replace(f'- {HOME[2] + 0.2}\n', '- 90.0\n', 1)
+    line = text.split('\n').index('  - 90.0') + 1
+    with pytest.raises(BrokenFile, match=f'^line {line}: a joint position is 90 rad; give it in'):
+        imported(tmp_path, text)
+    found = imported(tmp_path, text.replace('90.0', '6.25'))
+    assert found.goal.waypoints.postures[1].values[2] == 6.25
+
+
+def test_tolerances_of_a_goal_for_a_controller_are_said(tmp_path):
+    goal = copy.deepcopy(MESSAGES['control_msgs/FollowJointTrajectory'][0])
+    goal['goal_time_tolerance'] = {'sec': 1, 'nanosec': 0}
+    assert any(
+        'goal_time_tolerance: a path has no such field' in text
+        for text in remarks(imported(tmp_path, echo(goal)))
+    )
+
+
     for i in range(count + 1):
         y = begin.position[1] + length * i / count
         end = Pose((begin.position[0], y, begin.position[2]), begin.quaternion)

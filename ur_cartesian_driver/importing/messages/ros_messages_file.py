@@ -47,6 +47,8 @@ from ur_cartesian_driver.motion.goal.goal import Posture, SegmentType
 _WITHOUT_TURN = ((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.0))
 #: The fields that are read from the header of a pose.
 _STAMPED = ('frame_id', 'stamp')
+#: A larger joint position [rad] must be in degrees; MoveIt keeps joints within one turn.
+_MAX_ANGLE = 4.0 * np.pi
 
 
 def collect_yaml(file: Path, options: ImportOptions, into: PathCollector) -> None:
@@ -340,7 +342,7 @@ def _collect_joints(message: Any, options: ImportOptions, into: PathCollector) -
         positions = _sequence(point.positions, 'positions', line)
         if len(positions) != len(names):
             raise BrokenFile(line, f'it has {len(positions)} positions for {len(names)} joints')
-        rows.append([_number(positions[k], 'positions', line) for k in order])
+        rows.append([_angle(positions[k], line) for k in order])
         times.append(_seconds(point.time_from_start, line))
         lines.append(line)
     if not rows:
@@ -370,6 +372,20 @@ def _joint_order(names: Sequence[str], line: int, remarks: ImportNotes) -> list[
     order = []
     for joint in JOINT_NAMES:
         # Names can have a prefix that distinguishes the arms of a cell.
+def _angle(value: Any, line: int) -> float:
+    """
+    Return a joint position [rad].
+
+    :raises BrokenFile: the value is no number, or must be in degrees.
+    """
+    angle = _number(value, 'positions', line)
+    if abs(angle) > _MAX_ANGLE:
+        raise BrokenFile(
+            getattr(value, 'line', line), f'a joint position is {angle:g} rad; give it in radians'
+        )
+    return angle
+
+
         found = [i for i, name in enumerate(names) if name.endswith(joint)]
         if len(found) != 1:
             raise BrokenFile(line, f'joint_names has {len(found)} of {joint}, but must have one')
