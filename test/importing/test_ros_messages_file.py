@@ -156,6 +156,10 @@ MESSAGES = {
             'trajectory_start': {'joint_state': {'name': ['a'], 'position': [1.0]}},
         }
     ],
+    'control_msgs/FollowJointTrajectory': [
+        {'trajectory': joint_trajectory(), 'goal_tolerance': [], 'path_tolerance': []}
+    ],
+    'moveit_msgs/ExecuteTrajectory': [{'trajectory': {'joint_trajectory': joint_trajectory()}}],
     'geometry_msgs/Pose': [pose(0.1), pose(0.2)],
     'geometry_msgs/PoseStamped': [stamped(0.1, 1), stamped(0.2, 2)],
     'geometry_msgs/PoseWithCovarianceStamped': [with_covariance(0.1, 1), with_covariance(0.2, 2)],
@@ -291,10 +295,6 @@ def test_a_joint_trajectory(tmp_path):
     assert found.goal.waypoints.times.tolist() == [1.0, 2.0]
 
 
-def straight_line_of_joints(count=40, length=0.2):
-    """Return a trajectory that echo prints, of a line along y, and the line's ends."""
-    arm = Arm(robot_model('ur5e'))
-    begin, q, points = arm.forward(HOME), vector6(HOME), []
 def test_joints_in_degrees_are_refused(tmp_path):
     text = echo(joint_trajectory()).replace(f'- {HOME[2] + 0.2}\n', '- 90.0\n', 1)
     line = text.split('\n').index('  - 90.0') + 1
@@ -313,6 +313,10 @@ def test_tolerances_of_a_goal_for_a_controller_are_said(tmp_path):
     )
 
 
+def straight_line_of_joints(count=40, length=0.2):
+    """Return a trajectory that echo prints, of a line along y, and the line's ends."""
+    arm = Arm(robot_model('ur5e'))
+    begin, q, points = arm.forward(HOME), vector6(HOME), []
     for i in range(count + 1):
         y = begin.position[1] + length * i / count
         end = Pose((begin.position[0], y, begin.position[2]), begin.quaternion)

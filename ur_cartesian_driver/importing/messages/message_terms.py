@@ -19,16 +19,19 @@ POSES = (
     'geometry_msgs/PoseWithCovarianceStamped',
     'geometry_msgs/Pose',
 )
+OWN_GOAL = 'ur_cartesian_driver/FollowCartesianTrajectory'
+#: Goals that have the fields of ours, but a trajectory of joints.
+CONTROLLER_GOALS = ('control_msgs/FollowJointTrajectory', 'moveit_msgs/ExecuteTrajectory')
 MULTI_DOF = 'trajectory_msgs/MultiDOFJointTrajectory'
 _NO_PATH = 'it has no path of the tool'
 
 TERMS = term_table(
     honoured('a path in one message', PATH, POSE_ARRAY, JOINT_TRAJECTORY),
-    honoured('a path in one message', ROBOT_TRAJECTORY, DISPLAY_TRAJECTORY),
+    honoured('a path in one message', ROBOT_TRAJECTORY, DISPLAY_TRAJECTORY, *CONTROLLER_GOALS),
     refused(
         'a path in one message',
         'it is a goal already; ur-cartesian send takes it as it is',
-        'ur_cartesian_driver/FollowCartesianTrajectory',
+        OWN_GOAL,
         'cartesian_control_msgs/CartesianTrajectory',
     ),
     refused('a path in one message', 'its joints have more than one axis', MULTI_DOF),
@@ -84,7 +87,7 @@ _TELLING: Mapping[str, tuple[str, ...]] = {
     JOINT_TRAJECTORY: ('joint_names', 'points'),
     ROBOT_TRAJECTORY: ('joint_trajectory',),
     DISPLAY_TRAJECTORY: ('trajectory', 'trajectory_start'),
-    'ur_cartesian_driver/FollowCartesianTrajectory': ('trajectory',),
+    OWN_GOAL: ('trajectory',),
     'visualization_msgs/Marker': ('ns', 'points'),
     'visualization_msgs/MarkerArray': ('markers',),
     'cartesian_control_msgs/CartesianTrajectory': ('points',),

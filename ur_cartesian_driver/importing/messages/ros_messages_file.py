@@ -30,10 +30,12 @@ from ur_cartesian_driver.importing.messages.echoed_message import (
     MessagePart,
 )
 from ur_cartesian_driver.importing.messages.message_terms import (
+    CONTROLLER_GOALS,
     DISPLAY_TRAJECTORY,
     JOINT_TRAJECTORY,
     message_type,
     MULTI_DOF,
+    OWN_GOAL,
     PATH,
     POSES,
     ROBOT_TRAJECTORY,
@@ -45,10 +47,10 @@ from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows
 from ur_cartesian_driver.motion.goal.goal import Posture, SegmentType
 
 _WITHOUT_TURN = ((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.0))
-#: The fields that are read from the header of a pose.
-_STAMPED = ('frame_id', 'stamp')
 #: A larger joint position [rad] must be in degrees; MoveIt keeps joints within one turn.
 _MAX_ANGLE = 4.0 * np.pi
+#: The fields that are read from the header of a pose.
+_STAMPED = ('frame_id', 'stamp')
 
 
 def collect_yaml(file: Path, options: ImportOptions, into: PathCollector) -> None:
@@ -88,6 +90,9 @@ def collect_message(message: Any, options: ImportOptions, into: PathCollector) -
     elif name == ROBOT_TRAJECTORY:
         _say_others(message, ('joint_trajectory',), into.remarks)
         _collect_joints(message.joint_trajectory, options, into)
+    elif name in CONTROLLER_GOALS:
+        _say_others(message, ('trajectory',), into.remarks)
+        collect_message(message.trajectory, options, into)
     elif name == DISPLAY_TRAJECTORY:
         _say_others(message, ('trajectory',), into.remarks)
         trajectories = _sequence(message.trajectory, 'trajectory', 0)
@@ -113,6 +118,10 @@ def _type(message: Any) -> str:
             'this is neither a Path, a PoseArray, a JointTrajectory nor a pose; its fields are '
             f'{quoted(", ".join(fields), 80)}',
         )
+    if name == OWN_GOAL:
+        inner = message_type(_fields(message.trajectory))
+        if inner in (JOINT_TRAJECTORY, ROBOT_TRAJECTORY):
+            name = CONTROLLER_GOALS[inner == ROBOT_TRAJECTORY]
     if TERMS[name].treatment is Treatment.REFUSED:
         raise BrokenFile(line, f'this is a {name}: {TERMS[name].reason}')
     return name
@@ -363,15 +372,6 @@ def _collect_joints(message: Any, options: ImportOptions, into: PathCollector) -
         )
 
 
-def _joint_order(names: Sequence[str], line: int, remarks: ImportNotes) -> list[int]:
-    """
-    Return the indices of the arm's joints among names, from base to wrist 3.
-
-    :raises BrokenFile: a joint is missing, or occurs twice.
-    """
-    order = []
-    for joint in JOINT_NAMES:
-        # Names can have a prefix that distinguishes the arms of a cell.
 def _angle(value: Any, line: int) -> float:
     """
     Return a joint position [rad].
@@ -386,6 +386,15 @@ def _angle(value: Any, line: int) -> float:
     return angle
 
 
+def _joint_order(names: Sequence[str], line: int, remarks: ImportNotes) -> list[int]:
+    """
+    Return the indices of the arm's joints among names, from base to wrist 3.
+
+    :raises BrokenFile: a joint is missing, or occurs twice.
+    """
+    order = []
+    for joint in JOINT_NAMES:
+        # Names can have a prefix that distinguishes the arms of a cell.
         found = [i for i, name in enumerate(names) if name.endswith(joint)]
         if len(found) != 1:
             raise BrokenFile(line, f'joint_names has {len(found)} of {joint}, but must have one')
