@@ -43,7 +43,7 @@ _MAX_JUMP = 0.5
 _SAME = 1e-6
 #: Number of samples in the first block after a refinement, and in the longest block: longer ones
 #: would only need more memory.
-_FIRST_BLOCK, _LONGEST_BLOCK = 64, 16384
+_FIRST_BLOCK, _LONGEST_BLOCK = 64, 8192
 #: Number of samples on the rest of a piece that show how far a joint would leave its range.
 _SAMPLES_BEYOND = 16
 #: A block that is solved to its end is followed by one that is longer by this factor.
