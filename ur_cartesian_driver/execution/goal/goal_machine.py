@@ -152,7 +152,7 @@ class GoalMachine:
             return self._append(event, now)
         if self.state is GoalState.ENDED:
             return []
-        if isinstance(event, events.StateReceived):
+        if self.job.moving_frame is not None and isinstance(event, events.StateReceived):
             event = replace(event, state=self._seen(event.state))
         if self._packet_time is None:
             self._packet_time = now - self._packet.state_age
