@@ -64,6 +64,8 @@ from ur_cartesian_driver.motion.state.servo_report import UNKNOWN6
 #: A robot program that has read one of our sequence numbers within this time [s] is not considered
 #: hung, even if the arm stands still.
 ANSWER_TIMEOUT = 1.0
+#: How long the robot program may take to answer CANCEL while it reads set-points [s].
+CANCEL_TIMEOUT = 1.0
 #: ``servoj`` smooths its set-points, so the controller's target lags them: by about the lookahead
 #: time of ``servoj``, or, with a low gain, by up to this many lookahead times.
 MAX_LAG_LOOKAHEADS = 4.0
@@ -90,7 +92,9 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         self._spline = monitor.job.spline
         self._max_servo_lag = MAX_LAG_LOOKAHEADS * stream.settings.lookahead_time
         self._last_read, self._last_answer = -1, -inf
-        self._has_filled = self._has_left = self._is_cancelled = False
+        self._has_filled = self._has_left = False
+        #: Time of the first packet after a CANCEL that has to be answered [s]; None = none yet.
+        self._cancelled_at: float | None = None
         #: Sends what the robot program does along the path; None = nothing.
         self._points = PointFeeder(monitor) if monitor.job.has_events else None
         self._holds = deque(monitor.job.holds)
@@ -144,6 +148,9 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
                 return self._leave()
             case GoalState.CANCELLING | GoalState.PROGRAM_LOST:
                 # A program that is started after this must not find set-points in the inputs.
+                # A program that still discards points has not read yet that it is to leave: it
+                # would read the set-points of the next goal, and leave then.
+                self.stream.may_leave = self._points is None or state is not GoalState.CANCELLING
                 commands = self._points.enter(state, packet) if self._points is not None else []
                 return commands + self._stop()
             case GoalState.ENDED:
@@ -168,6 +175,11 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
             return [] if self._points is None else self._points.feed(event, now)
         if event.feedback.last_sequence != self._last_read:
             self._last_read, self._last_answer = event.feedback.last_sequence, now
+        if not self.stream.may_leave:
+            self._cancelled_at = now if self._cancelled_at is None else self._cancelled_at
+            # A program that is paused answers nothing, and takes no next goal.
+            is_late = now > self._cancelled_at + CANCEL_TIMEOUT
+            self.stream.may_leave = is_late or not event.feedback.playing
         before = self.stream.phase
         row = self.stream.on_feedback(event.feedback, now)
         if self.stream.phase is ServoPhase.SERVOING and not self._has_filled:
@@ -200,9 +212,9 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         if self._points is None and isinstance(event, TrajectoryEnded):
             # All others are the results of an earlier goal.
             return None if event.result is TrajectoryResult.TOUCHED else NO_MEANING
-        if state is GoalState.CANCELLING and isinstance(event, TrajectoryEnded):
-            self._is_cancelled |= event.result is TrajectoryResult.CANCELED
-        elif not isinstance(event, ServoReceived):
+        if isinstance(event, TrajectoryEnded) and event.result is TrajectoryResult.CANCELED:
+            self.stream.may_leave = True
+        if not isinstance(event, ServoReceived):
             return None
         if self.stream.phase is ServoPhase.ARRIVED and state is GoalState.MOVING:
             # The robot program may still have something to do.
@@ -210,10 +222,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         if self.stream.phase is not ServoPhase.LEFT:
             return NO_MEANING
         if state is GoalState.CANCELLING:
-            # A program that still discards points has not read yet that it is to leave the servo:
-            # it would read the set-points of the next goal, and then leave.
-            is_done = self._points is None or self._is_cancelled
-            return (GoalSignal.CANCELED, '') if is_done else NO_MEANING
+            return GoalSignal.CANCELED, ''
         if state in INTERRUPTIBLE_STATES:
             # A program that is about to end leaves the servo; the reason may follow in a moment.
             return GoalSignal.PROGRAM_STOPPED, (

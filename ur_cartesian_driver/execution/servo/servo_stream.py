@@ -222,6 +222,8 @@ class ServoStream:
         self.held_time = 0.0
         #: Time of the motion [s]: that of the source without the rests that were left out.
         self._moved_time = 0.0
+        #: Whether LEAVING ends when the program has left; if not, writes go on until it may.
+        self.may_leave = True
         #: What a feed override leaves of the motion's rate, 0 to 1.
         self.feed = 1.0
         #: The value to which :attr:`feed` goes, and how fast [1/s].
@@ -385,7 +387,7 @@ class ServoStream:
         if feedback.mode == ServoMode.SERVO:
             return False
         if self.phase is ServoPhase.LEAVING:
-            return self._has_read(self._first_idle)
+            return self.may_leave and self._has_read(self._first_idle)
         return self.phase in STREAMING and self._has_read(self._first_servo)
 
     def _advance_clock(self, passed: float, feedback: ServoFeedback) -> None:
