@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import struct
+import time
 
 import pytest
 from robot_ports import FREE, Primary, Wire
@@ -36,6 +37,7 @@ def test_each_primary_client_gets_the_version_first_then_states(robot):
             assert isinstance(version, VersionMessage)
             assert (version.major, version.minor) == (5, 21)
             assert version.timestamp == 2**64 - 1  # as robots send it
+            assert time.strptime(version.date, '%d-%m-%Y, %H:%M:%S')
             packages = {type(p): p for p in wire.await_(RobotStateFrame).packages}
     assert packages[RobotModeData].robot_mode == 7
     assert packages[ConfigurationData].robot_type == 1
@@ -117,8 +119,11 @@ def test_a_compile_error_comes_with_line_and_column(robot):
     with Primary(robot.ports.primary) as wire:
         wire.send(b'def illegal_fun():\n  calldoesntexist()\nend\n')
         error = wire.await_(RuntimeExceptionMessage)
+        wire.send(b'def stops():\n  a = sqrt(-1)\nend\n')
+        later = wire.await_(RuntimeExceptionMessage)
     assert (error.line, error.column) == (2, 3)
     assert error.text == 'compile_error_name_not_found:calldoesntexist:'
+    assert error.timestamp == 2**64 - 1 > later.timestamp  # as recorded in URSim
 
 
 def test_a_bare_line_is_a_program_of_its_own(robot):

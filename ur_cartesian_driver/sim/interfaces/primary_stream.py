@@ -32,6 +32,7 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.programs.program_runner import PAUSED
 from ur_cartesian_driver.sim.rtde_output_values import COMPUTED, FIXED
+from ur_cartesian_driver.sim.state.controller_messages import NO_TIMESTAMP
 
 #: Field of a sub-package -> RTDE output with the same meaning.
 JOINT_OUTPUTS: Mapping[str, str] = {
@@ -53,8 +54,6 @@ TOOL_OUTPUTS: Mapping[str, str] = {
     'mode': 'tool_mode',
 }
 
-#: Timestamp of the version message, as recorded on four robots (software 3.5 to 5.1).
-NO_TIMESTAMP = 2**64 - 1
 #: States per second.
 STATE_RATE = 10.0
 #: Reported limit of the joint accelerations [rad/s^2], as recorded on a UR5e.
@@ -75,7 +74,7 @@ def version_frame(controller: Controller) -> bytes:
             minor=minor,
             bugfix=bugfix,
             build=build,
-            date='2026-01-01, 00:00:00',
+            date='01-01-2026, 00:00:00',  # day first, as recorded
             timestamp=NO_TIMESTAMP,
         )
     )

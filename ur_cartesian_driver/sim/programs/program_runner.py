@@ -191,7 +191,7 @@ class ProgramRunner:
         def start(compiled: CompiledProgram | CompileError) -> None:
             if isinstance(compiled, CompileError):
                 self._messages.exception(
-                    compiled.line - line_offset, compiled.column, compiled.text
+                    compiled.line - line_offset, compiled.column, compiled.text, at_start=True
                 )
             elif compiled.program.kind == 'sec':
                 self._secondaries.append(compiled.interpreter)
@@ -276,7 +276,9 @@ class ProgramRunner:
                 return
             self._awaited = None
             if isinstance(compiled, CompileError):
-                self._messages.exception(compiled.line, compiled.column, compiled.text)
+                self._messages.exception(
+                    compiled.line, compiled.column, compiled.text, at_start=True
+                )
                 self.start_failure = str(compiled)
             else:
                 self._start_compiled(name, compiled.interpreter)

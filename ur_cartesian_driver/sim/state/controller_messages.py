@@ -26,6 +26,9 @@ _MAX_LOG_LINES = 10_000
 _MAX_TEXT_LENGTH = 4000
 
 _POPUP, _REQUEST = 2, 9
+#: Timestamp of the version message, as recorded on four robots (software 3.5 to 5.1), and of the
+#: exception of a program that does not compile, as recorded in URSim (5.4).
+NO_TIMESTAMP = 2**64 - 1
 
 
 class ControllerMessages:
@@ -63,12 +66,19 @@ class ControllerMessages:
         """Report that a program has started, stopped or failed."""
         self.pending.append(KeyMessage(timestamp=self._stamp(), title=title, text=_cut(text)))
 
-    def exception(self, line: int, column: int, text: str) -> None:
-        """Report an error that stops a program or its start; line and column begin at 1."""
+    def exception(self, line: int, column: int, text: str, *, at_start: bool = False) -> None:
+        """
+        Report an error that stops a program; line and column begin at 1.
+
+        :param at_start: whether the program has not started, because it does not compile.
+        """
         self.log.append(f'{line}:{column}: {text}')
         self.pending.append(
             RuntimeExceptionMessage(
-                timestamp=self._stamp(), line=max(0, line), column=max(0, column), text=_cut(text)
+                timestamp=NO_TIMESTAMP if at_start else self._stamp(),
+                line=max(0, line),
+                column=max(0, column),
+                text=_cut(text),
             )
         )
 
