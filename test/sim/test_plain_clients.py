@@ -71,6 +71,25 @@ def test_a_secondary_program_sets_the_slider_through_a_socket_to_the_robot_itsel
         assert 'socket_open takes time' in error['text']
 
 
+def test_a_program_pauses_itself_and_says_why_through_the_dashboard(make_robot):
+    # A gripper's published program: two commands on one socket, which it closes without reading.
+    robot = make_robot()
+    host, port = robot.config.host, robot.ports.dashboard
+    with primary(robot) as client:
+        client.send(
+            f'def grip():\n  thread watch():\n    socket_open("{host}", {port}, "d")\n'
+            '    socket_send_line("pause", "d")\n'
+            '    socket_send_string("popup the part is lost", "d")\n'
+            '    socket_send_byte(10, "d")\n    socket_close("d")\n  end\n  run watch()\n'
+            '  speedj([0.1, 0, 0, 0, 0, 0], 1, 60)\nend\n'
+        )
+        client.await_('state', paused=True)
+        deadline = time.monotonic() + 10.0
+        while not robot.call(lambda controller: controller.popups):
+            assert time.monotonic() < deadline
+        assert robot.call(lambda controller: controller.popups[0].text) == 'the part is lost'
+
+
 def test_a_line_unlocks_without_the_wait_of_the_dashboard_but_not_within_a_millisecond(make_robot):
     robot = make_robot(rate=1.0)
     with primary(robot) as client, dashboard(robot) as board:

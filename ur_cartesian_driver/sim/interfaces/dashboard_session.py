@@ -241,6 +241,11 @@ class DashboardSession(ClientSession):
         #: The answer to the first request, while it is being made.
         self._answering: Generator[None, None, bytes] | None = None
 
+    @property
+    def is_busy(self) -> bool:
+        """Whether commands wait; published programs send two, and hang up at once."""
+        return bool(self._requests)
+
     def open(self) -> bytes:
         """Return the greeting."""
         return encode_line(BANNER)

@@ -39,6 +39,11 @@ class HangUp(Exception):
 class ClientSession(ABC):
     """One client's conversation."""
 
+    @property
+    def is_busy(self) -> bool:
+        """Whether requests wait that are carried out even if the client hangs up meanwhile."""
+        return False
+
     def open(self) -> bytes:
         """Return the bytes to send at the start; by default none, because the client begins."""
         return b''
@@ -99,6 +104,8 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
     def poll(self) -> None:
         """Make the session answer requests that it could not answer at once."""
         self._handle_incoming(b'')
+        if self._transport is None:
+            self._leave_if_done()
 
     def _transport_reading(self, wanted: bool) -> None:
         """Resume reading, or pause it so that the client has to wait."""
@@ -190,8 +197,12 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._transport = None
-        self._server.connections.discard(self)
-        self.session.close()
+        self._leave_if_done()
+
+    def _leave_if_done(self) -> None:
+        if self._has_hung_up or self._server.closing or not self.session.is_busy:
+            self._server.connections.discard(self)
+            self.session.close()
 
 
 class TcpServer(Generic[S]):
