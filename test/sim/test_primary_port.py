@@ -133,9 +133,24 @@ def test_a_bare_line_is_a_program_of_its_own(robot):
     assert robot.state().digital_outputs == 0b100
 
 
+@pytest.mark.parametrize(
+    ('line', 'text'),
+    [
+        (b'  set_flag(1 True)', 'syntax_error_on_line:1:set_flag(1 True):'),
+        (b'nothing()', 'compile_error_name_not_found:nothing:'),
+        (b'a = sqrt(-1)', 'Runtime error (1:5): Domain error: sqrt is defined from 0 on, got -1'),
+    ],
+)
+def test_the_mistake_of_a_bare_line_is_in_line_1(robot, line, text):
+    with Primary(robot.ports.primary) as wire:
+        wire.send(line + b'\n')
+        error = wire.await_(RuntimeExceptionMessage)
+    assert (error.line, error.text) == (1, text)
+
+
 def test_the_speed_can_be_set_by_a_line(robot):
     with Primary(robot.ports.primary) as wire:
-        wire.send(b'set real\nset sim\nset real\nset speed 0.5\n')
+        wire.send(b'confirm user safety parameters\nset real\nset sim\nset real\nset speed 0.5\n')
         wait_for(lambda: robot.state().speed_slider == 0.5)
     assert robot.state().messages == ()
 

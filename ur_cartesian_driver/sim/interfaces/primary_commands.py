@@ -26,6 +26,8 @@ _SET_SPEED = 'set speed'
 _CONTROL: Mapping[str, Callable[[Controller], object]] = {
     'power on': Controller.power_on,
     'power off': Controller.power_off,
+    # The question of a robot that has been switched on: not asked here.
+    'confirm user safety parameters': lambda _: None,
     'set robotmode run': Controller.release_brakes,
     'set unlock protective stop': Controller.unlock_soon,
     'stop program': lambda controller: controller.programs.stop(),
@@ -58,7 +60,7 @@ def execute_command(controller: Controller, item: UploadedItem, *, may_send: boo
     elif item.text.startswith(_SET_SPEED):
         _set_speed(controller, item.text.removeprefix(_SET_SPEED).strip())
     else:
-        controller.programs.submit(f'def unnamed():\n{item.text}\nend\n', line_offset=1)
+        controller.programs.submit(item.text, is_line=True)
 
 
 def _set_speed(controller: Controller, argument: str) -> None:

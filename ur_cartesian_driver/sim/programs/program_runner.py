@@ -18,6 +18,7 @@ column of the error, and the running program goes on.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+from dataclasses import replace
 from functools import lru_cache
 import logging
 from random import Random
@@ -29,6 +30,7 @@ from ur_cartesian_driver.sim.state.controller_messages import ControllerMessages
 from ur_cartesian_driver.urscript import (
     CompileError,
     parse,
+    parse_line,
     RuntimeException,
     ScriptInterpreter,
     ScriptProgram,
@@ -41,8 +43,12 @@ T = TypeVar('T')
 #: Generates the URScript of a program; calls its argument with the text, at once or later.
 GenerateScript: TypeAlias = Callable[[Callable[[str], None]], None]
 
-#: A cache, because clients send the same program again and again; syntax trees are immutable.
-_parse_cached = lru_cache(maxsize=8)(parse)
+
+@lru_cache(maxsize=8)  # clients send the same program again and again; syntax trees are immutable
+def _parse_cached(text: str, is_line: bool = False) -> ScriptProgram:
+    """Parse a program, or a line of statements, which is a program without a name."""
+    return replace(parse_line(text), name='unnamed') if is_line else parse(text)
+
 
 #: The code of the programs that were compiled last, for all controllers of this process: each with
 #: the program, whose identity is part of the key.
@@ -180,30 +186,30 @@ class ProgramRunner:
         """Whether a start waits: for the text of the program, or until the arm stands."""
         return self._awaited is not None or self._queued is not None
 
-    def submit(self, text: str, line_offset: int = 0) -> None:
+    def submit(self, text: str, is_line: bool = False) -> None:
         """
         Compile a program and start it; a `sec` runs in parallel with the primary program.
 
-        :param line_offset: number of lines that precede the client's own lines in ``text``.
+        :param is_line: whether the text is a line of statements.
         """
         stops = self._stops
 
         def start(compiled: CompiledProgram | CompileError) -> None:
             if isinstance(compiled, CompileError):
                 self._messages.exception(
-                    compiled.line - line_offset, compiled.column, compiled.text, at_start=True
+                    compiled.line, compiled.column, compiled.text, at_start=True
                 )
             elif compiled.program.kind == 'sec':
                 self._secondaries.append(compiled.interpreter)
             elif stops == self._stops:
                 self._start_compiled(compiled.program.name, compiled.interpreter)
 
-        self.compile_aside(lambda: self._compile_text(text), start)
+        self.compile_aside(lambda: self._compile_text(text, is_line), start)
 
-    def _compile_text(self, text: str) -> CompiledProgram | CompileError:
+    def _compile_text(self, text: str, is_line: bool = False) -> CompiledProgram | CompileError:
         """Compile a program, possibly in another thread."""
         try:
-            program = _parse_cached(text)
+            program = _parse_cached(text, is_line)
             if program.kind == 'sec':
                 interpreter = ScriptInterpreter(program, self._secondary_builtins)
             else:
