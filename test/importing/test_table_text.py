@@ -86,6 +86,7 @@ def test_three_columns_without_a_header_need_a_unit(tmp_path):
     ('text', 'sentence'),
     [
         ('1,2,3\n', "line 1: no line before it names the columns; write one, such as 'x [mm],y"),
+        ('2\n1 2 3\n4 5 6\n', 'line 1: no line before it names the columns'),
         ('\n1 2 3 4 5 6\n', "line 2: no line before it .*'x [mm],y [mm],z [mm],rx [rad],ry"),
         ('# scan\n1;2;3;0;0;0;1;\n', "line 2: no line .*'x [mm],y [mm],z [mm],qx,qy,qz,qw'"),
         ('1700000000,5,map,1,2,3,0,0,0,1\n', 'line 1: no line before it names the columns'),

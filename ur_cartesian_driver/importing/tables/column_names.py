@@ -127,6 +127,11 @@ TERMS = term_table(
         *('q{0123}', 'q{1234}'),
     ),
     refused(OTHER_ORIENTATION, 'the file does not say whether they are a normal', 'i, j, k'),
+    refused(
+        OTHER_ORIENTATION,
+        'a rotation matrix is not read',
+        *('r1{123}, r2{123}, r3{123}', 'r0{012}, r1{012}, r2{012}'),
+    ),
     honoured(NORMAL, 'n{xyz}', 'normal_{xyz}', 'normals_{xyz}'),
     honoured(
         TIME,

@@ -105,7 +105,9 @@ def read_table(
             if titles := next(filter(is_header, _titles(text, delimiters)), None):
                 header = (i + 1, titles)
             if not comment:
-                if (header and header[0] == i + 1) or _is_numeric(line):
+                # A number alone is no point, but the rate or count of a recorder.
+                is_row = _is_numeric(line) and not _is_number(line)
+                if (header and header[0] == i + 1) or is_row:
                     break
                 before.append(i + 1)
     if header is None:
@@ -199,9 +201,9 @@ def _cells(line: str, delimiter: str | None) -> list[str]:
 
 
 def _is_numeric(line: str) -> bool:
-    """Return whether more than half of the cells of a line, at least three, are numbers."""
+    """Return whether more than half of the cells of a line are numbers."""
     cells = re.findall(r'[^;,\s"]+', line)
-    return len(cells) > 2 and 2 * sum(map(_is_number, cells)) > len(cells)
+    return 2 * sum(map(_is_number, cells)) > len(cells)
 
 
 def _is_number(cell: str) -> bool:
