@@ -195,10 +195,24 @@ def test_the_diameter_mode_halves_x(tmp_path):
 def test_the_radii_of_a_lathe_are_said(tmp_path):
     found = imported(tmp_path, 'G21 G18\nG50 S2000\nG96 S200 M3\nG0 X10 Z5\nG1 Z0 F100\n')
     assert 'X of a lathe: a radius, because there is no G7' in remarks(found)
-    for mark in ('G50 S2000', 'G92 S2000', 'G99\nG1 X9 F0.2', 'G1 X9 F100\nG97 G99\nX8 F.2'):
+    for mark in (
+        'G50 S2000',
+        'G92 S2000',
+        'G28 U0 W0',
+        'G99\nG1 X9 F0.2',
+        'G1 X9 F100\nG97 G99\nX8 F.2',
+    ):
         found = imported(tmp_path, f'G21 G18\n{mark}\nG0 X10 Z5\nG1 Z0\n')
         assert 'X of a lathe: a radius, because there is no G7' in remarks(found)
-    for other in ('G50', '(G96)', 'G99\nG98\nG1 X9 F100', 'G92 X0', 'G1 X9 F100\nG99'):
+    for other in (
+        'G50',
+        '(G96)',
+        'G28 W',
+        'G28 U0 V0',
+        'G99\nG98\nG1 X9 F100',
+        'G92 X0',
+        'G1 X9 F100\nG99',
+    ):
         found = imported(tmp_path, f'G21 G18\n{other}\nG0 X10 Z5\nG1 Z0\n')
         assert not any('X of a lathe' in text for text in remarks(found))
     found = imported(tmp_path, 'G21 G18 G8\nG96 S200 M3\nG0 X10 Z5\nG1 Z0 F100\n')
@@ -242,3 +256,12 @@ def test_a_feed_per_turn_is_no_speed(tmp_path):
         remarks(found)
     )
     assert "line 3: G1 without F: its speed is the driver's" in remarks(found)
+
+
+@pytest.mark.parametrize('mark', ['G50 S2500', 'G96 S180', 'G28 U0. W0.', 'G30 X5 U0'])
+@pytest.mark.parametrize(('mode', 'speed'), [('', 0.0), ('G98', 0.001), ('G94', 0.001)])
+def test_a_feed_of_a_lathe_is_a_speed_if_the_program_says_so(tmp_path, mark, mode, speed):
+    found = imported(tmp_path, f'G21 {mode}\n{mark}\nG0 X10 Y0 Z5\nG1 Z0 F60\n')
+    assert found.goal.segments.velocities[-1] == pytest.approx(speed)
+    said = 'line 4: word F: per turn or per minute, as the lathe is set; write G98 or G99'
+    assert (said in remarks(found)) == (not mode)

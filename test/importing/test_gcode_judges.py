@@ -166,7 +166,9 @@ def test_words_of_other_machines_do_not_change_the_path(tmp_path, number):
     program, motions = JUDGED[number]
     lines = program.split('\n')
     first = next(row for row, line in enumerate(lines) if line[:1] not in '%O') + 1
-    last = next(row for row, line in enumerate(lines) if line in ('M2', 'M30', '%') and row)
+    last = 1 + next(row for row, line in enumerate(lines) if line in ('M2', 'M30', '%') and row)
+    # G96, G50 S and G92 S are of lathes, whose feeds can begin per turn.
+    lines.insert(first - 1, 'G94')
     for name in NEUTRAL[number::MIXED]:
         row = random_of('mixed', name).randint(first, last)
         # G96 gives S another meaning, until G97.

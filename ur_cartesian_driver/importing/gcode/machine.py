@@ -39,6 +39,8 @@ _AXIS_WORDS = frozenset('XYZABCE')
 _WITH_AXES = ('G28', 'G30', 'G53')
 #: The codes by which a lathe is known, and those that end a feed per turn.
 _LATHE_CODE = re.compile(r'G\s*0*(50|92|94|96|98|99)(?![.\d])', re.I)
+#: Goes home along X by increments, which only a lathe or a wire has.
+_LATHE_HOME = re.compile(r'G\s*0*(28|30)(?![.\d]).*U\s*[-+.\d]', re.I)
 _S_WORD, _F_WORD = (re.compile(rf'{letter}\s*[-+.\d]', re.I) for letter in 'SF')
 _CONDITION_END = re.compile(r'\s*M623\b', re.I)
 _UNITS = {'G20': LENGTH_UNITS['in'], 'G21': LENGTH_UNITS['mm']}
@@ -74,7 +76,9 @@ class GcodeMachine:
         self._line = 0
         self._has_begun = self._seen_percent = False
         self._frame = _FRAMES[0]
-        self._feed_per_turn = self._surface_speed = False
+        self._surface_speed = False
+        #: Whether F is per turn of the spindle; None = no code has said it yet.
+        self._feed_per_turn: bool | None = None
         #: The line of an M622 whose M623 is still to come; 0 = none.
         self._condition = 0
         #: For each M120 whose M121 is still to come: whether increments were in effect (G91).
@@ -315,6 +319,9 @@ class GcodeMachine:
         if self._feed_per_turn:
             self._omit('word F', 'after G99 a lathe gives it per turn, so it is no speed')
             self._path.feed = None
+        elif self._feed_per_turn is None and self._is_lathe:
+            self._omit('word F', 'per turn or per minute, as the lathe is set; write G98 or G99')
+            self._path.feed = None
         else:
             self._path.feed = value * self._path.length(self._line) / 60.0
 
@@ -445,10 +452,16 @@ class GcodeMachine:
 
     @cached_property
     def _is_lathe(self) -> bool:
-        """Return whether the program has a surface speed, or limits it, or feeds per turn."""
+        """
+        Return whether the program is one of a lathe.
+
+        It has a surface speed, or limits it, or feeds per turn, or goes home along U without V.
+        """
         per_turn = False
         for line in self._lines:
             text = COMMENT.sub('', line)
+            if _LATHE_HOME.search(text) and not self._has_v:
+                return True
             for match in _LATHE_CODE.finditer(text):
                 per_turn = match[1] == '99' or (per_turn and match[1] not in ('94', '98'))
                 if match[1] == '96' or (match[1] in ('50', '92') and _S_WORD.search(text)):
