@@ -113,7 +113,7 @@ def test_a_request_waits_until_a_person_answers(bench):
     bench.wait(1.0)
     assert bench.log == []
     (request,) = (m for m in controller.messages.take() if isinstance(m, RawMessage))
-    assert (request.message_type, request.content[5:]) == (9, b'Go on?')
+    assert (request.message_type, request.content) == (9, bytes(8) + b'Go on?')
     controller.pendant.answers.append('no')
     bench.until(lambda: bench.programs.state is RuntimeState.STOPPED)
     assert bench.log == ['False']

@@ -94,10 +94,20 @@ def test_a_program_that_comes_in_pieces_runs_and_all_clients_hear_of_it(robot):
             wire.await_(KeyMessage, title='PROGRAM_XXX_STOPPED', text='hello')
 
 
+def test_clients_hear_of_a_window(robot):
+    with Primary(robot.ports.primary) as wire:
+        wire.send(b'popup("Part lost", "Gripper", error=True)\n')
+        content = wire.await_(RawMessage, message_type=2).content
+    # As published clients unpack it: number, type, warning, error, blocking, length of the title.
+    assert struct.unpack('>II???B', content[:12]) == (0, 0, False, True, False, 7)
+    assert content[12:] == b'GripperPart lost'
+
+
 def test_clients_hear_of_a_request_and_a_person_answers(robot):
     with Primary(robot.ports.primary) as wire:
         wire.send(b'textmsg(request_integer_from_primary_client("How many?"))\n')
-        assert wire.await_(RawMessage, message_type=9).content.endswith(b'How many?')
+        content = wire.await_(RawMessage, message_type=9).content
+        assert (struct.unpack('>II', content[:8]), content[8:]) == ((0, 1), b'How many?')
         robot.answer('3')
         wire.await_(TextMessage, text='3')
 

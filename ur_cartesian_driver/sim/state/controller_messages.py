@@ -104,16 +104,16 @@ class ControllerMessages:
         """
         Report that a window is shown.
 
-        The body is: u32 request, u8 type of the request, u8 each for warning, error and blocking,
-        u8 length of the title, title, text.
+        The body is: u32 number and u32 type of the request, u8 each for warning, error and
+        blocking, u8 length of the title, title, text. Six published clients read it so.
         """
         title = _cut(popup.title, 255).encode(errors='replace')
-        flags = bytes([0, popup.warning, popup.error, popup.blocking])
+        flags = bytes([popup.warning, popup.error, popup.blocking])
         self.pending.append(
             RawMessage(
                 message_type=_POPUP,
                 timestamp=self._stamp(),
-                content=bytes(4)
+                content=bytes(8)
                 + flags
                 + bytes([len(title)])
                 + title
@@ -125,8 +125,8 @@ class ControllerMessages:
         """
         Report that a window requests a value.
 
-        The layout of the body is undocumented. Assumed is one that begins like a popup's: u32
-        request (0), u8 type of the value, text.
+        The body is: u32 number of the request (0), u32 type of the value, text. Three published
+        clients read it so; the numbers of the types are assumed.
 
         :param kind: the type of the value; 0 = boolean, 1 = integer, 2 = float, 3 = string.
         """
@@ -134,7 +134,7 @@ class ControllerMessages:
             RawMessage(
                 message_type=_REQUEST,
                 timestamp=self._stamp(),
-                content=bytes(4) + bytes([kind]) + _cut(text).encode(errors='replace'),
+                content=bytes(4) + kind.to_bytes(4, 'big') + _cut(text).encode(errors='replace'),
             )
         )
 
