@@ -10,7 +10,6 @@ meet: there it is the solution nearest to the straight line between the joints a
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,13 +17,15 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows, solve_path
-from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
+from ur_cartesian_driver.motion.plan.move_rows import MoveRows, MOVES
 from ur_cartesian_driver.motion.plan.plan import Plan, ReferencePath
-from ur_cartesian_driver.motion.plan.primitive import MoveJ, OptimoveJ
+from ur_cartesian_driver.motion.plan.primitive import MoveJ, OptimoveJ, Primitive
 
 # Times that differ by less than this [s] are the same.
 _INSTANT = 1e-9
+_JOINT_MOVES = MoveJ, OptimoveJ
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,23 +48,38 @@ class JointMove:
 def joint_moves(plan: Plan) -> tuple[JointMove, ...]:
     """Return the joint moves of a plan in order."""
     reference, planned = plan.reference, plan.rows
-    ends = np.cumsum(planned.durations)
+    numbers = _joint_move_rows(planned.primitives)
+    waypoints = planned.waypoints[numbers]
+    first, last = (np.searchsorted(reference.point, waypoints + k) for k in (0, 1))
     # A travel has several motions to the same point; their rows are told apart by their times.
-    shared = Counter(planned.waypoints.tolist())
-    moves = []
-    q = plan.start
-    for segment, end in zip(plan.segments, ends.tolist(), strict=True):
-        if isinstance(segment.primitive, MoveJ | OptimoveJ):
-            first, last = np.searchsorted(
-                reference.point, [segment.waypoint, segment.waypoint + 1]
-            )
-            if shared[segment.waypoint] > 1:
-                times = [end - segment.duration + _INSTANT, end + _INSTANT]
-                begin, stop = np.searchsorted(reference.time, times)
-                first, last = max(first, begin), min(last, stop)
-            moves.append(JointMove(q, segment.joints, max(0, int(first) - 1), int(last) - 1))
-        q = segment.joints
-    return tuple(moves)
+    shared = np.isin(waypoints, planned.waypoints[1:][np.diff(planned.waypoints) == 0])
+    if shared.any():
+        ends = np.cumsum(planned.durations)[numbers]
+        begin, stop = (
+            np.searchsorted(reference.time, time + _INSTANT)
+            for time in (ends - planned.durations[numbers], ends)
+        )
+        first = np.where(shared, np.maximum(first, begin), first)
+        last = np.where(shared, np.minimum(last, stop), last)
+    joints = np.vstack([plan.start, planned.joints])
+    return tuple(
+        JointMove(vector6(joints[k].tolist()), vector6(joints[k + 1].tolist()), begin, end)
+        for k, begin, end in zip(
+            numbers.tolist(), np.maximum(first - 1, 0).tolist(), (last - 1).tolist(), strict=True
+        )
+    )
+
+
+def _joint_move_rows(primitives: Sequence[Primitive]) -> Indices:
+    """Return the rows of joint moves; moves to poses are not made objects, a goal has many."""
+    columns = primitives if isinstance(primitives, MoveRows) else None
+    objects = range(len(primitives)) if columns is None else columns.others
+    found = {k for k in objects if isinstance(primitives[k], _JOINT_MOVES)}
+    if columns is not None:
+        kinds = [MOVES.index(kind) for kind in _JOINT_MOVES]
+        of_kind = np.flatnonzero(np.isin(columns.kinds, kinds)).tolist()
+        found.update(k for k in of_kind if k not in objects)
+    return np.array(sorted(found), dtype=np.intp)
 
 
 def row_places(reference: ReferencePath, time: Floats) -> Floats:
