@@ -295,6 +295,17 @@ def test_a_joint_trajectory(tmp_path):
     assert found.goal.waypoints.times.tolist() == [1.0, 2.0]
 
 
+@pytest.mark.parametrize('part', ['position', 'orientation'])
+def test_a_field_within_a_pose_is_said(tmp_path, part):
+    text = echo(*MESSAGES['nav_msgs/Path']).replace(
+        f'    {part}:\n', f'    {part}:\n      unit: mm\n'
+    )
+    lines = [i for i, line in enumerate(text.split('\n'), 1) if 'unit' in line]
+    assert f'lines {lines[0]}, {lines[1]}: unit: a path has no such field' in (
+        remarks(imported(tmp_path, text))
+    )
+
+
 def test_joints_in_degrees_are_refused(tmp_path):
     text = echo(joint_trajectory()).replace(f'- {HOME[2] + 0.2}\n', '- 90.0\n', 1)
     line = text.split('\n').index('  - 90.0') + 1
@@ -568,6 +579,10 @@ def test_a_frame_that_changes_is_refused(tmp_path):
         (
             lambda text: text.replace('frame_id: base', 'frame_id: [a]'),
             'line 5: frame_id is no text',
+        ),
+        (
+            lambda text: text.replace('frame_id: base', 'frame_id: 5'),
+            'line 5: frame_id is no text; put it into quotes.',
         ),
         (lambda text: '- ' * 60 + 'a\n', 'line 1: it is nested too deeply.'),
         (lambda text: '{' * 60, 'line 1: '),

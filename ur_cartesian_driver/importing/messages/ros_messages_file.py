@@ -49,6 +49,8 @@ from ur_cartesian_driver.motion.goal.goal import Posture, SegmentType
 _WITHOUT_TURN = ((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.0))
 #: A larger joint position [rad] must be in degrees; MoveIt keeps joints within one turn.
 _MAX_ANGLE = 4.0 * np.pi
+#: The fields that are read from the parts of a pose.
+_PARTS_OF_POSE = {'position': 'xyz', 'orientation': 'xyzw'}
 #: The fields that are read from the header of a pose.
 _STAMPED = ('frame_id', 'stamp')
 
@@ -239,8 +241,8 @@ def _frame(header: Any, line: int) -> str:
     if header is None:
         return ''
     frame = _part(header, 'stamp, frame_id', line).frame_id
-    if not isinstance(frame, str | float):
-        raise BrokenFile(getattr(frame, 'line', line), 'frame_id is no text')
+    if not isinstance(frame, str):
+        raise BrokenFile(getattr(frame, 'line', line), 'frame_id is no text; put it into quotes')
     return str(frame)
 
 
@@ -315,6 +317,9 @@ def _say_others_of_pose(item: Any, remarks: ImportNotes) -> None:
     _say_others(item, ('header', 'pose', 'position', 'orientation'), remarks)
     if 'header' in _fields(item):
         _say_others(item.header, _STAMPED, remarks)
+    for part, names in _PARTS_OF_POSE.items():
+        if part in _fields(item):
+            _say_others(getattr(item, part), names, remarks)
     if 'pose' in _fields(item):
         _say_others_of_pose(item.pose, remarks)
 
