@@ -61,6 +61,15 @@ def test_a_file_that_is_no_text_is_refused(tmp_path, data, sentence):
         import_file(tmp_path / 'a.csv')
 
 
+@pytest.mark.parametrize('end', ['\x1a', '\x1a\x1a\x1a'])
+def test_a_mark_at_the_end_of_a_text_is_no_part_of_it(tmp_path, end):
+    (tmp_path / 'a.nc').write_bytes(b'G21 G90\r\nG1 X1 Y1 Z1 F100\r\n' + end.encode())
+    assert len(import_file(tmp_path / 'a.nc').goal.waypoints) == 1
+    (tmp_path / 'b.nc').write_bytes(f'G21 G90\n{end}\nG1 X1 Y1 Z1 F100\n'.encode())
+    with pytest.raises(BrokenFile, match=r'^line 2: '):
+        import_file(tmp_path / 'b.nc')
+
+
 @pytest.mark.parametrize('end', ['\n', '\r\n', '\r'])
 @pytest.mark.parametrize('name', ['a.csv', 'a.yaml'])
 def test_lines_count_the_same_with_all_ends(tmp_path, name, end):

@@ -22,6 +22,9 @@ _MARKS = (
     (codecs.BOM_UTF16_BE, 'utf-16'),
 )
 
+#: Ctrl-Z, with which programs of DOS and of machine controls end a text.
+_END_OF_FILE = '\x1a'
+
 
 def file_text(path: Path) -> str:
     """
@@ -51,7 +54,7 @@ def decoded(data: bytes, code_page: str = 'cp1252') -> str:
         text = _by_code_page(data, code_page)
     if '\0' in text:
         raise BrokenFile(0, 'this is a binary file, and no text')
-    return text
+    return text.rstrip(_END_OF_FILE)
 
 
 def _by_code_page(data: bytes, code_page: str) -> str:
