@@ -104,6 +104,32 @@ def test_a_feed_is_a_speed(tmp_path):
     )
 
 
+@pytest.mark.parametrize(
+    ('line', 'speed'),
+    [('G4 P1 F1200', 0.02), ('G4 X1 F1200', 0.02), ('G4 F1200', 0.01), ('G28 F1200', 0.02)],
+)
+def test_a_feed_beside_another_code_is_a_feed(tmp_path, line, speed):
+    found = imported(tmp_path, f'{BEFORE}{line}\nG0 X1 Y1 Z2\nG1 X3\n')
+    assert found.goal.segments.velocities[-1] == pytest.approx(speed)
+
+
+def test_coordinates_are_set_beside_a_power(tmp_path):
+    found = imported(tmp_path, f'{BEFORE}G92 X5 M3 S50\nX7\n', 'S=analog:0:100')
+    assert positions(found) == pytest.approx(np.array([HERE, (3, 1, 1)]))
+    assert [value for _, _, value in switched(found)] == [0.5]
+
+
+def test_a_length_of_the_tool_beside_the_end_of_a_cycle_moves_nothing_away(tmp_path):
+    found = imported(tmp_path, f'{BEFORE}G0 G80 G43 H1 X3\n')
+    assert positions(found) == pytest.approx(np.array([HERE, (3, 1, 1)]))
+    assert remarks(found) == ['line 3: G43: the length of the tool is in the active TCP']
+
+
+def test_a_work_offset_leaves_p_to_other_codes(tmp_path):
+    text = f'G54 G4 P2\n{BEFORE}G54 M98 P7\nM2\nO7\nX3\nM99\n'
+    assert positions(imported(tmp_path, text)) == pytest.approx(np.array([HERE, (3, 1, 1)]))
+
+
 @pytest.mark.parametrize('code', CANCELS)
 def test_a_cancel_changes_nothing(tmp_path, code):
     found = imported(tmp_path, BEFORE + code + AFTER)

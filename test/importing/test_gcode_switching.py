@@ -23,6 +23,7 @@ S = 'S=analog:0:100'
         ('S50\nX1\n', []),
         # The values of other codes are no power.
         ('M3 S50\nM204 S5000\nM104 S215\nX1\nG4 S3\n', [(0, 0.5)]),
+        ('M3 S50 G4 P2\nX1\nG4 P1 S70\nX2\n', [(0, 0.5), (1, 0.7)]),
         ('G96 S999 M3\nX1\nS999\nG97 S30\n', [(1, 0.3)]),
         ('G50 S9999\nM3 S5\nX1\n', [(0, 0.05)]),
     ],

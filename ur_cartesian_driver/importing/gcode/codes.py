@@ -177,7 +177,7 @@ _OFFSETS = (
         'offsets',
         _HOME,
         *('G28', 'G30'),
-        words=_AXES + 'EFIJKLOPRSTH',
+        words=_AXES + 'EIJKLOPRSTH',
         bare=_AXES + 'EIJKLOPRSH',
         stage=Stage.OFFSET,
         moves_away=True,
@@ -320,14 +320,23 @@ def code_named(name: str) -> Code | None:
     return row
 
 
-def code_on_line(name: str, words: Mapping[str, float]) -> Code | None:
-    """Return the row of a code with the words of its line; None = the code is not known."""
+def code_on_line(name: str, words: Mapping[str, float], *, is_alone: bool) -> Code | None:
+    """
+    Return the row of a code with the words of its line; None = the code is not known.
+
+    :param is_alone: whether the line has no other code.
+    """
     if name in _CHANGED_BY_WORDS:
         if name == 'G10' and 'L' in words:
             return CODES.get(f'G10 L{words["L"]:g}')
-        if name == 'G5' and words.keys() != {'P'}:
-            return CODES[name]  # a spline has a P, too
-        for letter in words:
+        if (
+            # A spline has a P, too; the H beside G80 can be that of a G43.
+            (name == 'G5' and words.keys() != {'P'})
+            or (name == 'G80' and not is_alone)
+            or (name == 'G92' and not words.keys().isdisjoint('XYZ'))
+        ):
+            return CODES[name]
+        for letter in sorted(words, key='ZX'.find, reverse=True):
             if row := CODES.get(f'{name} {letter}'):
                 return row
     row = code_named(name)

@@ -41,11 +41,15 @@ _WITH_AXES = ('G28', 'G30', 'G53')
 _LATHE_CODE = re.compile(r'G\s*0*(50|92|94|96|98|99)(?![.\d])', re.I)
 #: Goes home along X by increments, which only a lathe or a wire has.
 _LATHE_HOME = re.compile(r'G\s*0*(28|30)(?![.\d]).*U\s*[-+.\d]', re.I)
-_S_WORD, _F_WORD = (re.compile(rf'{letter}\s*[-+.\d]', re.I) for letter in 'SF')
+_S_WORD, _F_WORD, _AXIS = (
+    re.compile(rf'{letter}\s*[-+.\d]', re.I) for letter in ('S', 'F', '[XYZ]')
+)
 _CONDITION_END = re.compile(r'\s*M623\b', re.I)
 _UNITS = {'G20': LENGTH_UNITS['in'], 'G21': LENGTH_UNITS['mm']}
 #: The codes of the work offsets; G10 numbers them from 1.
 _FRAMES = ('G54', 'G55', 'G56', 'G57', 'G58', 'G59', 'G59.1', 'G59.2', 'G59.3')
+#: The words of G4 that are a time wherever they stand; S and F are one if there is none of these.
+_DWELL = 'PXU'
 #: Codes that have a P on other controls only than those with G64 P.
 _LEAVE_P = frozenset((*_FRAMES, 'M0', 'M1', 'M2', 'M6', 'M30', 'M60'))
 
@@ -146,15 +150,18 @@ class GcodeMachine:
 
     def _obey(self, codes: Sequence[str], words: _Words, bare: str) -> None:
         """Execute a line with other codes than one motion code, or with bare letters."""
-        rows = [self._row(code, words) for code in codes]
+        rows = [self._row(code, words, is_alone=len(codes) == 1) for code in codes]
         if len(rows) == 1 and rows[0].alone:
             self._do(codes[0], rows[0], words, bare)
             return
         self._check_codes(codes, rows, words)
         own: list[_Words] = [{} for _ in rows]
         # G64 takes its P and Q before others, but acts after the unit of its line.
-        for i in sorted(range(len(rows)), key=lambda i: rows[i].group != PATH_CONTROL):
-            own[i] = {letter: words.pop(letter) for letter in rows[i].words if letter in words}
+        order = {
+            i: (row.group != PATH_CONTROL, codes[i] in _LEAVE_P) for i, row in enumerate(rows)
+        }
+        for i in sorted(order, key=order.__getitem__):
+            own[i] = _taken(codes[i], rows[i], words)
         self._check_words(codes, rows, own, words, bare)
         self._has_begun |= codes[0][0] in 'GM'
         spindle = any(row.group == 'spindle' for row in rows)
@@ -171,8 +178,8 @@ class GcodeMachine:
                 if row.stage is stage:
                     self._do(code, row, values, bare)
 
-    def _row(self, code: str, words: Mapping[str, float]) -> Code:
-        row = code_on_line(code, words)
+    def _row(self, code: str, words: Mapping[str, float], *, is_alone: bool) -> Code:
+        row = code_on_line(code, words, is_alone=is_alone)
         if row is None:
             raise self._fail(f'{code} is not known; remove it, or write it as moves')
         if row.treatment is Treatment.REFUSED:
@@ -232,11 +239,24 @@ class GcodeMachine:
                 others.discard('S')
             if row.name == 'other M-codes':
                 others &= _OF_MOTION
+            if code in ('G4', 'G28', 'G30', 'G50', 'G92'):
+                self._check_shared(code, values, rows, has_motion=has_motion)
             if row.name == 'G53' and not values:
                 raise self._fail('G53 needs coordinates on its line')
             if others and (row.alone or row.name == 'other M-codes'):
                 raise self._fail(
                     f'{min(others)} could belong to {code} or not; give {code} a line of its own'
+                )
+
+    def _check_shared(
+        self, code: str, own: _Words, rows: Sequence[Code], *, has_motion: bool
+    ) -> None:
+        """Refuse an S or F of a code that the spindle or the motion of its line could mean."""
+        has_spindle = any(row.group == 'spindle' for row in rows)
+        for letter, is_shared in (('S', has_spindle), ('F', has_motion)):
+            if letter in own and is_shared:
+                raise self._fail(
+                    f'{letter} could belong to {code} or not; give {code} a line of its own'
                 )
 
     def _check_path_control(
@@ -464,7 +484,9 @@ class GcodeMachine:
                 return True
             for match in _LATHE_CODE.finditer(text):
                 per_turn = match[1] == '99' or (per_turn and match[1] not in ('94', '98'))
-                if match[1] == '96' or (match[1] in ('50', '92') and _S_WORD.search(text)):
+                if match[1] == '96' or (
+                    match[1] in ('50', '92') and _S_WORD.search(text) and not _AXIS.search(text)
+                ):
                     return True
             if per_turn and _F_WORD.search(text):
                 return True
@@ -508,6 +530,14 @@ _DO: Mapping[str, _Action] = {
     'G64 P': GcodeMachine._set_path_control,
     'G64 Q': GcodeMachine._set_path_control,
 }
+
+
+def _taken(code: str, row: Code, words: _Words) -> _Words:
+    """Remove and return the words of a line that belong to a code."""
+    letters = row.words
+    if code == 'G4' and any(letter in words for letter in _DWELL):
+        letters = _DWELL
+    return {letter: words.pop(letter) for letter in letters if letter in words}
 
 
 def _is_name(code: str) -> bool:
