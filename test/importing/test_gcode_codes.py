@@ -125,6 +125,11 @@ def test_a_length_of_the_tool_beside_the_end_of_a_cycle_moves_nothing_away(tmp_p
     assert remarks(found) == ['line 3: G43: the length of the tool is in the active TCP']
 
 
+def test_a_tool_beside_a_way_home_is_said(tmp_path):
+    said = remarks(imported(tmp_path, f'{BEFORE}G91 G28 Z0 T2 M6\n'))
+    assert 'line 3: word T: tools are not changed' in said
+
+
 def test_a_work_offset_leaves_p_to_other_codes(tmp_path):
     text = f'G54 G4 P2\n{BEFORE}G54 M98 P7\nM2\nO7\nX3\nM99\n'
     assert positions(imported(tmp_path, text)) == pytest.approx(np.array([HERE, (3, 1, 1)]))

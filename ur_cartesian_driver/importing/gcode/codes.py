@@ -177,7 +177,7 @@ _OFFSETS = (
         'offsets',
         _HOME,
         *('G28', 'G30'),
-        words=_AXES + 'EIJKLOPRSTH',
+        words=_AXES + 'EIJKLOPRSH',
         bare=_AXES + 'EIJKLOPRSH',
         stage=Stage.OFFSET,
         moves_away=True,
