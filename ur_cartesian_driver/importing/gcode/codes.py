@@ -213,6 +213,7 @@ _OUTPUTS = (
 )
 _TOOLS = (
     _left_out('tools', _NO_TOOLS, 'T'),
+    _left_out('tools', _NO_TOOLS, 'TX', 'TC', 'T?'),
     _left_out('tools', _NO_TOOLS, 'M6', words='HDPQ', stage=Stage.OUTPUT),
     _left_out('tools', _NO_TOOLS, 'M61', words='Q'),
     _left_out('tools', 'there is no table of tools', 'D', 'H'),

@@ -137,6 +137,8 @@ def _odd_block(number: int, line: str, text: str) -> Block:
     first = text[:1]
     if first in ('%', '/', ''):
         return Block([first] if first else [], {})
+    if text in ('TX', 'TC', 'T?'):  # Prusa: the filament is chosen at the printer
+        return Block([text], {})
     if first == '$':
         return Block([text[:2] if text[:2] in CODES else '$'], {})
     if first in 'O:':
