@@ -20,6 +20,7 @@ from ur_cartesian_driver.planning.request.point_events.timed_path import (
     PlacedOutput,
     SAME_TIME,
     TimedPath,
+    ToTcp,
 )
 from ur_cartesian_driver.protocol.program.trajectory_points import MAX_LEADS, MAX_PENDING_OUTPUTS
 
@@ -33,11 +34,12 @@ def place_outputs(
     start_time: float = 0.0,
     point_times: Floats | None = None,
     control_cycle: float = 0.0,
+    to_tcp: ToTcp | None = None,
 ) -> PlannedRows:
     """
     Return the segments with the records of outputs switched during the motion, in order of time.
 
-    :param reference: the path of the TCP along the segments, on the clock of ``start_time``.
+    :param reference: the path of the tool along the segments, on the clock of ``start_time``.
     :param events: the output events by goal field, with waypoints numbered as in ``segments``.
     :param blend_halves: duration of the first half of the blend after each segment [s]; None =
         no blends.
@@ -45,13 +47,14 @@ def place_outputs(
     :param point_times: when points are passed within a motion (n,) [s]; None = each point is at
         the end of a motion.
     :param control_cycle: cycle of the controller [s], needed for pulses only.
+    :param to_tcp: see :class:`TimedPath`.
     :raises InvalidGoal: no motion leads to a point, or too many outputs are pending at once.
     """
     if not any(events.values()):
         return segments
     path = TimedPath(
-        segments, reference, blend_halves, start_time, point_times, control_cycle
-    )  # fmt: skip
+        segments, reference, blend_halves, start_time, point_times, control_cycle, to_tcp
+    )
     switches = [
         found
         for kind in OUTPUT_EVENTS

@@ -90,6 +90,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
 )
 from ur_cartesian_driver.planning.request.held_part_rules import (
     check_part_keeps_orientation,
+    check_part_outputs,
     with_advice_for_part,
 )
 from ur_cartesian_driver.planning.request.ignored_fields import ignored_remarks
@@ -502,6 +503,8 @@ class GoalPlanner:
         if goal.min_speed_fraction:
             check_min_speed(goal, find_slow_stretches())
         goal, segments, reference = self.stops.insert(goal, segments, motion)
+        if goal.moving_frame is not None:
+            check_part_outputs(goal, reference.poses)
         segments = place_outputs(
             segments,
             reference,
@@ -509,6 +512,7 @@ class GoalPlanner:
             blend_halves=segments.blend_entries[:, -1],
             point_times=None if point_times is None else self.stops.delayed(point_times),
             control_cycle=self.arm.model.control_cycle,
+            to_tcp=self.kinematics.tcp_poses if self.kinematics.frame_moves else None,
         )
         planned = Plan(
             goal=goal,

@@ -363,8 +363,16 @@ def _outputs(plan: Plan) -> Iterator[tuple[str, Floats]]:
         for output in segment.outputs:
             if not isinstance(output, SwitchOutput):
                 continue
-            at = output.trigger_pose or pose_from_row(plan.reference.poses[last])
+            at = pose_from_row(plan.reference.poses[last])
+            if output.trigger_pose is not None:
+                at = _on_path(plan, output.trigger_pose)
             yield describe_command(output), np.array(at.position)
+
+
+def _on_path(plan: Plan, T_base_tcp: Pose) -> Pose:
+    """Return where the tool is on the path when the TCP is somewhere."""
+    frame, tcp = plan.goal.moving_frame, plan.T_flange_tcp or plan.T_flange_active
+    return T_base_tcp if frame is None else frame.tool(T_base_tcp @ tcp.inverse())
 
 
 def _page(pages: dict[str, str], text: str) -> str:

@@ -503,6 +503,7 @@ class _PartPlanner:
                 {'io_commands': (*commands, *new), 'pulses': pulses},
                 start_time=start_time,
                 control_cycle=self._arm.model.control_cycle,
+                to_tcp=self._kinematics.tcp_poses if self._kinematics.frame_moves else None,
             )
         except GoalRefused as refusal:
             raise refusal.reworded(_renumber_commands(str(refusal), -len(pending))) from None

@@ -102,3 +102,23 @@ def check_part_keeps_orientation(goal: GoalTable, targets: Floats, start: Pose) 
             f'base, and curves on a part that turns{presses}',
             least if goal.presses else f'{least}, or {_SPLINES}',
         )
+
+
+def check_part_outputs(goal: GoalTable, poses: Floats) -> None:
+    """
+    Refuse outputs by the way or the speed of the tool on a part that turns.
+
+    The robot program measures both at the TCP in base, where they are others if the part turns.
+
+    :param poses: the path of the tool in the frame on the part, rows (n, 7).
+    :raises NotAvailable: there are such outputs, and the part turns.
+    """
+    fields = [name for name in ('proportional_outputs', 'pulses') if getattr(goal, name)]
+    if not fields or (angle_rows(poses[:1, 3:], poses[:, 3:]) <= MAX_TURN).all():
+        return
+    raise NotAvailable(
+        f'{fields[0]}[0]',
+        'follows the motion of the TCP in base, which is not that of the tool on a part that '
+        'turns',
+        'lead the part without turning it, or switch outputs at places (io_commands)',
+    )

@@ -16,13 +16,16 @@ their times and distances, and with them the place at each time; on splines see 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.arrays import Floats
-from ur_cartesian_driver.motion.geometry.pose import conjugate, Pose, rotate
+from ur_cartesian_driver.motion.geometry.pose import conjugate, Pose, pose_from_row, rotate
 from ur_cartesian_driver.motion.geometry.vectors import subtract, Vector6
 from ur_cartesian_driver.motion.plan.plan import PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import (
@@ -35,6 +38,9 @@ from ur_cartesian_driver.motion.plan.primitive import (
     Wait,
 )
 from ur_cartesian_driver.planning.request.point_events.path_clock import PathClock
+
+#: Returns poses of the TCP in base (n, 7) for poses of the tool in the frame of the path (n, 7).
+ToTcp: TypeAlias = Callable[[Floats], Floats]
 
 #: Times that differ by at most this [s] are the same.
 SAME_TIME = 1e-6
@@ -112,22 +118,27 @@ class TimedPath:
         start_time: float,
         point_times: Floats | None = None,
         control_cycle: float = 0.0,
+        to_tcp: ToTcp | None = None,
     ) -> None:
         """
         Compute when each motion ends, and when it returns.
 
-        :param reference: the path of the TCP along the segments, on the clock of ``start_time``.
+        :param reference: the path of the tool along the segments, on the clock of ``start_time``.
         :param blend_halves: the time in the first half of the blend after each segment [s]; None =
             no blends.
         :param start_time: when the first segment begins [s].
         :param point_times: when points are passed within a motion (n,) [s]; None = each point is
             at the end of a motion.
         :param control_cycle: cycle of the controller [s], needed for pulses only.
+        :param to_tcp: returns where the TCP is in base, which the robot program looks at; None =
+            it is the tool.
         """
         self.control_cycle = control_cycle
+        self._to_tcp = to_tcp
         self._point_times = point_times
         self._primitives, self._reference = segments.primitives, reference
-        self.clock = PathClock(reference, is_spline=segments.are_spline)
+        self._is_spline = segments.are_spline
+        self.clock = PathClock(reference, is_spline=self._is_spline)
         self.ends: Floats = start_time + np.cumsum(segments.durations)
         self._blend_halves = np.zeros(len(segments)) if blend_halves is None else blend_halves
         self._returns: Floats = self.ends - self._blend_halves
@@ -251,7 +262,7 @@ class TimedPath:
         """
         if time is None or (direction := self._trigger_direction(time)) is None:
             return record
-        pose, read = self.clock.pose(time), self.clock.pose(float(self._returns[after]))
+        pose, read = self._tcp_pose(time), self._tcp_pose(float(self._returns[after]))
         start = (pose.inverse() @ read).rotation_vector()
         beyond = sum(a * b for a, b in zip(start, direction, strict=True))
         return replace(
@@ -291,7 +302,7 @@ class TimedPath:
                 f'{max(time - begin, 0.0):.3f} s',
                 'reduce the lead, or move the place',
             )
-        distance, speeds, turns = self.clock.motion_back(time, lead, LEAD_PIECES)
+        distance, speeds, turns = self._clock_of_tcp.motion_back(time, lead, LEAD_PIECES)
         law = LeadLaw(lead=lead, distance=distance, speeds=tuple(speeds.tolist()), turns=turns)
         return self.last_returned(time - lead), time - lead, law
 
@@ -337,11 +348,26 @@ class TimedPath:
         k = int(np.argmin(np.linalg.norm(points[:-1] + u[:, None] * chords - position, axis=1)))
         return float(np.clip(t[k] + u[k] * (t[k + 1] - t[k]), begin, end))
 
+    def _tcp_pose(self, time: float) -> Pose:
+        """Return where the TCP is in base at a time."""
+        pose = self.clock.pose(time)
+        if self._to_tcp is None:
+            return pose
+        return pose_from_row(self._to_tcp(np.array([pose.row()]))[0].tolist())
+
+    @cached_property
+    def _clock_of_tcp(self) -> PathClock:
+        """The motion of the TCP in base."""
+        if self._to_tcp is None:
+            return self.clock
+        path = replace(self._reference, poses=self._to_tcp(self._reference.poses))
+        return PathClock(path, is_spline=self._is_spline)
+
     def _trigger_direction(self, time: float) -> Vector6 | None:
-        """Return the path's direction at a time; None if the tool rests or turns back there."""
-        pose, half = self.clock.pose(time), _DIRECTION_TIME
+        """Return the direction of the TCP at a time; None if it rests or turns back there."""
+        pose, half = self._tcp_pose(time), _DIRECTION_TIME
         while half <= _MAX_DIRECTION_TIME:
-            a, b = self.clock.pose(time - half), self.clock.pose(time + half)
+            a, b = self._tcp_pose(time - half), self._tcp_pose(time + half)
             distance, angle = a.distance_to(b), a.angle_to(b)
             if distance < _TURNS_BACK * (a.distance_to(pose) + pose.distance_to(b)):
                 return None
