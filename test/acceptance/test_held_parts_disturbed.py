@@ -38,8 +38,8 @@ COUNT = 20
 OVERLAP = 0.005
 #: The longest and shortest time between two disturbances [cycles].
 BETWEEN = (10, 90)
-#: How soon after a pause the output is on again [cycles].
-RESTORED = 4
+#: How soon the output is off in a pause, and on again after it [cycles].
+SECURED, RESTORED = 8, 4
 SLIDER, PAUSE, CANCEL = 'slider', 'pause', 'cancel'
 
 
@@ -49,7 +49,9 @@ class Disturbed:
     def __init__(self, cell, bench, random, goal):
         self.cell, self.bench, self.random, self.goal = cell, bench, random, goal
         self.done: list[str] = []
-        self.readings: list[tuple[np.ndarray, np.ndarray]] = []
+        #: For each run the places (n, 3), whether the output was on (n,), without the moments
+        #: until the driver has made it safe in a pause, and whether it was on but for pauses (n,).
+        self.readings: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         #: Rows of the present run in which a pause holds an output off that was on before.
         self._paused: list[slice] = []
 
@@ -60,10 +62,12 @@ class Disturbed:
             cancelled = await self._disturb(motion, may_cancel=cancels < 3)
             outcome = await self.bench.end(motion)
             places, on = self.bench.readings()
+            meant = on.copy()
             for rows in self._paused:
-                on[rows] = True
+                meant[rows] = True
+                on[rows.start : rows.start + SECURED] = False
             self._paused = []
-            self.readings.append((places, on))
+            self.readings.append((places, on, meant))
             if not cancelled:
                 assert outcome.code is ErrorCode.SUCCESSFUL, (self.done, outcome)
                 return
@@ -127,16 +131,15 @@ def test_whatever_comes_together_the_path_on_the_part_is_whole(execution):
 def check(case, execution):
     """See that the tool was on all of the path, and that the output was on along its stretch."""
     corners, beside = programmed(), DEVIATION + BESIDE[execution]
-    places = np.vstack([places for places, _ in case.readings])
-    on = np.concatenate([on for _, on in case.readings])
+    places, on, meant = map(np.concatenate, zip(*case.readings, strict=True))
     covered(corners, places, beside, case)
     stretch = corners[ON + 1 : OFF + 2]
-    covered(stretch, places[on], beside, case)
+    covered(stretch, places[meant], beside, case)
     # On nowhere else, and off at the end.
     assert distances(places[on], [stretch]).max() < CLOSE + beside, case.done
     assert not on[-1], case.done
     # The first run begins on the path; a resumed one comes back to it along an approach.
-    first, _ = case.readings[0]
+    first = case.readings[0][0]
     assert distances(first, [corners]).max() < beside, case.done
 
 
