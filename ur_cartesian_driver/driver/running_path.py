@@ -62,6 +62,8 @@ class RunningPath:
             self._pass_points(inf)
         elif outcome.stopped is not None:
             self._pass_points(outcome.stopped.point + outcome.stopped.fraction - NO_FRACTION)
+        with self._lock:
+            self._paths = []  # long ones have many rows, and the handle may stay
 
     def _pass_points(self, place: float) -> None:
         """
