@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 from math import nan
 
+import pytest
 from virtual_network import HOST, VirtualLoop
 
 from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
@@ -71,6 +72,31 @@ def test_kinematics_that_cannot_be_are_refused_with_the_numbers():
 def test_a_text_of_the_robot_is_one_line():
     news = told_by(primary.encode_message(primary.TextMessage(text='first\n\x1b[31msecond')))
     assert news[0] == ('text', 'first  [31msecond')
+
+
+@pytest.mark.parametrize(
+    ('text', 'report'),
+    [
+        (
+            'compile_error_name_not_found:nope:',
+            'the robot cannot compile a program that it was sent: an error in line 2, column 3: '
+            'compile_error_name_not_found:nope:',
+        ),
+        (
+            'syntax_error_on_line:2:  x = = 1:',
+            'the robot cannot compile a program that it was sent: an error in line 2, column 3: '
+            'syntax_error_on_line:2:  x = = 1:',
+        ),
+        (
+            'Index is out of range',
+            'the robot program failed in line 2, column 3: Index is out of range',
+        ),
+    ],
+)
+def test_a_program_that_never_ran_is_not_said_to_have_failed(text, report):
+    """It may be another client's, while ours goes on."""
+    frame = primary.encode_message(primary.RuntimeExceptionMessage(line=2, column=3, text=text))
+    assert told_by(frame)[0] == ('error', report)
 
 
 # ---- requests on a connection that is read-only -------------------------------------------------
