@@ -82,6 +82,7 @@ NUMBERS = {
     'get_target_tcp_pose_along_path': ('get_target_tcp_pose_along_path()[0]', 0.3),
     'get_actual_tool_flange_pose': ('get_actual_tool_flange_pose()[0]', 0.3),
     'get_target_waypoint': ('get_target_waypoint()[0]', 0.3),
+    'tool_pose': ('tool_pose()[0]', 0.3),
     'get_joint_positions': ('get_forward_kin(get_joint_positions())[0]', 0.3),
     'get_actual_joint_positions': ('get_forward_kin(get_actual_joint_positions())[0]', 0.3),
     'get_target_joint_positions': ('get_forward_kin(get_target_joint_positions())[0]', 0.3),

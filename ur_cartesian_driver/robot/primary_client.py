@@ -41,8 +41,6 @@ READ_ONLY_CODE = 210
 SECONDARY_EXCEPTION = 'SECONDARY_PROGRAM_EXCEPTION'
 #: Beginnings of the text of an exception if the robot could not compile a program.
 COMPILE_ERRORS = ('compile_error_', 'syntax_error_')
-#: What such an exception reports.
-UNCOMPILED = 'the robot cannot compile a program that it was sent: an error'
 #: Largest age of a request that is repeated [s], so that a much later switch to remote control
 #: does not carry out an old request.
 REPEAT_TIMEOUT = 1.0
@@ -219,12 +217,14 @@ class PrimaryClient:
                     text = f'the robot reports {message.label} {to_single_line(message.text)}'
                     self._listener.error(text.rstrip())
             case primary.RuntimeExceptionMessage():
+                line, column = message.line, message.column
+                text = to_single_line(message.text)
                 # A program that does not compile never ran, and may be another client's.
-                is_compiled = not message.text.startswith(COMPILE_ERRORS)
                 self._listener.error(
-                    ('the robot program failed' if is_compiled else UNCOMPILED)
-                    + f' in line {message.line}, column '
-                    f'{message.column}: {to_single_line(message.text)}'
+                    'the robot cannot compile a program that it was sent: an error in line '
+                    f'{line}, column {column}: {text}'
+                    if message.text.startswith(COMPILE_ERRORS)
+                    else f'the robot program failed in line {line}, column {column}: {text}'
                 )
             case primary.KeyMessage(title=title) if title.startswith(SECONDARY_EXCEPTION):
                 self._listener.error(f'a secondary program failed: {to_single_line(message.text)}')

@@ -45,6 +45,7 @@ _TCP_POSES = (
     'get_target_tcp_pose',
     'get_target_tcp_pose_along_path',
     'get_target_waypoint',
+    'tool_pose',
 )
 _FLANGE_POSE = 'get_actual_tool_flange_pose'
 #: The functions that read the joints, too.

@@ -158,6 +158,7 @@ TERMS = term_table(
     honoured(
         'the arm',
         *('get_actual_tcp_pose', 'get_target_tcp_pose', 'get_target_tcp_pose_along_path'),
+        'tool_pose',
         *('get_actual_tool_flange_pose', 'get_target_waypoint', 'get_joint_positions'),
         *('get_actual_joint_positions', 'get_target_joint_positions', 'is_steady'),
         *('get_actual_joint_speeds', 'get_target_joint_speeds', 'get_actual_tcp_speed'),
