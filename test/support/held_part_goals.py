@@ -27,8 +27,8 @@ from ur_cartesian_driver.sim.calibration import random_calibration
 MODELS = ('ur3e', 'ur5', 'ur5e', 'ur10e', 'ur16e', 'ur20')
 #: Distance of samples [s].
 STEP = 0.002
-#: Samples over which the jerk is measured: 20 ms.
-OVER = 10
+#: Time over which the jerk is measured [s].
+OVER = 0.02
 
 
 @dataclass
@@ -48,16 +48,17 @@ def origin_pose(origin):
     return Pose(tuple(origin[:3]), quaternion_from_roll_pitch_yaw(*origin[3:]))
 
 
-def held_case(random, path_of):
+def held_case(random, path_of, arm=None):
     """
     Return a random part in a random hand before a random tool, with a path on the part.
 
     :param path_of: returns the goal of a path: of the generator, and the pose where it begins.
+    :param arm: the arm; None = a random one, too.
     """
     rng = np.random.default_rng(random.randrange(2**32))
     model = robot_model(rng.choice(MODELS))
     geometry = random_calibration(model, int(rng.integers(1000))) if rng.random() < 0.5 else None
-    arm = Arm(model, geometry)
+    arm = arm or Arm(model, geometry)
     q = tuple((np.array([0.2, -1.5, 1.9, -1.9, -1.57, 0.3]) + rng.normal(0.0, 0.15, 6)).tolist())
     part = [*rng.uniform(-0.15, 0.15, 3), *rng.uniform(-1.5, 1.5, 3)]
     at = Pose(
@@ -190,22 +191,37 @@ class Held:
 def measure(case, made, options):
     """Return what a plan does, by pinocchio."""
     t = np.arange(0.0, made.duration, STEP)
-    q, qd, qdd = made.joint_spline.rows(t)
+    return measured(case, made.joint_spline.rows(t), options)
+
+
+def measure_trace(case, q, cycle, options):
+    """Return what the target joints (n, 6) of all cycles do; rates are their differences."""
+    qd = np.gradient(q, cycle, axis=0)
+    return measured(case, (q, qd, np.gradient(qd, cycle, axis=0)), options, cycle)
+
+
+def measured(case, joints, options, step=STEP):
+    """
+    Return what joints do on the part.
+
+    :param joints: positions, speeds and accelerations (n, 6) each, a step [s] apart.
+    """
+    q, qd, qdd = joints
     tool = case.relative(q)
     flange = case.urdf.relative('tool0', 'base', q)[:, :3, 3]
-    velocity = np.gradient(tool[:, :3, 3], STEP, axis=0)
-    acceleration = np.gradient(velocity, STEP, axis=0)
+    velocity = np.gradient(tool[:, :3, 3], step, axis=0)
+    acceleration = np.gradient(velocity, step, axis=0)
     limit = max(
         (each.acceleration or options.linear_acceleration for each in case.goal.segments),
         default=options.max_linear_acceleration,
     )
-    jerk = np.zeros(len(t))
-    if len(t) > OVER:
-        change = acceleration[OVER:] - acceleration[:-OVER]
-        jerk[OVER // 2 : len(t) - OVER + OVER // 2] = np.linalg.norm(change, axis=1) / (
-            OVER * STEP
+    jerk, over = np.zeros(len(q)), round(OVER / step)
+    if len(q) > over:
+        change = acceleration[over:] - acceleration[:-over]
+        jerk[over // 2 : len(q) - over + over // 2] = np.linalg.norm(change, axis=1) / (
+            over * step
         )
-    base_speed = np.linalg.norm(np.gradient(flange, STEP, axis=0), axis=1)
+    base_speed = np.linalg.norm(np.gradient(flange, step, axis=0), axis=1)
     return Held(
         tool=tool,
         speed=np.linalg.norm(velocity, axis=1),
@@ -213,16 +229,17 @@ def measure(case, made, options):
         joint_acceleration=np.abs(qdd).max(axis=1) / options.max_joint_acceleration,
         carrier=base_speed / options.max_tool_speed,
         acceleration=np.linalg.norm(acceleration, axis=1) / limit,
-        turn_acceleration=_turn_accelerations(tool[:, :3, :3]) / options.max_angular_acceleration,
+        turn_acceleration=_turn_accelerations(tool[:, :3, :3], step)
+        / options.max_angular_acceleration,
         jerk=jerk / options.max_linear_jerk,
     )
 
 
-def _turn_accelerations(R):
-    """Return the angular accelerations (n,) [rad/s^2] of rotations (n, 3, 3)."""
-    W = np.gradient(R, STEP, axis=0) @ R.transpose(0, 2, 1)
+def _turn_accelerations(R, step):
+    """Return the angular accelerations (n,) [rad/s^2] of rotations (n, 3, 3) a step [s] apart."""
+    W = np.gradient(R, step, axis=0) @ R.transpose(0, 2, 1)
     w = np.stack([W[:, 2, 1], W[:, 0, 2], W[:, 1, 0]], axis=1)
-    return np.linalg.norm(np.gradient(w, STEP, axis=0), axis=1)
+    return np.linalg.norm(np.gradient(w, step, axis=0), axis=1)
 
 
 def off_path(case, seen):
