@@ -34,7 +34,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
 MAX_TURN = 1e-4
 # Turns up to this angle [rad] are neglected in the way and the speed of the TCP in base: 0.6 mm in
 # all if the tool touches 0.3 m beside the TCP. The start, which is measured, is turned by less.
-_SAME_WAY = 2e-3
+_NEGLECTED_TURN = 2e-3
 _JOINT_ADVICE = re.compile(
     r'use (PRIMITIVES with )?a JOINT segment(, or set on_posture_change to movej)?'
 )
@@ -117,7 +117,7 @@ def check_part_outputs(goal: GoalTable, poses: Floats) -> None:
     :raises NotAvailable: there are such outputs, and the part turns.
     """
     fields = [name for name in ('proportional_outputs', 'pulses') if getattr(goal, name)]
-    if not fields or (angle_rows(poses[:1, 3:], poses[:, 3:]) <= _SAME_WAY).all():
+    if not fields or (angle_rows(poses[:1, 3:], poses[:, 3:]) <= _NEGLECTED_TURN).all():
         return
     raise NotAvailable(
         f'{fields[0]}[0]',
