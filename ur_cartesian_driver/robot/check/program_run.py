@@ -26,7 +26,7 @@ from ur_cartesian_driver.robot.rtde.probe import read_state
 #: Timeouts for the first motion, the next event, and rest after a stop [s].
 START_TIMEOUT, END_TIMEOUT, REST_TIMEOUT = 3.0, 30.0, 3.0
 #: Time in which the loss of a connection is noticed [s].
-LOSS_TIME = 0.1
+LOSS_TIME = 0.25
 
 
 class Surprise(Exception):
