@@ -125,6 +125,7 @@ def test_a_number_is_read_as_the_grammar_says(tmp_path, line, x):
         ('G64 P-0.1', 'G64 P-0.1 is no tolerance'),
         ('G64 P0.1 Q-1', 'G64 Q-1 is no tolerance'),
         ('M62 P1 G64', 'P could belong to G64 or M62; give it a line of its own'),
+        ('M3 S50 M1', 'S could belong to M1 or not; give M1 a line of its own'),
         ('G80 X5', 'coordinates without G0, G1, G2 or G3 since G80'),
         ('G53', 'G53 needs coordinates'),
         ('G20 F10', 'F beside G20 is of one unit or the other'),

@@ -337,7 +337,8 @@ def code_on_line(name: str, words: Mapping[str, float], *, is_alone: bool) -> Co
             or (name == 'G92' and not words.keys().isdisjoint('XYZ'))
         ):
             return CODES[name]
-        for letter in sorted(words, key='ZX'.find, reverse=True):
+        # G50 X is refused, even with an S.
+        for letter in sorted(words, key=lambda letter: letter not in 'XZ'):
             if row := CODES.get(f'{name} {letter}'):
                 return row
     row = code_named(name)

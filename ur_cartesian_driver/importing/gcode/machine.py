@@ -50,7 +50,7 @@ _UNITS = {'G20': LENGTH_UNITS['in'], 'G21': LENGTH_UNITS['mm']}
 _FRAMES = ('G54', 'G55', 'G56', 'G57', 'G58', 'G59', 'G59.1', 'G59.2', 'G59.3')
 #: The words of G4 that are a time wherever they stand; S and F are one if there is none of these.
 _DWELL = 'PXU'
-#: Codes that have a P on other controls only than those with G64 P.
+#: Codes that get a P only if no other code of their line takes it.
 _LEAVE_P = frozenset((*_FRAMES, 'M0', 'M1', 'M2', 'M6', 'M30', 'M60'))
 
 _Words = dict[str, float]
@@ -156,7 +156,7 @@ class GcodeMachine:
             return
         self._check_codes(codes, rows, words)
         own: list[_Words] = [{} for _ in rows]
-        # G64 takes its P and Q before others, but acts after the unit of its line.
+        # G64 takes its P and Q first, those in _LEAVE_P last; G64 acts after the unit of its line.
         order = {
             i: (row.group != PATH_CONTROL, codes[i] in _LEAVE_P) for i, row in enumerate(rows)
         }
@@ -239,7 +239,7 @@ class GcodeMachine:
                 others.discard('S')
             if row.name == 'other M-codes':
                 others &= _OF_MOTION
-            if code in ('G4', 'G28', 'G30', 'G50', 'G92'):
+            if code != 'G96':  # its S is that of a spindle
                 self._check_shared(code, values, rows, has_motion=has_motion)
             if row.name == 'G53' and not values:
                 raise self._fail('G53 needs coordinates on its line')
