@@ -58,7 +58,7 @@ class RtdeConnection:
         #: Shortest time between a request of the handshake and its answer [s].
         self.round_trip = inf
         self._version: ControllerVersion | None = None
-        self._patience = asyncio.timeout(ANSWER_TIMEOUT)
+        self._patience = asyncio.timeout(None)  # each request sets its end
         self._answered = asyncio.Event()  # the handshake is done, or the connection closed
         self._closed: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         self._connection = TcpConnection(self._on_data, self._on_closed)
@@ -140,7 +140,8 @@ class RtdeConnection:
         """Send the next request of the handshake, if any."""
         if data:
             self._last_request = asyncio.get_running_loop().time()
-            self._patience.reschedule(self._last_request + ANSWER_TIMEOUT)
+            if not self._patience.expired():
+                self._patience.reschedule(self._last_request + ANSWER_TIMEOUT)
             self._connection.send(data)
 
     def _take(self, event: RtdeEvent) -> None:
