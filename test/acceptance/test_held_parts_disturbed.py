@@ -6,8 +6,6 @@ Slider, pause, and cancel with resume come together at random while a part is le
 Put together, the path on the part is whole, and the output was on along its stretch alone.
 """
 
-from itertools import pairwise
-
 from curve_distance import distances
 from held_part_bench import (
     Bench,
@@ -15,6 +13,7 @@ from held_part_bench import (
     CLOSE,
     DEVIATION,
     edges,
+    is_covered,
     OFF,
     ON,
     PRIMITIVES,
@@ -132,21 +131,12 @@ def check(case, execution):
     """See that the tool was on all of the path, and that the output was on along its stretch."""
     corners, beside = programmed(), DEVIATION + BESIDE[execution]
     places, on, meant = map(np.concatenate, zip(*case.readings, strict=True))
-    covered(corners, places, beside, case)
+    assert is_covered(corners, places, beside), case.done
     stretch = corners[ON + 1 : OFF + 2]
-    covered(stretch, places[meant], beside, case)
+    assert is_covered(stretch, places[meant], beside), case.done
     # On nowhere else, and off at the end.
     assert distances(places[on], [stretch]).max() < CLOSE + beside, case.done
     assert not on[-1], case.done
     # The first run begins on the path; a resumed one comes back to it along an approach.
     first = case.readings[0][0]
     assert distances(first, [corners]).max() < beside, case.done
-
-
-def covered(corners, places, beside, case):
-    """See that the tool was everywhere on a path through corners (n, 3)."""
-    wanted = np.linspace(0.0, 1.0, 100)[2:-2, None]
-    for a, b in pairwise(corners):
-        along = a + wanted * (b - a)
-        near = np.linalg.norm(along[:, None] - places, axis=2).min(axis=1)
-        assert near.max() < CLOSE + beside, case.done

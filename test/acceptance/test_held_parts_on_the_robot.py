@@ -17,10 +17,10 @@ from held_part_bench import (
     Bench,
     BESIDE,
     check,
-    CLOSE,
     DEVIATION,
     edges,
     FRAME,
+    is_covered,
     OFF,
     ON,
     OPTIONS,
@@ -119,11 +119,8 @@ def test_an_interrupted_path_on_the_part_is_whole(execution):
             assert outcome.code is ErrorCode.SUCCESSFUL, (k, stop_at, stopped, outcome)
             second, on2 = bench.readings()
             glued = np.vstack([first[on], second[on2]])
-            wanted = np.linspace(0.0, 1.0, 100)[:, None]
-            for a, b in zip(programmed()[ON + 1 : OFF + 1], programmed()[ON + 2 :], strict=False):
-                along = (a + wanted * (b - a))[2:-2]
-                near = np.linalg.norm(along[:, None] - glued, axis=2).min(axis=1)
-                assert near.max() < CLOSE + DEVIATION + BESIDE[execution], (k, stop_at, stopped)
+            stretch, beside = programmed()[ON + 1 : OFF + 2], DEVIATION + BESIDE[execution]
+            assert is_covered(stretch, glued, beside), (k, stop_at, stopped)
             # The output is on nowhere else.
             assert distances(glued, [programmed()]).max() < DEVIATION + BESIDE[execution]
             assert not on2[-1]

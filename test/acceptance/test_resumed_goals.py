@@ -15,6 +15,7 @@ import os
 from goal_geometry import Kinematics
 import numpy as np
 from plain_clients import RtdeRecorder
+from process_output import is_on, SAFE_OUTPUTS, switch
 import pytest
 from robot_cell import CYCLE, RTDE, run_cell
 from virtual_network import HOST
@@ -25,9 +26,6 @@ from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import (
     Goal,
-    IOCommand,
-    OutputKind,
-    SafeOutput,
     Segment,
     SegmentType,
     Waypoint,
@@ -42,7 +40,7 @@ ARM = Arm(robot_model('ur5e'))
 OPTIONS = PlanningOptions(self_collision='off')
 TOOL = Kinematics(ARM.geometry, ARM.model.position_limits, IDENTITY)
 Q = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
-PIN, ON, OFF = 2, 1, 4
+ON, OFF = 1, 4
 SPEED, OVERLAP, APPROACH = 0.05, 0.005, 0.02
 #: How close the path and its places are followed: RTDE says it once in a cycle [m].
 CLOSE = SPEED * CYCLE + 2e-4
@@ -85,19 +83,7 @@ def seam():
             line,
         ),
         io_commands=(switch(ON, 1.0), switch(OFF, 0.0)),
-        safe_outputs=(
-            SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=PIN, value=0.0, restore=True),
-        ),
-    )
-
-
-def switch(waypoint, value):
-    return IOCommand(
-        waypoint=waypoint,
-        offset=0.0,
-        output=OutputKind.STANDARD_DIGITAL,
-        pin=PIN,
-        value=value,
+        safe_outputs=SAFE_OUTPUTS,
     )
 
 
@@ -190,7 +176,7 @@ class Bench:
             await cell.until(cell.control_messages)
             await cell.sleep(0.1)
         x = TOOL.tool(np.array([row.target_q for row in rows]))[:, :3, 3]
-        on = np.array([bool(row.digital_outputs & (1 << PIN)) for row in rows])
+        on = np.array([is_on(row.digital_outputs) for row in rows])
         return motion.outcome, x, on
 
 

@@ -8,12 +8,14 @@ that is written here; the path on the part is made of numbers alone.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 from curve_distance import distances
 from held_part_goals import frame_and_urdf, origin_pose
 import numpy as np
 from plain_clients import RtdeRecorder
+from process_output import is_on, SAFE_OUTPUTS, switch
 from recorded_goal import SETUP
 from robot_cell import CYCLE, RTDE
 from virtual_network import HOST
@@ -28,9 +30,6 @@ from ur_cartesian_driver.motion.geometry.pose import (
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import (
     Goal,
-    IOCommand,
-    OutputKind,
-    SafeOutput,
     Segment,
     SegmentType,
     Tolerance,
@@ -44,7 +43,7 @@ ARM = Arm(robot_model('ur5e'))
 OPTIONS = PlanningOptions(self_collision='off')
 Q = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
 PART = (0.03, -0.02, 0.1, 0.3, -0.2, 0.5)
-DEVIATION, SPEED, PIN, ON, OFF = 5e-4, 0.04, 2, 0, 3
+DEVIATION, SPEED, ON, OFF = 5e-4, 0.04, 0, 3
 #: How far the tool may be beside the set-points [m]: servoj's filter cuts corners.
 BESIDE = {PRIMITIVES: 2e-5, SPLINE: 2e-5, SERVO: 1e-3}
 #: Where the path leads from its start on the part [m], and how the tool is turned there [rad].
@@ -83,20 +82,8 @@ def edges(execution=SPLINE, **fields):
         execution=execution,
         path_tolerance=Tolerance(position=(0.004,) * 3),
         io_commands=(switch(ON, 1.0), switch(OFF, 0.0)),
-        safe_outputs=(
-            SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=PIN, value=0.0, restore=True),
-        ),
+        safe_outputs=SAFE_OUTPUTS,
         **fields,
-    )
-
-
-def switch(waypoint, value):
-    return IOCommand(
-        waypoint=waypoint,
-        offset=0.0,
-        output=OutputKind.STANDARD_DIGITAL,
-        pin=PIN,
-        value=value,
     )
 
 
@@ -137,12 +124,12 @@ class Bench:
     def is_on(self):
         """Whether the output is on, by the newest packet."""
         rows = self.recorder.rows
-        return bool(rows) and bool(rows[-1].digital_outputs & (1 << PIN))
+        return bool(rows) and is_on(rows[-1].digital_outputs)
 
     def readings(self):
         """Return the places of the tool on the part (n, 3), and whether the output was on (n,)."""
         q = np.array([row.target_q for row in self.recorder.rows])
-        on = np.array([bool(row.digital_outputs & (1 << PIN)) for row in self.recorder.rows])
+        on = np.array([is_on(row.digital_outputs) for row in self.recorder.rows])
         return URDF.relative('tool', 'part', q)[:, :3, 3], on
 
 
@@ -159,3 +146,11 @@ def check(bench, execution):
         assert (
             np.linalg.norm(places[row] - path[point + 1]) < CLOSE + DEVIATION + BESIDE[execution]
         )
+
+
+def is_covered(corners, places, beside):
+    """Tell whether the tool was everywhere on a path, but near its corners (n, 3)."""
+    parts = np.linspace(0.0, 1.0, 100)[2:-2, None]
+    wanted = np.vstack([a + parts * (b - a) for a, b in pairwise(corners)])
+    off = np.linalg.norm(wanted[:, None] - places, axis=2).min(axis=1)
+    return off.max() < CLOSE + beside

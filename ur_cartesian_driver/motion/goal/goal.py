@@ -120,7 +120,8 @@ class InputKind(IntEnum):
 class PressFrame(IntEnum):
     """The frame along whose axes the tool gives way in a :class:`Press`."""
 
-    #: The frame of the TCP, which turns with the tool along the path.
+    #: The frame of the TCP, which turns with the tool along the path; on a part in the hand the
+    #: frame of the fixed tool.
     TOOL = 0
     #: The frame of the goal.
     GOAL = 1

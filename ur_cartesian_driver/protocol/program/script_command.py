@@ -81,8 +81,8 @@ class SafeOutputsAction(IntEnum):
     ARM = 1
     #: Set the outputs now, and forget them.
     SET = 2
-    #: Give the outputs these values after a pause, or those that the goal has given them since;
-    #: what the program remembers stays.
+    #: Give the outputs these values after a pause, or the last ones that the goal has given them,
+    #: even if another client has changed them since; what the program remembers stays.
     RESTORE = 3
 
 
