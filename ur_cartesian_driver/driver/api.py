@@ -553,7 +553,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
 
         def on_appended(appended: AppendPlan, job: MotionJob) -> None:
             if active.path is not None:
-                active.path.append(appended.plan, appended.start_time, job.spline)
+                active.path.append(appended.plan, appended.start_time, appended.spline)
             if self.options.cell is not cell:
                 self._check_running_soon()
 

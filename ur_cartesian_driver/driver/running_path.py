@@ -53,8 +53,9 @@ class RunningPath:
 
     def report(self, progress: Progress) -> None:
         """Keep a progress report, and change the cell at the points that the arm has left."""
-        self._progress = progress
-        self._pass_points(float(progress.waypoint))
+        with self._lock:
+            self._progress = progress
+            self._pass_points(float(progress.waypoint))
 
     def end(self, outcome: Outcome) -> None:
         """Change the cell at the points that the arm had left when the motion ended."""
@@ -98,9 +99,10 @@ class RunningPath:
         :param options_now: returns the options with the cell, without the changes to come.
         :raises GoalRefused: it would touch; or its joints are not known.
         """
-        progress = self._progress
-        time, q = (0.0, self._start) if progress is None else (progress.time, progress.desired_q)
         with self._lock:
+            progress, time, q = self._progress, 0.0, self._start
+            if progress is not None:
+                time, q = progress.time, progress.desired_q
             paths, changes = list(self._paths), [change for change, _ in self._part_changes]
             options = options_now()
         for path in paths:  # of several, none changes the cell

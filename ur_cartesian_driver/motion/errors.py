@@ -93,7 +93,7 @@ class DriverError(Exception):
 
 
 class GoalRefused(DriverError):
-    """A goal was refused before anything moved."""
+    """A goal was refused before anything moved, or its rest because the cell changed."""
 
     def reworded(self, sentence: str) -> GoalRefused:
         """Return the same refusal with another sentence."""

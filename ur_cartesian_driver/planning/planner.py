@@ -69,8 +69,9 @@ from ur_cartesian_driver.planning.preflight.offset_band_check import (
     offset_band,
     offset_remarks,
     OffsetBandCheck,
-    path_joints,
+    speeds_beside,
 )
+from ur_cartesian_driver.planning.preflight.planned_joints import joint_moves, solved_joints
 from ur_cartesian_driver.planning.preflight.start_checks import (
     check_approach,
     check_reported_tcp,
@@ -377,7 +378,8 @@ def _with_offset_band(plan: Plan, planner: GoalPlanner) -> Plan:
         q, qd, _ = plan.joint_spline.rows(path.time)
     else:
         path, settling = dense_path(path), FILTER_SETTLING
-        q, qd = path_joints(path, planner.kinematics, planner.state.actual_q)
+        q = solved_joints(planner.kinematics, plan.reference, path, joint_moves(plan), plan.start)
+        qd = speeds_beside(q, path.time)
     band = offset_band(plan.goal.path_offset, path, plan.T_tcp_controlled, settling)
     warnings = OffsetBandCheck(
         kinematics=planner.kinematics,

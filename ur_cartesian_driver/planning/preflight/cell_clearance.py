@@ -70,7 +70,8 @@ class Place(NamedTuple):
 class CellResult(NamedTuple):
     """What was found along a path."""
 
-    #: The first place at which a pair is closer than its clearance; None = there is none.
+    #: Where a pair is nearest between the first two rows between which it is closer than its
+    #: clearance; None = nowhere.
     violation: Place | None
     #: The place at which a pair is closest; None = nothing is measured. Bodies on neighbouring
     #: links do not count: they are always close.
@@ -143,8 +144,9 @@ class _Motion:
 
     def bend(self, places: Floats, carriers: Indices) -> Floats:
         """Return how far poses between two rows may be from the motion (k,) [m]; 0 in a row."""
-        row = np.minimum(places.astype(np.intp), len(self.bends) - 1)
-        return np.where(places == row, 0.0, self.bends[row][:, carriers].sum(axis=1))
+        row = places.astype(np.intp)
+        bends = self.bends[np.minimum(row, len(self.bends) - 1)][:, carriers].sum(axis=1)
+        return np.where(places == row, 0.0, bends)
 
 
 def _summed_lengths(changes: Floats) -> Floats:
@@ -329,6 +331,7 @@ class _Search:
         """Search stretches for one pair, by halving those that are not proved."""
         bodies, carriers = self._bodies, self._bodies.carriers[column]
         clearance, moved = float(bodies.clearances[column]), motion.moved_of(carriers)
+        first = float(stretches.begin[0]) if len(stretches.begin) else 0.0
         while len(stretches.begin):
             middle, enough = stretches.middle, self._enough(column)
             here = _at(moved, middle)
@@ -344,14 +347,23 @@ class _Search:
             open_ = (sure < enough + reach) & (reach > RESOLUTION)
             bad = np.flatnonzero(sure < clearance)
             if len(bad):
-                self._violate(self._nearest(column, motion, float(middle[bad[0]]), offset))
+                self._violate(self._nearest(column, motion, float(middle[bad[0]]), first, offset))
             if self.violation is not None:
                 open_ &= stretches.begin < self.violation.at - offset
             stretches = stretches.halves(open_)
 
-    def _nearest(self, column: int, motion: _Motion, place: float, offset: int) -> Place:
-        """Return the place at which a pair is nearest between the two rows around a place."""
-        places = np.append(np.linspace(floor(place), ceil(place), _LOOKS), place)
+    def _nearest(
+        self, column: int, motion: _Motion, place: float, first: float, offset: int
+    ) -> Place:
+        """
+        Return the place at which a pair is nearest between the two rows around a place.
+
+        :param first: no place before this one is looked at: there the pair may still separate.
+        """
+        places = np.array([place])
+        if place != floor(place):
+            around = np.linspace(max(floor(place), first), ceil(place), _LOOKS)
+            places = np.append(around, place)
         sure = self._bodies.distances(column, motion.at(places), inf)
         sure = sure - motion.bend(places, self._bodies.carriers[column])
         k = int(np.argmin(sure))

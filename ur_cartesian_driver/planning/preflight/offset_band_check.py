@@ -20,7 +20,7 @@ from math import ceil, hypot
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows, solve_path
+from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import (
     GoalRefused,
@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, interpolate_rows
-from ur_cartesian_driver.motion.geometry.vectors import Joints, norm, Vector3, vector3, vector6
+from ur_cartesian_driver.motion.geometry.vectors import norm, Vector3, vector3, vector6
 from ur_cartesian_driver.motion.goal.goal import PartChange, PathOffset
 from ur_cartesian_driver.motion.plan.offset_band import OFFSET_AXES, OffsetBand
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
@@ -129,23 +129,16 @@ def dense_path(path: ReferencePath) -> ReferencePath:
     )
 
 
-def path_joints(
-    path: ReferencePath, kinematics: TcpKinematics, start: Joints
-) -> tuple[Floats, Floats]:
+def speeds_beside(q: Floats, time: Floats) -> Floats:
     """
-    Return the joint positions along a path (n, 6) [rad], and their speeds [rad/s].
+    Return the larger joint speed beside each row of joints (n, 6) [rad/s].
 
-    :param start: the joint positions before the first sample [rad].
-    :raises GoalRefused: a pose has no solution.
+    :param q: (n, 6) [rad].
+    :param time: (n,) [s].
     """
-    solved = solve_path(kinematics.arm, kinematics.flange_rows(path.poses), start)
-    if not solved.found.all():
-        row = int(np.argmin(solved.found))
-        where = describe_location(int(path.point[row]), float(path.fraction[row]))
-        raise kinematics.no_solution_error(pose_from_row(path.poses[row].tolist()), where)
-    rates = np.abs(np.diff(solved.q, axis=0)) / np.maximum(np.diff(path.time), 1e-6)[:, None]
+    rates = np.abs(np.diff(q, axis=0)) / np.maximum(np.diff(time), 1e-6)[:, None]
     rates = np.pad(rates, ((1, 1), (0, 0)))
-    return solved.q, np.maximum(rates[1:], rates[:-1])
+    return np.maximum(rates[1:], rates[:-1])
 
 
 def fade_time(limit: float, speed: float, acceleration: float) -> float:

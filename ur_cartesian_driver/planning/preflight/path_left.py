@@ -17,8 +17,7 @@ from typing import Self
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.geometry.arrays import Floats
-from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import PartChange
 from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
@@ -28,7 +27,6 @@ from ur_cartesian_driver.motion.plan.plan import Plan, ReferencePath
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import clearances, JointSamples
 from ur_cartesian_driver.planning.preflight.held_part_kinematics import kinematics_of
-from ur_cartesian_driver.planning.preflight.joint_path_solver import describe_location
 from ur_cartesian_driver.planning.preflight.offset_band_check import (
     dense_path,
     OffsetBandCheck,
@@ -36,10 +34,8 @@ from ur_cartesian_driver.planning.preflight.offset_band_check import (
 from ur_cartesian_driver.planning.preflight.planned_joints import (
     joint_moves,
     JointMove,
-    joints_along,
-    row_places,
+    solved_joints,
 )
-from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.controlled_frame import tool_tips
 
 
@@ -48,7 +44,7 @@ class PathLeft:
     """A path, and where it ends if another one takes its place."""
 
     reference: ReferencePath
-    #: The joints over time of a goal in SERVO; None = they follow from the path of the tool.
+    #: The joints over time of a goal in SPLINE or SERVO; None = they follow from the path.
     spline: JointSpline | None
     #: The joint moves of the path, if there is no spline.
     joint_moves: tuple[JointMove, ...] = ()
@@ -114,7 +110,7 @@ class PathLeft:
         if self.spline is not None:
             joints = self.spline.rows(path.time)[0]
         else:
-            joints = self._joints_along(path, kinematics, q)
+            joints = solved_joints(kinematics, self.reference, path, self.joint_moves, q)
         # The arm itself and the planes are as they were when the path was planned.
         only_cell = replace(options, self_collision='off', workspace_planes=())
         samples = JointSamples(path.point, path.fraction, joints)
@@ -134,26 +130,6 @@ class PathLeft:
                 part_changes=part_changes,
             ).check_clearance()
         return vector6(joints[-1].tolist())
-
-    def _joints_along(self, path: ReferencePath, kinematics: TcpKinematics, q: Joints) -> Floats:
-        """
-        Return the joints (n, 6) of a part of the path [rad].
-
-        :raises GoalRefused: a pose has no solution.
-        """
-        joints = joints_along(
-            kinematics.arm,
-            kinematics.flange_rows(path.poses),
-            row_places(self.reference, path.time),
-            self.joint_moves,
-            q,
-        )
-        is_missing = np.isnan(joints[:, 0])
-        if is_missing.any():
-            row = int(np.argmax(is_missing))
-            where = describe_location(int(path.point[row]), float(path.fraction[row]))
-            raise kinematics.no_solution_error(pose_from_row(path.poses[row].tolist()), where)
-        return joints
 
 
 def spline_of(plan: Plan) -> JointSpline | None:

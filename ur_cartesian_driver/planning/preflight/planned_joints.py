@@ -18,10 +18,13 @@ import numpy as np
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows, solve_path
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
+from ur_cartesian_driver.motion.geometry.pose import pose_from_row
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.plan.move_rows import MoveRows, MOVES
 from ur_cartesian_driver.motion.plan.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import MoveJ, OptimoveJ, Primitive
+from ur_cartesian_driver.planning.preflight.joint_path_solver import describe_location
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 
 # Times that differ by less than this [s] are the same.
 _INSTANT = 1e-9
@@ -112,22 +115,48 @@ def joints_along(
     :param start: the joints before the first pose [rad].
     """
     joints = np.empty((len(places), 6))
-    done = 0
-
-    def follow(end: int) -> None:
-        before = joints[:done][~np.isnan(joints[:done, 0])]
-        q = vector6(before[-1].tolist()) if len(before) else start
-        solved = solve_path(arm, flange_poses[done:end], q)
-        joints[done:end] = np.where(solved.found[:, None], solved.q, np.nan)
-
-    for move in moves:
-        first, end = np.searchsorted(places, [move.first, move.last], side='right').tolist()
-        if first >= end:
-            continue
+    done, q = 0, start
+    for move in (*moves, None):
+        first = end = len(places)
+        if move is not None:
+            first, end = np.searchsorted(places, [move.first, move.last], side='right').tolist()
         if first > done:
-            follow(first)
-        joints[first:end] = nearest_rows(arm, flange_poses[first:end], move.at(places[first:end]))
-        done = end
-    if done < len(places):
-        follow(len(places))
+            solved = solve_path(arm, flange_poses[done:first], q)
+            joints[done:first] = np.where(solved.found[:, None], solved.q, np.nan)
+            q = _last_known(joints[done:first], q)
+        if move is not None and end > first:
+            near = move.at(places[first:end])
+            joints[first:end] = nearest_rows(arm, flange_poses[first:end], near)
+            q = _last_known(joints[first:end], q)
+        done = max(done, end)
+    return joints
+
+
+def _last_known(joints: Floats, otherwise: Joints) -> Joints:
+    known = np.flatnonzero(~np.isnan(joints[:, 0]))
+    return vector6(joints[known[-1]].tolist()) if len(known) else otherwise
+
+
+def solved_joints(
+    kinematics: TcpKinematics,
+    reference: ReferencePath,
+    path: ReferencePath,
+    moves: Sequence[JointMove],
+    start: Joints,
+) -> Floats:
+    """
+    Return the joints (n, 6) [rad] along a part of the reference path.
+
+    :param path: the part, with any samples of its own.
+    :param moves: the joint moves of the reference path.
+    :param start: the joints before the first sample [rad].
+    :raises GoalRefused: a pose has no solution.
+    """
+    flange, places = kinematics.flange_rows(path.poses), row_places(reference, path.time)
+    joints = joints_along(kinematics.arm, flange, places, moves, start)
+    is_missing = np.isnan(joints[:, 0])
+    if is_missing.any():
+        row = int(np.argmax(is_missing))
+        where = describe_location(int(path.point[row]), float(path.fraction[row]))
+        raise kinematics.no_solution_error(pose_from_row(path.poses[row].tolist()), where)
     return joints
