@@ -174,8 +174,8 @@ def test_the_target_joints_of_the_robot_lead_the_part_along_its_path(name, is_ca
     robot = robot_of(name, is_calibrated)
     cycle, random = robot.controller.cycle, random_of('held trace', name, is_calibrated)
     options = replace(OPTIONS, max_tool_speed=2.0, spline_tolerance=1e-5)
-    ran, judged = 0, 0
-    for number in range(cases(500 // (2 * len(MODELS)))):
+    ran, judged, count = 0, 0, cases(504 // (2 * len(MODELS)))
+    for number in range(count):
         is_spline = number % 3 == 2
         case = held_case(random, spline_goal if is_spline else rounded_goal, robot.controller.arm)
         robot.place(case.state.actual_q, IDENTITY)
@@ -193,17 +193,16 @@ def test_the_target_joints_of_the_robot_lead_the_part_along_its_path(name, is_ca
         assert seen.joint_speed.max() <= 1.0 + PART, case
         ran += 1
         if is_spline:
-            t = np.minimum(cycle * np.arange(len(q)), case.goal.waypoints[-1].time)
-            off = distances(seen.tool[:, :3, 3], [spline_poses(case, np.linspace(0, t[-1], 4000))])
+            wanted = spline_poses(case, np.linspace(0.0, case.goal.waypoints[-1].time, 4000))
+            off = distances(seen.tool[:, :3, 3], [wanted])
         else:
             off = off_path(case, seen) - case.goal.corner_deviation
             judged += check_feed(case, made, seen, cycle)
         assert off.max() <= POSITION, case
-        for pose in [point.pose for point in case.goal.waypoints][-1:]:
-            at, wanted = seen.tool[-1], pose.matrix()
-            assert np.linalg.norm(at[:3, 3] - wanted[:3, 3]) <= POSITION, case
-            assert turned_by(at[:3, :3], wanted[:3, :3]) <= TURN, case
-    assert ran > 0
+        at, wanted = seen.tool[-1], case.goal.waypoints[-1].pose.matrix()
+        assert np.linalg.norm(at[:3, 3] - wanted[:3, 3]) <= POSITION, case
+        assert turned_by(at[:3, :3], wanted[:3, :3]) <= TURN, case
+    assert ran >= max(1, 0.4 * count - 2)
     # Of a tenth of the cases, none may have a stretch at its feed.
     assert judged > 0 or ran < 10
 

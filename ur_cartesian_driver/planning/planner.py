@@ -176,7 +176,7 @@ def _plan_fixed(
         plan = PLANNERS[planner.mode](planner)
     except GoalRefused as refusal:
         of_part = table.moving_frame is not None
-        advised = with_advice_for_part(refusal) if of_part else refusal
+        advised = with_advice_for_part(refusal, table) if of_part else refusal
         hinted = with_exchanged_frames(advised, table, state)
         if hinted is refusal:
             raise
@@ -221,9 +221,9 @@ def _plan_free(table: GoalTable, state: RobotState, arm: Arm, options: PlanningO
 def plan_moves(planner: GoalPlanner) -> Plan:
     """Return the plan of a goal whose points are connected by motion commands of the robot."""
     goal, state, arm, options = planner.goal, planner.state, planner.arm, planner.options
-    if planner.kinematics.frame_moves:
-        check_part_keeps_orientation(goal, planner.targets, state.actual_tcp_pose)
     first = planner.first_target()
+    if planner.kinematics.frame_moves:
+        check_part_keeps_orientation(goal, planner.targets, state.actual_tcp_pose, first)
     if options.laws.blend_begin < 1.0 and goal.segments.blend_radii.any():
         # A measured law must not let a goal pass that was refused: the path of the assumed blends
         # has to be possible, too. How long it takes does not matter.

@@ -52,7 +52,7 @@ from ur_cartesian_driver.planning.geometry.samples import counted
 from ur_cartesian_driver.planning.options import MAX_CLEARANCE, PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import Clearance
 from ur_cartesian_driver.planning.preflight.held_part_kinematics import kinematics_of
-from ur_cartesian_driver.planning.request.controlled_frame import is_same_tcp
+from ur_cartesian_driver.planning.request.controlled_frame import is_same_tcp, tool_tips
 from ur_cartesian_driver.planning.request.goal_fields import (
     IS_JOINT_MOVE,
     IS_OPTIMIZED,
@@ -200,8 +200,7 @@ class _FreePath:
         #: Whether the controlled frame is or becomes the TCP; any other frame would leave its
         #: straight line if the tool turned.
         self.can_turn = options.allow_tcp_change or is_same_tcp(T_tcp_controlled, IDENTITY)
-        #: The active TCP first, and the controlled frame if it is another one.
-        self.tool_tips = tuple(dict.fromkeys((state.T_flange_tcp, T_flange_controlled)))
+        self.tool_tips = tool_tips(goal, state.T_flange_tcp)
         self.q_start = state.actual_q
         self.name = FreeAxis(int(segments.free_axes[first])).name.lower()
         self.axis = _AXES[int(segments.free_axes[first])]

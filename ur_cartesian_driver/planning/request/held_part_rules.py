@@ -19,7 +19,7 @@ from ur_cartesian_driver.motion.errors import GoalRefused, NotAvailable
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows
-from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
+from ur_cartesian_driver.motion.goal.goal import ArcMode, FreeAxis, SegmentType
 from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
@@ -78,29 +78,39 @@ def check_held_part(goal: GoalTable, options: PlanningOptions) -> None:
         )
 
 
-def with_advice_for_part(refusal: GoalRefused) -> GoalRefused:
+def with_advice_for_part(refusal: GoalRefused, goal: GoalTable) -> GoalRefused:
     """Return the refusal of a path on a held part, which has no JOINT segments."""
     advice = 'let the tool turn about an axis of its own (free_axis)'
-    return refusal.reworded(_JOINT_ADVICE.sub(advice, str(refusal)))
+    if (goal.segments.free_axes != FreeAxis.NONE).any():
+        advice = 'move the part or the tool'
+    elif not resolve_execution_mode(goal).traits.is_spline:
+        advice = f'{advice}, and {_SPLINES}'
+    text = _JOINT_ADVICE.sub(advice, str(refusal))
+    return refusal if text == str(refusal) else refusal.reworded(text)
 
 
-def check_part_keeps_orientation(goal: GoalTable, targets: Floats, start: Pose) -> None:
+def check_part_keeps_orientation(
+    goal: GoalTable, targets: Floats, start: Pose, first: int
+) -> None:
     """
     Refuse a goal of PRIMITIVES that turns the held part.
 
     :param targets: the points in the frame on the part, rows (n, 7).
     :param start: pose of the tool in that frame at the start.
+    :param first: the first point to which a motion leads; the arm is at those before.
     :raises NotAvailable: a segment turns the part.
     """
+    targets = targets[first:]
     before = np.concatenate([[start.row()], targets[:-1]])
     angles = angle_rows(before[:, 3:], targets[:, 3:])
-    for i in rows_where(angles > MAX_TURN)[:1]:
-        whence = f'points[{i - 1}]' if i else 'where the arm stands'
-        least = 'keep the orientation' if i else 'bring the arm there by a goal of its own'
+    for k in rows_where(angles > MAX_TURN)[:1]:
+        i = first + k
+        whence = f'points[{i - 1}]' if k else 'where the arm stands'
+        least = 'keep the orientation' if k else 'bring the arm there by a goal of its own'
         presses = ', and only these give way to presses' if goal.presses else ''
         raise NotAvailable(
             point_field(i, 'pose.orientation'),
-            f'turns the part that the arm holds by {degrees(angles[i]):.3g} degrees from '
+            f'turns the part that the arm holds by {degrees(angles[k]):.3g} degrees from '
             f'{whence}, but the moves of the controller, which PRIMITIVES sends, are straight in '
             f'base, and curves on a part that turns{presses}',
             least if goal.presses else f'{least}, or {_SPLINES}',
