@@ -3,7 +3,6 @@
 """The cell of a running node, changed by its service."""
 
 from concurrent.futures import Future
-import threading
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,11 +16,6 @@ from ur_cartesian_driver.motion.cell.shapes import Sphere
 from ur_cartesian_driver.ros.goals import planning_scene_subscriber
 from ur_cartesian_driver.ros.goals.planning_scene_subscriber import PlanningSceneSubscriber
 from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS
-from ur_cartesian_driver.ros.services.deferred_service import (
-    MAX_WAITING_REQUESTS,
-    RequestQueue,
-    SHUTDOWN_REFUSAL,
-)
 from ur_cartesian_driver.srv import ChangeCell
 
 pytestmark = pytest.mark.slow
@@ -168,20 +162,6 @@ def test_the_scene_that_moveit_has_already_comes_by_its_service(
     finally:
         scenes.close()
         driver.change_cell(remove=driver.cell.names)
-
-
-def test_requests_that_wait_are_bounded_and_refused_at_the_end():
-    may_go_on = threading.Event()
-    queue = RequestQueue('wait', lambda request: may_go_on.wait() and request, lambda text: text)
-    first, *others = [queue.submit(k) for k in range(MAX_WAITING_REQUESTS)]
-    assert 'requests to wait wait' in queue.submit(-1).result(timeout=0.0)
-    closing = threading.Thread(target=queue.close)
-    closing.start()
-    assert {each.result(timeout=5.0) for each in others} == {SHUTDOWN_REFUSAL}
-    may_go_on.set()
-    closing.join()
-    assert first.result(timeout=5.0) == 0
-    assert queue.submit(-1).result(timeout=0.0) == SHUTDOWN_REFUSAL
 
 
 def test_bodies_come_as_the_text_of_a_file_and_all_or_nothing_changes(single_cell, change):
