@@ -85,7 +85,7 @@ _BODIES: tuple[tuple[Link, _Kind, int], ...] = (
 _CUT = 0.46
 # Rows per block, so that the intermediate arrays stay in the CPU cache.
 _BLOCK = 2048
-# The same for pairs of bodies, each of which has so many rows.
+# The same for pairs of bodies: the product of rows and pairs.
 _PAIR_ROWS = 12288
 # Of this many consecutive rows, the middle one bounds the distances of the others.
 _STRIDE = 16

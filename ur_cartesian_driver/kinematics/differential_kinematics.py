@@ -84,9 +84,9 @@ def largest_joint_rates(
     """
     at = _jacobians(arm, T_flange_tcp, q)
     inverse = np.linalg.inv(at.jacobian + _MIN_SINGULAR_VALUE * np.eye(6))
-    squares = inverse * inverse
     travel, turn = (
-        np.sqrt(np.einsum('ijk->ij', squares[:, :, part])) for part in _TRAVEL_AND_TURN
+        np.sqrt(np.einsum('ijk,ijk->ij', part, part))
+        for part in (inverse[:, :, columns] for columns in _TRAVEL_AND_TURN)
     )
     qd: Floats = rates[0] * travel + rates[1] * turn
     # Constant joint rates accelerate the TCP by at most the square of their sum times its reach.

@@ -34,8 +34,8 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import pose_from_row
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 
-# Rows per block: more would leave the CPU cache. Calls of numpy for fewer, and for the eighth of
-# them from which a calibrated arm begins, would take longer than what they compute.
+# Rows per block: more would leave the CPU cache. With fewer rows the calls
+# of numpy would cost more than their arithmetic; a calibrated arm begins with one row in _STRIDE.
 _BLOCK = 8192
 # The same for Newton's method, which needs a hundred numbers for each row.
 _NEWTON_BLOCK = 4096
@@ -44,7 +44,7 @@ _MIN_BLOCK = 16
 
 # Newton's method ends when the squared error (metres and radians) is below this.
 _EXACT = 1e-21
-# It ends without a look at the error, too, behind a step in which all joints together turn by less
+# It ends without a look at the error, too, after a step in which all joints together turn by less
 # than this [rad]: the error is at most half the square of the turn, times the distance of the
 # flange from a joint, or 3e-11.
 _LAST_STEP = 5e-6
@@ -234,7 +234,7 @@ def refine(arm: Arm, targets: TargetPoses, q: Floats) -> tuple[Floats, Flags]:
 def _refine(
     arm: Arm, targets: TargetPoses, q: Floats, last_step: float = _LAST_STEP
 ) -> tuple[Floats, Flags]:
-    """Return joint positions (n, 6), and whether the last step to each was as small as this."""
+    """Return joints (n, 6), and whether each is solved: by its error, or by a small last step."""
     q = q.copy()
     exact = np.zeros(len(q), dtype=np.bool_)
     active = np.arange(len(q))
