@@ -128,8 +128,8 @@ class ImportOptions:
     tool: str = ''
     #: The pose of the file's origin in the frame.
     origin: Pose = IDENTITY
-    #: Unit of lengths that have none; overrides that of a DXF drawing. Empty: a file that lacks a
-    #: unit is refused, but G-code is in mm.
+    #: Unit of lengths without one; overrides the unit of a DXF drawing. Empty = a file that lacks
+    #: a unit is refused, except G-code, which is in mm.
     unit: str = ''
     #: Factor on all lengths, about the origin of the file.
     scale: float = 1.0
@@ -140,12 +140,12 @@ class ImportOptions:
     travel_speed: float | None = None
     #: Acceleration [m/s^2] of lines and arcs; None = the file's, else the driver's parameter.
     acceleration: float | None = None
-    #: Duration [s] of the motion to the first point, if the file has times; None = the first one.
+    #: Duration [s] of the motion to the first point, if the file has times; None = its first time.
     approach_time: float | None = None
     #: Blend radius [m] at inner points for which the file has none; smaller where lines are short.
     blend: float = 0.0
-    #: Corner deviation [m] where the file has none for lines and arcs; 0 = the arm stops at these
-    #: corners, or passes them with a blend.
+    #: Corner deviation [m] of lines and arcs for which the file has none; 0 = the arm stops at
+    #: these corners, or passes them with a blend.
     corner: float = 0.0
     #: Largest distance of the simplified path from the file's [m]; 0 = all points are kept.
     simplify: float = 0.0
@@ -155,8 +155,8 @@ class ImportOptions:
     lift: float = 0.0
     #: Outputs by the code that switches them: S, or an M-code with its values.
     outputs: Mapping[str, CodeOutput] = field(default_factory=dict)
-    #: Whether the tool goes in straight lines between the points of a joint trajectory; if not,
-    #: the joints go from point to point.
+    #: Whether the points of a joint trajectory are joined by straight lines of the tool; if not,
+    #: by joint motions.
     lines: bool = False
     #: The arm for which a file's joint positions are meant.
     arm: Arm = field(default_factory=lambda: Arm(robot_model('ur5e')))

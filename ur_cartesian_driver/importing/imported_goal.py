@@ -195,7 +195,11 @@ def _rounded(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) -
 
 
 def _common_corner(path: ImportedPath, options: ImportOptions) -> float:
-    """Return the corner of the whole goal [m]; 0 if a point stops, which no point can demand."""
+    """
+    Return the corner deviation of the whole goal [m]; 0 if the arm stops at any point.
+
+    With a common corner deviation, no point of a goal could demand a stop.
+    """
     return options.corner if (path.corners > 0.0).all() else 0.0
 
 
@@ -236,7 +240,8 @@ def _against(normals: Floats, lines: Int64s) -> Floats:
     if not (lengths > 1e-6).all():
         raise BrokenFile(int(lines[int(np.argmin(lengths))]), 'the normal is zero')
     ez = -normals / lengths[:, None]
-    # If z is near y of the frame, x would jump at the slightest turn of the surface: use x then.
+    # If z is near the frame's y, x would jump at the slightest turn of the surface, so the frame's
+    # x is the reference then.
     reference = np.where((np.abs(ez[:, 1]) > 0.95)[:, None], (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     ex = reference - np.einsum('ij,ij->i', reference, ez)[:, None] * ez
     ex = ex / np.linalg.norm(ex, axis=1)[:, None]
@@ -343,7 +348,7 @@ def _lifted(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) ->
     count = np.ones(len(path), dtype=np.int64)
     count[rows] = 3
     order = np.repeat(np.arange(len(path)), count)
-    first = np.cumsum(count) - count  # where the copies of a row begin
+    first = np.cumsum(count) - count  # the first copy of each row
     raised = np.zeros(len(order), dtype=bool)
     positions = path.positions[order]
     last = first + count - 1
@@ -412,7 +417,7 @@ def _blends(
     fits = radii.copy()
     fits[1:] = np.minimum(fits[1:], _BLEND_SHARE * lengths)
     fits[:-1] = np.minimum(fits[:-1], _BLEND_SHARE * lengths)
-    # The first line begins at the arm, whose position is unknown, so its length limits no blend.
+    # The first line begins at the arm's unknown position, so its length limits no blend.
     special = np.isin(path.types, (SegmentType.CIRCULAR, SegmentType.PROCESS))
     special[:-1] |= special[1:]
     rates = np.where(speeds > 0.0, speeds, _UNKNOWN_SPEED)

@@ -3,8 +3,8 @@
 """
 Times of the points of a file.
 
-Whatever the clock of a file, its readers count from the first point. The first time of a goal is
-the duration of the motion to the first point; it is 0 only if the arm is already there.
+Readers count from the first point, whatever the clock of the file. The first time of a goal is the
+duration of the motion to the first point; it is 0 only if the arm is already there.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ur_cartesian_driver.importing.imported_path import (
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.goal.goal_columns import rows_where
 
-#: Shortest standstill [s] that becomes a dwell. In a shorter one a slow tool may just not have
+#: Shortest standstill [s] that becomes a dwell. A shorter one can be a slow tool that has not
 #: moved by 5 um yet, so its time stays part of the motion.
 _MIN_REST = 0.5
 #: A step in time is a gap if it is longer than the first number [s], and longer than the second

@@ -22,7 +22,7 @@ from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes,
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind, Posture, SegmentType
 
-#: The output that each bit of a recording's digital outputs shows, from bit 0.
+#: The output of each bit in a recording's digital outputs, from bit 0.
 _OUTPUTS = (
     *((OutputKind.STANDARD_DIGITAL, pin) for pin in range(8)),
     *((OutputKind.CONFIGURABLE_DIGITAL, pin) for pin in range(8)),
@@ -59,7 +59,7 @@ TERMS = term_table(
 
 def collect_recording(file: Path, options: ImportOptions, into: PathCollector) -> None:
     """
-    Read a recording; the numbers of its packets, from 1, take the place of lines.
+    Read a recording; the numbers of its packets (from 1) take the place of lines.
 
     The goal begins with a joint motion to the first point, in the posture of the recording.
 
@@ -103,7 +103,7 @@ def collect_recording(file: Path, options: ImportOptions, into: PathCollector) -
 
 
 def _say_others(remarks: ImportNotes) -> None:
-    """Add remarks on the arrays of recordings that are left out."""
+    """Add remarks on the arrays that are left out."""
     by_reason: dict[str, list[str]] = {}
     for term in TERMS.values():
         if term.treatment is Treatment.LEFT_OUT:

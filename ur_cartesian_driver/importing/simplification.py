@@ -11,7 +11,7 @@ position nearest to the arc's centre. (Along the old path the angle about this c
 so the old path is near every position on the arc.)
 
 A point is kept if an output, wait, dwell or posture belongs to it, if speed, acceleration or
-corner change after it, or if leaving it out would turn the tool by more than `MAX_TURN` there.
+corner change after it, or if the tool would be turned by more than `MAX_TURN` there without it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, interpolate_rows
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 
-#: Largest angle [rad] between the orientation at a left-out point and the new path's there.
+#: Largest angle [rad] between the old and the new orientation at a left-out point.
 MAX_TURN = radians(0.5)
 #: Smallest number of lines that an arc replaces.
 _MIN_LINES = 4
@@ -143,7 +143,7 @@ class _Simplifier:
         return _Piece(end, via)
 
     def _first_test(self) -> Flags:
-        """Return for each row whether the point after it might be left out, by a quick test."""
+        """Test quickly, for each row, whether the point after it might be left out."""
         a, b, c = self.points[:-2], self.points[1:-1], self.points[2:]
         chord = c - a
         square = np.einsum('ij,ij->i', chord, chord)

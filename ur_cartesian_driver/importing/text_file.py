@@ -11,7 +11,7 @@ import re
 from ur_cartesian_driver.importing.imported_path import BrokenFile
 
 # Used in place of str.splitlines(), which also splits at form feeds, 0x85 and U+2028. No format
-# ends a line at these, so the numbers of all later lines would be wrong.
+# ends a line at these, and splitting there would shift all later line numbers.
 _LINE_END = re.compile(r'\r\n|\n|\r')
 # The UTF-32 marks come first, because one of them begins with a UTF-16 mark.
 _MARKS = (
@@ -75,5 +75,5 @@ def file_lines(text: str) -> list[str]:
 
 
 def quoted(text: str, width: int = 40) -> str:
-    """Return a text of the file in quotes; dots replace the end of one longer than a width."""
+    """Return a text in quotes, shortened with dots to a width."""
     return repr(text if len(text) <= width else f'{text[: width - 3]}...')

@@ -4,8 +4,8 @@
 Contours: stretches whose ends meet, whatever their order and direction in the file.
 
 A contour continues where exactly two ends meet, and ends where three or more meet. So the order of
-the file does not determine which stretches a contour has. It determines only the direction: that
-of the contour's first stretch in the file, with which a closed contour also begins.
+the file does not determine which stretches a contour has. It determines only the direction: a
+contour runs along its first stretch in the file, and a closed contour begins with this stretch.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def contours(
 
 
 def _follow(end: _End, partners: dict[_End, _End]) -> tuple[list[_End], bool]:
-    """Return where a contour enters each stretch that follows an end, and whether it closes."""
+    """Return the end at which each following stretch is entered; whether the contour closes."""
     first = end[0]
     found: list[_End] = []
     while (entered := partners.get(end)) is not None:

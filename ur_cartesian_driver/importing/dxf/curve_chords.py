@@ -10,7 +10,7 @@ of the chord has a point of the curve beside it, and the bound holds in both dir
 Farin, Curves and Surfaces for CAGD: both properties hold for positive weights.) Each curve is
 halved until every piece is within a small fraction of the tolerance of its chord.
 
-Then pieces are merged greedily: each chord spans as many as the remaining tolerance allows. Only
+Then pieces are merged greedily: a chord spans as many as the remaining tolerance allows. Only
 the ends of pieces are checked, because a polyline is farthest from a line at one of its points,
 and its projection covers the whole line. A chord ends where the curve turns back by more than the
 remaining tolerance.
@@ -61,7 +61,7 @@ def spline_curves(degree: int, knots: Floats, controls: Floats) -> Floats:
     rows = spans[:, None] + np.arange(-degree, 1)
     curves = np.empty((len(spans), degree + 1, 4))
     for k in range(degree + 1):
-        # Control point k is the blossom with k arguments at the span's end, others at its start.
+        # Control point k is the blossom with k arguments at the span's end, the rest at its start.
         points = controls[rows]
         for r in range(1, degree + 1):
             at = knots[spans + 1 if r <= k else spans]

@@ -36,7 +36,7 @@ _SECTIONS = (
     'ACDSDATA',
 )
 _WITH_ENTITIES = ('BLOCKS', 'ENTITIES')
-#: The sections of the records that make a drawing; they are elsewhere only if the file was cut.
+#: The sections in which the records of a drawing belong; elsewhere they show that the file is cut.
 _SECTIONS_OF = {
     **dict.fromkeys(('TABLE', 'ENDTAB', 'LAYER', 'BLOCK_RECORD'), ('TABLES',)),
     **dict.fromkeys(('BLOCK', 'ENDBLK'), ('BLOCKS',)),
@@ -121,7 +121,7 @@ def read_drawing(file: Path, left_out: LeftOut) -> Drawing:
 
 def _section(record: Record, before: set[str], left_out: LeftOut) -> str:
     """Return the name of the section that a record begins."""
-    # The first code 2: the header variables, in the same record, may have that code as well.
+    # The first code 2, because header variables in the same record can have this code, too.
     name = next((value for code, value in record.tags if code == _NAME), '').upper()
     if name in before:
         raise record.fault(f'there is a section {name} before')
@@ -134,9 +134,9 @@ def _section(record: Record, before: set[str], left_out: LeftOut) -> str:
 
 
 def _header(record: Record) -> dict[str, Record]:
-    """Return the variables of a header; it cannot say two units."""
+    """Return the variables of a header; two different units are refused."""
     found: dict[str, Record] = {}
-    for name, variable in list(_variables(record)):  # each has its values when all are there
+    for name, variable in list(_variables(record)):  # the list completes each variable's tags
         first = found.setdefault(name, variable)
         if name == '$INSUNITS' and variable.integer(70) != first.integer(70):
             raise variable.fault('it occurs twice')
@@ -156,7 +156,7 @@ def _variables(header: Record) -> Iterator[tuple[str, Record]]:
 
 def _refuse_two_in_one(record: Record) -> None:
     """Refuse a record that goes on as an entity whose beginning is missing."""
-    kind, values = record.kind, record.values  # refuses other markers in entities with a path
+    kind, values = record.kind, record.values  # .values refuses other markers in such entities
     markers = values.get(MARKER, [])
     # Old files have no markers, but each entity has one layer.
     second = [line for text, line in markers if text == ENTITY_MARKER][1:]
@@ -185,7 +185,7 @@ def _add_entity(record: Record, into: list[Record] | None) -> None:
 
 
 def _add_layer(record: Record, layers: dict[str, Record], left_out: LeftOut) -> None:
-    """Add a layer; another one of its name must not contradict it in what is seen."""
+    """Add a layer; a second one of the same name must have the same visibility."""
     name = record.text(_NAME)
     first = layers.setdefault(name.upper(), record)
     if first is record:
@@ -284,7 +284,7 @@ class Seen:
             yield record, place
 
     def _hidden(self, record: Record, layer: str) -> str:
-        """Return the term that hides an entity; of layers, only frozen ones hide an INSERT."""
+        """Return the term that hides an entity; only a frozen layer hides an INSERT."""
         if record.integer(60):
             return '60'
         entry = self._drawing.layers.get(layer)

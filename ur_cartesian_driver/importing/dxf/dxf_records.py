@@ -23,7 +23,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector3, ZERO3
 EXTENDED_DATA = 1001
 MARKER, _EMBEDDED, _APPLICATION_GROUP, _ELEVATION = 100, 101, 102, 38
 _EXTRUSION, Z_AXIS = 210, (0.0, 0.0, 1.0)
-#: The marker of every entity, and those of the subclasses of a kind that has a path.
+#: The marker of every entity, and the markers of the subclasses of each kind with a path.
 ENTITY_MARKER = 'AcDbEntity'
 MARKERS = {
     'LINE': ('AcDbLine',),

@@ -192,7 +192,7 @@ def _term(kind: str, code: str) -> Term | None:
 
 @cache
 def _first_code(code: int) -> int:
-    """Turn the group code of a point's y or z into its x's; return other codes unchanged."""
+    """Return the code of a point's x for the code of its y or z; other codes are unchanged."""
     for first, last, x in ((20, 28, 10), (30, 37, 10), (220, 223, 210), (230, 233, 210)):
         if first <= code <= last:
             return x + code - first
@@ -262,7 +262,7 @@ class LeftOut:
             self.add(record, term.reason, what)
 
     def tell(self, remarks: ImportNotes) -> None:
-        """Add all remarks to those of the import; each names the handles of its first records."""
+        """Add all remarks to the import's; each names the handles of its first records."""
         for (what, why), records in self._found.items():
             handles = _listed([record.handle for record in records if record.handle])
             for record in records:

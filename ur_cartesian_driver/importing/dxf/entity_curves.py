@@ -34,17 +34,17 @@ _WHOLE_TURN = 1e-5
 #: Arcs with a smaller bulge are drawn as lines: their height is below a billionth of the chord.
 _FLAT = 1e-9
 _CLOSED, _FITTED, _IN_SPACE, _MESH, _FACES, _FRAME = 1, 4, 8, 16, 64, 16
-#: Ends that are as near as this are joined [m].
+#: Ends within this distance [m] of each other are joined.
 JOINED = 1e-5
 
 
 class _NoPathError(Exception):
-    """An entity has no path; the message is the term that says why."""
+    """An entity has no path; the message is the name of the term with the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Points [m]; to each point but the first leads a line, or an arc through its via point."""
+    """Points [m]; a line, or an arc through a via point, leads to each point but the first."""
 
     record: Record
     points: list[Vector3]
@@ -178,8 +178,8 @@ def _ellipse(record: Record, pen: _Pen, left_out: LeftOut) -> None:
         raise ValueError('it has an axis without a length')
     normal = object_axes(record.extrusion()).z
     out = dot(normal, a)
-    # Some programs turn such an axis, and others the plane. Across its axis no plane has an
-    # ellipse, however small.
+    # Some programs turn such an axis, and others the plane. If the axis is steep to the plane,
+    # there is no ellipse, however small.
     if pen.length_of(scale(normal, out)) > pen.tolerance or abs(out) > 0.5 * norm(a):
         raise ValueError(f'its axis leaves its plane by {abs(out):g} (group codes 11 and 210)')
     across = cross(normal, a)
@@ -234,7 +234,7 @@ def _polyline(record: Record, pen: _Pen, left_out: LeftOut) -> None:
     for bit in (_MESH, _FACES):
         if flags & bit:
             raise _NoPathError(f'POLYLINE 70={bit}')
-    record.point(10, ZERO3)  # two would be of a vertex, too, whose beginning is missing
+    record.point(10, ZERO3)  # refuses a second point, of a vertex whose beginning is missing
     vertices = []
     for vertex in record.vertices:
         # The control frame of a spline-fit polyline is not visible.
@@ -263,15 +263,15 @@ def _polyline(record: Record, pen: _Pen, left_out: LeftOut) -> None:
 
 def _elevation(record: Record, vertices: Sequence[Record], pen: _Pen) -> float:
     """
-    Return the elevation of a plane polyline: its own, or that of all its vertices.
+    Return the elevation of a plane polyline: its own, or the common one of its vertices.
 
-    :raises ValueError: it has none of its own, and its points have different ones.
+    :raises ValueError: it has no elevation of its own, and its points have different ones.
     """
     for code in (30, 38):
         if code in record.values:
             return record.number(code)
     heights = [vertex.point(10)[2] for vertex in vertices]
-    # To most programs its own point, without z, says 0.
+    # Most programs take its own point, if without z, for an elevation of 0.
     found = [*heights, *([0.0] if 10 in record.values else [])]
     if found and pen.length_of((0.0, 0.0, max(found) - min(found))) > pen.tolerance:
         raise ValueError(

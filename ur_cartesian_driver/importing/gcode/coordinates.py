@@ -40,7 +40,7 @@ class Coordinates:
         #: ``is_away``: the tool has gone to a machine position since the last point;
         #: ``has_changed``: the state of an axis has changed since the last point.
         self.is_away, self.has_changed = False, True
-        #: ``_offsets`` are the present offsets; ``_origin`` are those without G92 and G52.
+        #: ``_offsets`` are the present offsets; ``_origin`` are the offsets without G92 and G52.
         self._offsets = self._origin = [_Offset(), _Offset(), _Offset()]
         #: The offsets that G92.2 suspended; empty = none.
         self._suspended: list[_Offset] = []
@@ -94,7 +94,7 @@ class Coordinates:
 
     def preset(self, line: int, coordinates: Mapping[int, float]) -> str:
         """
-        Set the coordinates that the tool's present position has (G92).
+        Assign coordinates to the tool's present position (G92).
 
         :returns: the names of the axes along which the position was not known before.
         :raises BrokenFile: the position along an axis was known earlier in the program, but is
@@ -122,7 +122,7 @@ class Coordinates:
 
     def preset_origin(self, line: int, coordinates: Mapping[int, float]) -> None:
         """
-        Set the coordinates that the tool's present position has in the work offset (G10 L20).
+        Assign coordinates to the tool's present position, by the work offset (G10 L20).
 
         :raises BrokenFile: G92 or G52 is in use, or :meth:`preset` refuses the coordinates.
         """
@@ -177,7 +177,7 @@ class Coordinates:
         )
 
     def record(self, row: int) -> None:
-        """Note that the present states of the axes apply from a row of the path on."""
+        """Record the present states of the axes, which apply from a row of the path on."""
         self._history.append((row, (*self.states,)))
         for axis, state in enumerate(self.states):
             self._was_known[axis] |= state == _KNOWN

@@ -20,7 +20,7 @@ POSES = (
     'geometry_msgs/Pose',
 )
 OWN_GOAL = 'ur_cartesian_driver/FollowCartesianTrajectory'
-#: Goals that have the fields of ours, but a trajectory of joints.
+#: Goals with the same fields as ours, but with a joint trajectory.
 CONTROLLER_GOALS = ('control_msgs/FollowJointTrajectory', 'moveit_msgs/ExecuteTrajectory')
 MULTI_DOF = 'trajectory_msgs/MultiDOFJointTrajectory'
 _NO_PATH = 'it has no path of the tool'
@@ -81,7 +81,7 @@ TERMS = term_table(
     ),
     left_out('times of a whole path', 'a goal begins when it is sent', 'stamp'),
 )
-#: The fields that identify a type; a message has the first type all of whose fields it has.
+#: The fields that identify a type: the type of a message is the first one whose fields it has.
 _TELLING: Mapping[str, tuple[str, ...]] = {
     PATH: ('poses',),
     JOINT_TRAJECTORY: ('joint_names', 'points'),

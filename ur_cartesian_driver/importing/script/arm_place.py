@@ -22,7 +22,7 @@ from ur_cartesian_driver.urscript.script_values import ScriptPose
 
 
 class ArmPlace:
-    """The arm's position, also set in the motion generator for the controller's functions."""
+    """The arm's position, shared with the motion generator for the controller's functions."""
 
     def __init__(self, controller: Controller, options: ImportOptions) -> None:
         """Begin at an unknown position."""
@@ -33,13 +33,13 @@ class ArmPlace:
         self._motion.T_flange_tcp = options.T_flange_tcp
         #: Whether the file determines the pose; whether it also determines the joint positions.
         self.is_known = self.knows_joints = False
-        #: The last target pose, and the TCP of that pose; None = the joints give the pose.
+        #: The last target pose, and its TCP; None = the joints give the pose.
         self._last: tuple[Pose, Pose] | None = None
         #: Poses of the flange for which the joint positions have not been solved yet.
         self._flange_poses: list[Pose] = []
         #: For each TCP that was set: the line of the set_tcp call, and the TCP as text.
         self.set_tcps: dict[Pose, tuple[int, str]] = {}
-        #: Joint positions that were solved for a pose of the file: the pose counts, on any arm.
+        #: Joint positions solved for a pose of the file; they stand for the pose, on any arm.
         self.solutions: set[tuple[Value, ...]] = set()
 
     @property

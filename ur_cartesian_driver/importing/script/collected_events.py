@@ -77,7 +77,7 @@ class CollectedEvents:
 
     @property
     def acts(self) -> bool:
-        """Whether the running thread moved the arm last, or is main and that thread has ended."""
+        """Whether the running thread moved the arm last, or is main and the last mover ended."""
         thread = self.run.thread
         return thread == self._mover or (thread == MAIN and not self.run.lives(self._mover))
 
@@ -107,8 +107,8 @@ class CollectedEvents:
         """
         Add a point.
 
-        :raises RuntimeException: the point has no joint positions, and the active TCP is not that
-            of earlier such points.
+        :raises RuntimeException: the point has no joint positions, and earlier points without
+            joint positions have another TCP.
         """
         if point.joints is None:
             if self._tcp not in (None, self.place.tcp):

@@ -37,9 +37,9 @@ from ur_cartesian_driver.urscript.script_values import Value
 #: The manual's defaults: acceleration [m/s^2] and speed [m/s] of the tool; fraction of the arm's
 #: limits, for optimovej and optimovel.
 TOOL_A, TOOL_V, FRACTION = 1.2, 0.25, 0.3
-#: The same of joints [rad/s^2, rad/s].
+#: The manual's defaults for joints [rad/s^2, rad/s].
 JOINT_A, JOINT_V = ASSUMED_LAWS.timed_joint_acceleration, ASSUMED_LAWS.timed_joint_speed
-#: A shorter line [m] only turns the tool, and its rates are those of the turn, in a goal, too.
+#: A shorter line [m] only turns the tool: its rates apply to the turn, as in a goal.
 PURE_TURN = 1e-6
 #: The assumed turn ratio of movel.
 TURN_RATIO = ASSUMED_LAWS.turn_ratio
@@ -221,7 +221,7 @@ class MoveFunctions:
         defaults: tuple[float, float],
     ) -> tuple[float, float]:
         """
-        Return acceleration and speed; with a time, those at which the move takes that time.
+        Return acceleration and speed; if a time is given, they make the move take that time.
 
         The robot stretches the trapezoid of `a` and `v` to the time, as recordings of a UR3 show.
         """

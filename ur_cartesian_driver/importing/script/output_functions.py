@@ -41,7 +41,7 @@ class OutputFunctions:
         yield
 
     def wait_for_input(self, function: Value, n: Value, level: Value) -> Steps:
-        """Wait for a digital input; a call of this replaces a loop that waits for the input."""
+        """Wait for a digital input; this call replaces a loop that waits for the input."""
         while not self._events.acts:
             yield
         if function == 'get_digital_in':  # the old numbering: pins 8 and 9 are on the tool

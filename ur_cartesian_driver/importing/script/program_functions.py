@@ -48,7 +48,7 @@ _TCP_POSES = (
     'tool_pose',
 )
 _FLANGE_POSE = 'get_actual_tool_flange_pose'
-#: The functions that read the joints, too.
+#: The functions that also read the joints.
 _OF_JOINTS = (
     *('get_actual_joint_positions', 'get_target_joint_positions', 'get_joint_positions'),
     *('get_forward_kin', 'get_inverse_kin', 'get_inverse_kin_has_solution'),
@@ -166,7 +166,7 @@ class ProgramFunctions:
     # ---- the arm -------------------------------------------------------------------------------
 
     def _reader(self, name: str, does: Any) -> Any:
-        """Wrap a function so that it first reports the arm's position if that is only assumed."""
+        """Wrap a function so that it first reports an assumed position of the arm."""
         place, of_joints, signature = self._place, name in _OF_JOINTS, inspect.signature(does)
 
         @functools.wraps(does)

@@ -13,14 +13,14 @@ MAIN = 0
 
 
 class RunningScript:
-    """What a called function can ask of the running program: its line, its thread, its remarks."""
+    """The running program, as seen by the functions that it calls: line, thread and remarks."""
 
     def __init__(self) -> None:
         """Begin before the program is compiled."""
         self.interpreter: ScriptInterpreter | None = None
-        #: A clause that names the last call whose value is assumed; '' = none is.
+        #: A clause that names the last call with an assumed value; '' = none.
         self._assumed = ''
-        #: The remarks: their reason -> what it applies to, and the lines where that happened.
+        #: The remarks by reason: the functions and other things it applies to, and their lines.
         self._said: dict[str, tuple[dict[str, None], set[int]]] = {}
 
     @property
@@ -58,7 +58,7 @@ class RunningScript:
         return f'{before}{self._assumed}' if self._assumed else ''
 
     def tell(self, remarks: ImportNotes) -> None:
-        """Copy all remarks into those of the import."""
+        """Add all remarks to the remarks of the import."""
         for why, (names, lines) in self._said.items():
             for line in lines:
                 remarks.add(line, ', '.join(names), why)

@@ -131,7 +131,7 @@ def _calls(node: SyntaxNode) -> list[str]:
 
 
 def _call(node: Any, name: str = '', *arguments: Expression) -> CallStatement:
-    """Return a call, at the position of a node, of a named function or else of the node itself."""
+    """Return a call at a node's position, of the named function or else of the node's own."""
     place = {'line': node.line, 'column': node.column}
     given = tuple(CallArgument(name=None, value=value, **place) for value in arguments)
     return CallStatement(
@@ -201,7 +201,7 @@ def _input_wait(loop: WhileStatement) -> CallStatement | None:
 
 
 def _only_waits(statement: Statement) -> bool:
-    """Return whether a statement only takes time, or none."""
+    """Return whether a statement does nothing but take time."""
     call = statement.call if isinstance(statement, CallStatement) else None
     waits = isinstance(call, CallExpression) and call.function in ('sync', 'sleep')
     return waits or isinstance(statement, LabelStatement)

@@ -257,7 +257,7 @@ TERMS = term_table(
     ),
 )
 
-#: The reasons to leave out functions whose values here can differ from those on a robot.
+#: The reasons to leave out functions whose values can differ on a robot.
 ASSUMED = frozenset({_IDLE, _UNANSWERED, TERMS['random'].reason})
 #: The functions, by name.
 FUNCTIONS = {

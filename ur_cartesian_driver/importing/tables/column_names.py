@@ -73,7 +73,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     **dict.fromkeys(('t', 'sec', 'nanosec'), Quantity.TIME),
     'speed': Quantity.SPEED,
 }
-#: The units that the programs that write these columns use; they apply if the header has none.
+#: Units of the programs that write these columns; they apply if the header has none.
 FIXED_UNITS: Mapping[str, Mapping[str, str]] = {
     POSE: {**dict.fromkeys(_XYZ, 'm'), **dict.fromkeys(_RXYZ, 'rad')},
     ROS_POSE: dict.fromkeys(_XYZ, 'm'),
@@ -83,7 +83,7 @@ FIXED_UNITS: Mapping[str, Mapping[str, str]] = {
 
 
 NO_QUANTITY = 'a path has no such quantity'
-#: The braces mean each letter within them in turn. Of several groups with the same kind of values,
+#: Braces stand for each of their letters in turn. Of several groups with the same kind of values,
 #: the first one in TERMS is used.
 TERMS = term_table(
     honoured(
@@ -240,7 +240,7 @@ def body_of(title: Title) -> str:
 
 
 def is_orientation(title: Title) -> bool:
-    """Return whether a title's name, words or unit mean an orientation or a normal."""
+    """Return whether a title's name, words or unit suggest an orientation or a normal."""
     if title.name in _ORIENTATIONS:
         return True
     name, unit = _split(title.text)

@@ -130,7 +130,7 @@ _KINDS = {
 
 
 def _check_torques(taken: Sequence[Column], titles: Sequence[Title], line: int) -> None:
-    """Refuse positions tx, ty and tz beside forces fx, fy and fz: they are torques."""
+    """Refuse positions tx, ty and tz beside forces fx, fy and fz: they can be torques."""
     group = [titles[column.index] for column in taken if column.role in ROLES[POSITION]]
     names = {letters(title.text.partition('[')[0].partition('(')[0]) for title in titles}
     if names.issuperset(('fx', 'fy', 'fz')) and group[0].name == 'tx':
@@ -158,7 +158,7 @@ def _check_w(titles: Sequence[Title], *, is_oriented: bool, line: int) -> None:
 
 
 def _check_bodies(titles: Sequence[Title], line: int) -> None:
-    """Refuse a pose whose position and orientation are of two bodies."""
+    """Refuse a pose whose position and orientation belong to two bodies."""
     bodies = {body: title for title in titles if (body := body_of(title))}
     if len(bodies) > 1:
         raise BrokenFile(
@@ -181,7 +181,7 @@ def _listed(titles: Sequence[Title]) -> str:
 
 
 def _names(titles: Sequence[Title]) -> str:
-    """Return titles with commas between them; numbered titles become ranges: RTDE has over 100."""
+    """Return titles with commas between them; numbered ones (RTDE has over 100) become ranges."""
     runs: list[list[str]] = []
     for title in titles:
         stem = title.text.rstrip('0123456789')
@@ -203,7 +203,7 @@ def _refuse_header(titles: Sequence[Title], line: int) -> NoReturn:
 
 
 def _missing(names: set[str], kind: str) -> str:
-    """Return the first missing column of the group of which the table has the most columns."""
+    """Return the first missing column of the group with the most columns in the table."""
     groups = [COLUMNS[term] for term, kinds in _KINDS.items() if kinds[0] == kind]
     best = max(groups, key=lambda columns: len(names.intersection(columns)))
     return next(column for column in best if column not in names)

@@ -3,10 +3,10 @@
 """
 The header and rows of a table, in the dialects that programs write.
 
-Columns are separated by semicolons, tabs, commas or blanks; rows and header can have different
-separators, because numpy.savetxt writes the header that it is given. The header is the first line
-that names a position and is not a comment. If the rows begin before such a line, the header is the
-last comment before the rows that names a position.
+Columns are separated by semicolons, tabs, commas or blanks. Rows and header can have different
+separators, because numpy.savetxt does not adapt its header to its delimiter. The header is the
+first line that names a position and is not a comment. If the rows begin before such a line, the
+header is the last comment, before the rows, that names a position.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def read_table(
             if titles := next(filter(is_header, _titles(text, delimiters)), None):
                 header = (i + 1, titles)
             if not comment:
-                # A number alone is no point, but the rate or count of a recorder.
+                # A number alone is the rate or count of a recorder, not a point.
                 is_row = _is_numeric(line) and not _is_number(line)
                 if (header and header[0] == i + 1) or is_row:
                     break
@@ -141,7 +141,7 @@ def _with_rows(
 
 
 def _fits(cells: list[str], width: int) -> bool:
-    """Return whether a row has ``width`` cells, or one more that is empty, at its end."""
+    """Return whether a row has ``width`` cells, apart from an empty one at its end."""
     return bool(cells) and len(cells) - (not cells[-1]) <= width <= len(cells)
 
 
