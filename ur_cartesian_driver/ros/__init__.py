@@ -19,7 +19,7 @@ __all__ = ['CartesianDriverNode']
 
 
 def __getattr__(name: str) -> Any:
-    """Import the node on first use: `python -m` warns if the module that it runs is imported."""
+    """Import the node on first use: `python -m` warns if its module is imported already."""
     if name in __all__:
         from ur_cartesian_driver.ros import node
 

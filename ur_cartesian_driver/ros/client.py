@@ -338,9 +338,9 @@ class GoalClient:
         This can be called from anywhere while the goal runs, also in the callback of :meth:`send`.
         The call does not wait; requests are sent one after the other.
 
-        :param path: the points, with times from the start of the goal; of it, only points,
-            segments and outputs are used. Outputs count from the first point of a path, or, in a
-            message, of the goal. None = no points, allowed only with ``last``.
+        :param path: a path or message with times from the start of the goal, of which only
+            points, segments and outputs are used. Outputs count from the first point of the path
+            or, in a message, of the goal. None = no points, allowed only with ``last``.
         :param last: whether these are the last points of the goal.
         :param replace_from_point: the first point that the new ones replace, together with all
             later points.
@@ -439,9 +439,9 @@ class GoalClient:
 
     def _find_driver(self, timeout: float) -> Endpoints:
         """
-        Wait for the driver, and return what tells it from one that is started later.
+        Wait for the driver, and return its endpoints; a driver that is started later has others.
 
-        One that was killed is seen for some seconds beside its successor.
+        A driver that was killed is visible for some seconds beside its successor.
 
         :raises TimeoutError: no driver answers.
         :raises ConnectionError: several drivers serve the action, and any of them could move.
@@ -491,8 +491,8 @@ class GoalClient:
         """
         Spin until a future is done, and return its result.
 
-        :param driver: the driver that was asked, as :meth:`_find_driver` returned it.
-        :param unknown: what is not known if the driver is gone, as a clause.
+        :param driver: the endpoints of the driver, from :meth:`_find_driver`.
+        :param unknown: a clause for the error, such as "how the goal ended is not known".
         :param between: called after each spin, at least every 0.1 s.
         :raises ConnectionError: the driver is gone, or was started again.
         """

@@ -46,8 +46,8 @@ class GoalAppender:
         :param path: the points, segments and outputs; None = no points. For the other parameters
             see :meth:`~ur_cartesian_driver.ros.client.GoalClient.append`.
         :raises ValueError: both ``replace_from_point`` and ``replace_from_time`` are given.
-        :raises InvalidGoal: the path has what is not appended, or outputs at points whose numbers
-            in the goal are not known.
+        :raises InvalidGoal: the path has events that cannot be appended, or outputs at points
+            whose numbers in the goal are not known.
         """
         if replace_from_point is not None and replace_from_time is not None:
             raise ValueError('Give replace_from_point or replace_from_time, not both.')
@@ -90,7 +90,7 @@ class GoalAppender:
 
         def take(done: Future) -> None:
             response = done.result()
-            # Refused, too: another client may have appended. 0 = the goal is not there.
+            # Also if refused, because another client may have appended. 0 = there is no such goal.
             self._points = response.points_received or self._points
             answer.set_result(response)
 
@@ -100,7 +100,7 @@ class GoalAppender:
 def _refuse_other_events(
     goal: FollowCartesianTrajectory.Goal, request: AppendPoints.Request
 ) -> None:
-    """Refuse what happens at points and has no field in a request: it would not happen."""
+    """Refuse events at points for which a request has no field: they would be lost."""
     for kind in EVENT_KINDS.values():
         if not hasattr(request, kind.field) and len(getattr(goal, kind.field)):
             raise InvalidGoal(

@@ -33,12 +33,12 @@ __all__ = [
 ]
 
 _MAX_SECONDS = 2**31 - 1
-#: ``first_index`` of an append request: the number of points that the goal has, whatever it is.
+#: ``first_index`` of an append request: at the end of the goal, whatever its number of points.
 AT_END = 2**32 - 1
 
 
 def age_of(stamp: Time, now: int) -> float | None:
-    """Return the age of a stamp [s] at a time [ns]; None if it is zero, and so not given."""
+    """Return the age of a stamp [s] at a time [ns]; None if the stamp is zero (not given)."""
     sent = nanoseconds(stamp)
     return None if sent == 0 else (now - sent) / 1_000_000_000
 

@@ -192,7 +192,7 @@ class _LogBridge(logging.Handler):
     """
     Passes the log records of one driver to the logger of its node.
 
-    Records of no driver, as of a callback that failed, go to the oldest node of the process.
+    Records that belong to no driver (a callback failed) go to the oldest node of the process.
     """
 
     _bridges: ClassVar[list[_LogBridge]] = []
@@ -256,7 +256,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         )
         _check_arguments(remove_ros_args(own_arguments)[1:])
     except RuntimeError as error:
-        # rcl appends the source line to its sentence; of unknown arguments it has just the list.
+        # rcl appends the source line to its sentence, which only lists unknown arguments.
         reason = re.split(r', at /', str(error))[0]
         if reason.startswith('['):
             reason = f'{reason[1:-1]} is not understood. {_USAGE}'
@@ -289,7 +289,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _check_arguments(arguments: Sequence[str]) -> None:
-    """Exit if there are arguments that ROS does not take: without them, another arm may move."""
+    """Exit if ROS does not take an argument: if it were ignored, another arm might move."""
     if arguments:
         rclpy.shutdown()
     if {'-h', '--help'} & set(arguments):

@@ -58,9 +58,9 @@ def newest_subscription(
 
 def feedback_publishers(node: Node, action: str) -> Endpoints:
     """
-    Return who publishes the feedback of an action.
+    Return the publishers of an action's feedback.
 
-    A server that was started again serves under the same names, but with other endpoints.
+    A server that was started again has the same names, but other endpoints.
     """
     found = node.get_publishers_info_by_topic(f'{action}/_action/feedback')
     return frozenset(tuple(each.endpoint_gid) for each in found)

@@ -60,7 +60,7 @@ class GoalServer:
         """Start to serve."""
         self._transforms = listen_to_tf(node, settings.node.tf_max_age)
         self._plan_markers = PlanMarkerPublisher(node, settings.frames.base)
-        #: Publishes the cell; whoever changes the cell has it published anew.
+        #: Publishes the cell; the code that changes the cell calls it.
         self.cell_markers = CellMarkerPublisher(node, driver)
         self._context = GoalContext(
             driver=driver,
@@ -107,7 +107,7 @@ class GoalServer:
 
     @property
     def frames(self) -> Frames:
-        """The frames that goals can name, including those of tf2."""
+        """The frames that goals can name, including frames of tf2."""
         return self._context.frames
 
     @property
@@ -124,7 +124,7 @@ class GoalServer:
 
     @property
     def running_goal(self) -> GoalRun | None:
-        """The goal that moves the arm, or else the newest one that is about to; None: no such."""
+        """The goal that moves the arm, or else the newest one that is about to; None: neither."""
         with self._lock:
             runs = list(self._runs.values())
         moving = (run for run in runs if run.is_moving)
@@ -201,7 +201,7 @@ class GoalServer:
         return run.action.result(outcome)
 
     def _log_end(self, outcome: Outcome) -> None:
-        """Log how a goal has ended, for the one who reads the log later."""
+        """Log the outcome of a goal."""
         text = f'goal: {outcome.code.name}: {outcome.text}'
         if outcome.succeeded or outcome.code is ErrorCode.CANCELLED:
             self._logger.info(text)

@@ -52,7 +52,7 @@ class ArmArbiter:
 
     @property
     def release_count(self) -> int:
-        """How many times the arm was released; before each release it may have moved."""
+        """The number of releases of the arm; before each of them the arm may have moved."""
         return self._release_count
 
     @property
@@ -70,7 +70,7 @@ class ArmArbiter:
 
     def acquire(self, arm_request: ArmRequest, *, preemptible: bool = False) -> bool:
         """
-        Acquire the arm if it is free and nobody waits for it; return whether this was so.
+        Acquire the arm if it is free and nobody waits for it; return whether it was acquired.
 
         :param preemptible: whether any other request can preempt this one, which is therefore
             queued as the oldest.

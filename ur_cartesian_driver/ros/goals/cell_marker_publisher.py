@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""``~/cell_markers``: the bodies of the cell, and what the newest goal would touch, for RViz."""
+"""``~/cell_markers`` for RViz: the bodies of the cell, and the newest goal's collision."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class CellMarkerPublisher:
         """
         Publish the cell as it is now, unless the node is shutting down.
 
-        :param refusal: of the newest goal, which is shown at its place.
+        :param refusal: the refusal of the newest goal; its collision is shown at its place.
         """
         self._shows_refusal = False
         driver, stamp = self._driver, self._clock.now().to_msg()

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""``~/feed_override``: a signal that slows a running goal that takes one."""
+"""``~/feed_override``: a signal that slows the running goal, if the goal permits it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class FeedOverrideSubscriber:
     Passes the signal to the running motion; the node destroys the subscription.
 
     A sensor publishes all the time, so its values between goals, and during goals without feed
-    override, are no fault.
+    override, are ignored without a warning.
     """
 
     def __init__(self, node: Node, server: GoalServer) -> None:

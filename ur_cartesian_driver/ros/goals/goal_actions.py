@@ -131,7 +131,7 @@ class JointUntilAction(JointAction):
         """
         Return the goal of a message.
 
-        :raises InvalidGoal: the goal waits for something else than contact.
+        :raises InvalidGoal: the goal waits for something other than contact.
         """
         if request.until_type != request.TOOL_CONTACT:
             raise InvalidGoal(
@@ -158,7 +158,7 @@ def installed_actions() -> list[GoalAction]:
     actions: list[GoalAction] = [CartesianAction()]
     for type_name, kind in (
         ('control_msgs/action/FollowJointTrajectory', JointAction),
-        ('ur_msgs/action/FollowJointTrajectoryUntil', JointUntilAction),  # an older one lacks it
+        ('ur_msgs/action/FollowJointTrajectoryUntil', JointUntilAction),  # not in old releases
     ):
         action_type = class_of(type_name)
         if action_type is None:

@@ -28,7 +28,7 @@ class GoalContext:
     settings: Settings
     #: Shows a plan; called in the threads of goals.
     show: Callable[[Plan], None]
-    #: Shows what a refused goal would touch; called in the threads of goals.
+    #: Shows the collision of a refused goal; called in the threads of goals.
     show_refusal: Callable[[CollisionPredicted], None]
 
     def now(self) -> int:

@@ -65,7 +65,7 @@ class GoalRun:
         self._context = context
         self._on_end = on_end
         self._received = context.now()
-        #: When the motion starts [ns]; 0: at once.
+        #: The start time of the motion [ns]; 0: at once.
         self._start_time = nanoseconds(handle.request.trajectory.header.stamp)
         self.arm_request = ArmRequest(f'goal {self.key.hex()[:8]}', self._preempt_motion)
         self.thread = threading.Thread(target=self._run, name=self.arm_request.name, daemon=True)
@@ -212,8 +212,9 @@ class GoalRun:
         """
         Plan the goal, preempt older goals, and return the plan.
 
-        The goal is first planned from where the arm would come to rest, so that a refusal disturbs
-        no other goal. It is planned again if another goal has moved the arm meanwhile.
+        The goal is first planned from the place where the arm would come to rest, so that a
+        refusal disturbs no other goal. It is planned again if another goal has moved the arm
+        meanwhile.
 
         :raises GoalRefused: the goal is refused, or the running motion cannot be preempted.
         """
@@ -256,7 +257,7 @@ class GoalRun:
             )
 
     def _execute(self, plan: Plan) -> Outcome:
-        # Feedback and pictures are of the plan that is executed.
+        # Feedback and pictures show the plan that is executed.
         try:
             plan = self._context.driver.renewed(plan)
             motion = self._context.driver.start(plan, self._feedback_publisher(plan))

@@ -3,9 +3,9 @@
 """
 ``~/path_offset``: offsets for the running goal, if its ``path_offset`` allows them.
 
-An offset that cannot be followed is ignored with a warning that says why; the offset before it
+An offset that cannot be followed is ignored with a warning that says why; the previous offset
 stays in effect until it is stale. A sensor publishes all the time, so its values between goals are
-no fault.
+ignored without a warning.
 """
 
 from __future__ import annotations

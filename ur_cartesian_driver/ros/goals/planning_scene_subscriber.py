@@ -3,8 +3,8 @@
 """
 MoveIt's planning scene as bodies of the cell (``planning_scene_topic``).
 
-Only changes come by the topic, so the scene as it is comes by a service, when this appears: at the
-start of either node, and again after MoveIt was started anew.
+The topic has only changes of the scene. So the whole scene is requested from a service whenever
+the service appears: at the start of either node, and again after a restart of MoveIt.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from ur_cartesian_driver.ros.node_endpoints import steady_timer
 TYPE, SERVICE_TYPE = 'moveit_msgs/msg/PlanningScene', 'moveit_msgs/srv/GetPlanningScene'
 #: The name of the service, in the namespace of the topic.
 SERVICE = 'get_planning_scene'
-#: Time between two looks whether there is the service [s].
+#: Period in which the node looks for the service [s].
 _PERIOD = 1.0
-#: Each message changes the scene of those before it, so none may be lost.
+#: Each message changes the scene of the previous messages, so none may be lost.
 _QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 
 
 class PlanningSceneSubscriber:
-    """Takes planning scenes over, one after the other in a thread of its own."""
+    """Takes over planning scenes, one after the other in a thread of its own."""
 
     def __init__(self, node: Node, driver: Driver, frames: Frames, topic: str) -> None:
         """Subscribe, if moveit_msgs is installed."""
@@ -65,7 +65,7 @@ class PlanningSceneSubscriber:
         self._timer = steady_timer(node, _PERIOD, self._look_for_service, group)
 
     def close(self) -> None:
-        """Take no further scene over."""
+        """Take over no further scenes."""
         self._thread.shutdown(cancel_futures=True)
 
     def _look_for_service(self) -> None:
@@ -85,7 +85,7 @@ class PlanningSceneSubscriber:
             self._thread.submit(self.take, message)
 
     def take(self, message: Any) -> None:
-        """Take a message over, or log why not."""
+        """Take over a message, or log the reason why this is impossible."""
         driver = self._driver
         place = SceneArm(
             arm=driver.arm,
@@ -97,7 +97,7 @@ class PlanningSceneSubscriber:
         try:
             after = updated_scene(before, message, place)
             pairs, pairs_before = after.cell.may_touch, before.cell.may_touch
-            # A body forgets what it may touch only when it is removed.
+            # change_cell() only adds pairs; a body loses its pairs when it is removed.
             anew = {name for pair in pairs_before - pairs for name in pair} & after.names
             changed = [
                 body
@@ -113,7 +113,7 @@ class PlanningSceneSubscriber:
         except (DriverError, ValueError) as error:
             clause = str(error).rstrip('.')
             self._logger.error(f'The planning scene is not taken over: {clause}.')
-        except Exception:  # whatever the message has, the next one may be right
+        except Exception:  # the next message may be right
             self._logger.error(traceback.format_exc())
         else:
             self._names = after.names

@@ -30,7 +30,7 @@ class FreedriveService:
         """Start to serve."""
         self._driver, self._arbiter = driver, arbiter
         self._motion: MotionHandle | None = None
-        #: The answer to who has started freedrive, and whether it is ending.
+        #: The answer to the call that started freedrive, and whether freedrive is ending.
         self._started, self._is_ending = _FirstAnswer(), False
         self._lock = threading.Lock()
         self._service = DeferredService(node, SetBool, '~/freedrive_mode', self._handle)
@@ -44,7 +44,7 @@ class FreedriveService:
                 motion.result(JOIN_TIMEOUT)
 
     def _handle(self, request: Any) -> Future[ServiceAnswer]:
-        """Start or end freedrive; the answer comes when the robot has done this, or has failed."""
+        """Start or end freedrive; the answer comes when the robot has done so, or has failed."""
         with self._lock:
             motion = self._motion
             if request.data:

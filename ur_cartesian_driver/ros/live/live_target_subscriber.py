@@ -12,7 +12,7 @@ A session acquires the arm like a goal, but is treated as older than all goals, 
 preempts it.
 
 An operator who unlocks a robot and plays its program does not expect it to follow targets that
-still arrive. So after a stop, targets are ignored until the client has once sent none for
+still arrive. So after a stop, targets are ignored until the client has paused for
 ``live_target_timeout``.
 """
 

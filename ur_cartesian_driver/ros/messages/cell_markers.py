@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The bodies of the cell as markers for RViz, and those two that would touch."""
+"""Markers for RViz: the bodies of the cell, and the two that would touch."""
 
 from __future__ import annotations
 
@@ -26,15 +26,16 @@ from ur_cartesian_driver.ros.message_fields import pose_message
 
 #: Thickness of the squares that stand for planes [m], and their opacity.
 _THICKNESS, _CLEAR = 0.001, 0.3
-#: Opacity of what would touch, through which the arm and the fixed bodies are seen.
+#: Opacity of the bodies that would touch, through which the arm and the fixed bodies are seen.
 _GHOST = 0.6
 
 
 def cell_markers(cell: Cell, tf_prefix: str, stamp: Time) -> MarkerArray:
     """
-    Return the bodies as markers, which replace the markers before: a namespace for each body.
+    Return the bodies as markers, which replace all earlier markers.
 
-    Each is in the frame that carries it, so RViz moves it with the arm.
+    Each body has a namespace. Its markers are in the frame that carries the body, so RViz moves
+    them with the arm.
     """
     markers = [Marker(action=Marker.DELETEALL)]
     most = triangles_per_mesh(cell)
@@ -52,10 +53,10 @@ def refusal_markers(
     refusal: CollisionPredicted, cell: Cell, arm: Arm, T_flange_tcp: Pose, base: str, stamp: Time
 ) -> MarkerArray:
     """
-    Return the two bodies that would touch, where they would, in red.
+    Return the two bodies that would touch, in red, at the place of their collision.
 
-    Links of the arm are cylinders that contain them. Each namespace is the name of the body behind
-    ``refused``.
+    Links of the arm are drawn as enclosing cylinders. Each namespace is ``refused``, followed by
+    the name of the body.
 
     :param base: the frame of the robot's base.
     """

@@ -85,8 +85,8 @@ def resolve_frames(
     """
     Return a goal with its frames resolved.
 
-    Transforms of tf2 are those at the goal's stamp; the newest ones if the goal has no stamp, or
-    while the stamp lies in the future.
+    Transforms of tf2 are taken at the goal's stamp. If the goal has no stamp, or while the stamp
+    lies in the future, the newest ones are taken.
 
     :param trajectory: the ``CartesianTrajectory`` from which the goal was made.
     :param now: time of the node's clock [ns].

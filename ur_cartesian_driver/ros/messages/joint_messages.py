@@ -97,7 +97,7 @@ def joint_result(make: type[Any], outcome: Outcome) -> Message:
     message = make()
     code = joint_error_code(outcome.code)
     if outcome.code is ErrorCode.COLLISION and outcome.stopped is not None:
-        code = ErrorCode.PATH_TOLERANCE_VIOLATED  # the cell has changed: the arm had moved
+        code = ErrorCode.PATH_TOLERANCE_VIOLATED  # the cell changed after the arm had moved
     message.error_code = int(code)
     message.error_string = f'{name}{outcome.text}'
     return message

@@ -45,11 +45,11 @@ _AXES = (
 
 def plan_markers(plan: Plan, base: str, stamp: Time) -> MarkerArray:
     """
-    Return a plan as markers, which replace the markers of the plan before.
+    Return a plan as markers, which replace the markers of the previous plan.
 
     Namespace ``path``: the path of the TCP, each piece in the colour of its motion; ``points``:
-    the points of the goal; ``ends``: the axes of the TCP at the start and at the end. Of a path
-    on a held part, all of them move with the flange.
+    the points of the goal; ``ends``: the axes of the TCP at the start and at the end. If the path
+    is on a held part, all markers move with the flange.
 
     :param base: the frame of the robot's base.
     """

@@ -31,7 +31,7 @@ def in_flat_arrays(goal: FollowCartesianTrajectory.Goal) -> FollowCartesianTraje
     Return a goal with its points and segments packed.
 
     The goal is returned unchanged if it is packed already, has a jerk (which no motion uses), or
-    is malformed, so that it will be refused.
+    is malformed and so will be refused.
     """
     trajectory = goal.trajectory
     try:

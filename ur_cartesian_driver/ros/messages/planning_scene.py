@@ -3,8 +3,8 @@
 """
 MoveIt's PlanningScene as bodies of a cell.
 
-The messages are taken by the names of their fields: moveit_msgs need not be installed. The solid
-side of a plane is the one from which its normal points away.
+Messages are read by the names of their fields, so moveit_msgs need not be installed. The normal of
+a plane points away from its solid side.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.preflight.cell_stretches import place_in_base
 
-#: What other packages call the parts of the arm that may touch.
+#: The cell's names for parts of the arm that have other names in other packages.
 _LINK_OF_FRAME = {
     'base': 'base_link',
     'tool0': 'tool',
@@ -37,7 +37,7 @@ _LINK_OF_FRAME = {
 
 
 class _Operation(IntEnum):
-    """What to do with an object, numbered as in ``CollisionObject.operation``."""
+    """An operation on an object, numbered as in ``CollisionObject.operation``."""
 
     ADD = 0
     REMOVE = 1
@@ -47,7 +47,7 @@ class _Operation(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneBodies:
-    """A cell, and the names of its bodies that came as a planning scene."""
+    """A cell, and the names of its bodies that came from a planning scene."""
 
     cell: Cell
     names: frozenset[str] = frozenset()
@@ -55,7 +55,7 @@ class SceneBodies:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneArm:
-    """Where the arm is, for objects in frames that move with it."""
+    """The arm with its state and frames, for objects in frames that move with the arm."""
 
     arm: Arm
     #: None = not known.
@@ -92,9 +92,9 @@ class _Update:
 
     def of(self, item: Any, change: Callable[[], None]) -> None:
         """
-        Make the change of an object.
+        Change an object.
 
-        :raises ValueError: it cannot be made; the text names the object.
+        :raises ValueError: the change is impossible; the text names the object.
         """
         try:
             if item.id in self.scene.cell.names - self.scene.names:
@@ -107,7 +107,7 @@ class _Update:
             raise ValueError(f'object "{shortened(item.id)}": {clause}') from None
 
     def forget(self, which: Callable[[CellBody], bool]) -> None:
-        """Remove the bodies of the scene to which something applies."""
+        """Remove the bodies of the scene that meet a condition."""
         for body in self._own():
             if which(body):
                 self._remove(body.name)
@@ -144,7 +144,7 @@ class _Update:
         if not FRAMES.get(link):
             raise ValueError(f'"{shortened(attached.link_name)}" is no link of this arm')
         shapes = tuple(_shapes(item))
-        if not shapes:  # one of the scene, where it is
+        if not shapes:  # an object of the scene, at its present place
             body = self.scene.cell.body(item.id)
             T_link_body = self._in_link(link, body, self._in_base(body))
             body = replace(body, frame=link, T_frame_body=T_link_body)
@@ -171,7 +171,7 @@ class _Update:
     def _put(self, body: CellBody, *, replaces: bool = False) -> None:
         cell, names = self.scene.cell, self.scene.names
         if replaces and body.name in cell.names:
-            cell = cell.without(body.name)  # with the pairs that may touch
+            cell = cell.without(body.name)  # and without its pairs that may touch
         self.scene = SceneBodies(cell=cell.with_bodies([body]), names=names | {body.name})
 
     def _remove(self, name: str) -> None:
@@ -180,7 +180,7 @@ class _Update:
         )
 
     def _allow(self, name: str, links: Iterable[str]) -> None:
-        """Let a body touch links, and other bodies; those that the cell does not have are left."""
+        """Allow a body to touch links and other bodies; names that the cell lacks are ignored."""
         names = {link.removeprefix(self._place.prefix) for link in links}
         known = {_LINK_OF_FRAME.get(each, each) for each in names}
         known &= {*LINK_NAMES, *self.scene.cell.names} - {name}
@@ -221,7 +221,7 @@ def _operation(item: Any) -> _Operation:
 
 
 def _with_shapes(body: CellBody, shapes: Iterable[PlacedShape], T_body_new: Pose) -> CellBody:
-    """Return a body with more shapes, whose own frame is ``new``."""
+    """Return a body with more shapes, which are given in the frame ``new``."""
     more = (PlacedShape(each.shape, T_body_new @ each.T_body_shape) for each in shapes)
     return replace(body, shapes=(*body.shapes, *more))
 

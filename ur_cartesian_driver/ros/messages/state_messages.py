@@ -131,9 +131,9 @@ def status_message(
     Return the state of the connection and the modes of the robot.
 
     Each field has the value of the same name in the connection status or in the robot's state;
-    only ``speed_scaling`` has the value of ``effective_speed``, and what concerns the running goal
-    comes from its progress. The topic is published when the connection, a mode or who slows the
-    goal changes, and at least once a second.
+    only ``speed_scaling`` has the value of ``effective_speed``, and ``feed_override`` and
+    ``slowed_by`` come from the progress of the running goal. The topic is published when the
+    connection, a mode or a cause in ``slowed_by`` changes, and at least once a second.
 
     :param progress: of the running goal; None = no goal runs.
     """
@@ -157,7 +157,7 @@ def status_message(
 def slowed_by(
     state: RobotState | None, progress: Progress | None
 ) -> Iterator[tuple[str, float, str]]:
-    """Yield who slows the running goal, to which fraction of the speed, and a reason or ''."""
+    """Yield each cause that slows the running goal, its speed fraction, and a reason or ''."""
     if state is None or progress is None:
         return
     if state.target_speed_fraction < 1.0:

@@ -110,7 +110,7 @@ def declared_values(
             parameter = node.declare_parameter(
                 declaration.name, declaration.default, declaration.descriptor()
             )
-        # For example (), which rclpy takes for bytes and check() for an empty list.
+        # For example of (), which rclpy takes for bytes, but check() for an empty list.
         except (InvalidParameterException, InvalidParameterTypeException) as error:
             raise ParameterError(f'Parameter {declaration.name}: {error}.') from None
         values[declaration.name] = plain_value(parameter.value)

@@ -44,7 +44,7 @@ def yaml_value(text: str, name: str) -> ParameterValue:
     """
     Return the value of a YAML text, with the types that ROS 2 gives to its scalars.
 
-    :param name: of the text, for the message.
+    :param name: the name of the text, for the message.
     :raises ParameterError: the text is not YAML.
     """
     try:
@@ -94,7 +94,7 @@ def _sections(content: object, path: str = '') -> Iterator[tuple[str, object]]:
 
 
 class _Loader(yaml.SafeLoader):
-    """Reads plain scalars as rcl does (rcl_yaml_param_parser, parse.c); PyYAML needs 1.0e-1."""
+    """Reads scalars as rcl does (rcl_yaml_param_parser, parse.c); PyYAML takes 1e-1 for text."""
 
 
 def _truth(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> bool:

@@ -179,7 +179,7 @@ class CommandServices:
             return completed_answer(str(error))
 
     def _call(self, call: ServiceCall, _: Any = None) -> Future[ServiceAnswer]:
-        # A goal that is being planned depends on the settings that it found.
+        # A goal that is being planned depends on the settings at the start of its planning.
         if isinstance(call, calls.SettingCall) and not self._is_idle():
             return completed_answer(
                 'A goal, live session or freedrive is using the present value; end it, then try '

@@ -22,7 +22,7 @@ class ContactAction:
     def __init__(self, node: Node, driver: Driver) -> None:
         """Start to serve."""
         self._driver = driver
-        #: The goal whose watch the driver has; None = none.
+        #: The goal that watches; None = none.
         self._watching: Any = None
         self._server = DeferredActionServer(  # type: ignore[no-untyped-call]  # rclpy's
             node,

@@ -68,7 +68,7 @@ class DeferredService:
 
 
 class RequestQueue:
-    """Answers requests one after the other in a thread of its own; refuses too many of them."""
+    """Answers requests one by one, in a thread of its own; refuses them if too many wait."""
 
     def __init__(
         self, purpose: str, answer: Callable[[Any], Any], refuse: Callable[[str], Any]
@@ -76,7 +76,7 @@ class RequestQueue:
         """
         Create the thread.
 
-        :param purpose: what the requests are for, after "requests to".
+        :param purpose: the purpose of the requests, worded to follow "requests to".
         :param answer: takes a request and returns the response; it raises nothing.
         :param refuse: returns the response of a request that is not answered; takes the reason.
         """
@@ -109,7 +109,7 @@ class RequestQueue:
         return response
 
     def close(self) -> None:
-        """Complete the present request, and refuse those that wait and new ones."""
+        """Complete the present request, and refuse waiting and new ones."""
         self._thread.shutdown(cancel_futures=True)
 
 

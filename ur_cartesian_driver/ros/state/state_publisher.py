@@ -150,7 +150,7 @@ class _StateTopics:
         self._publishes_links = settings.node.publish_link_frames
         self._tf_prefix = settings.planning.tf_prefix
         self._arm: Arm | None = None
-        #: The stamps of the last messages, as keys: another thread looks into it.
+        #: The stamps of the last messages, as keys, because another thread looks them up.
         self._stamps: dict[tuple[int, int], None] = {}
 
     def has_published(self, stamp: Time) -> bool:

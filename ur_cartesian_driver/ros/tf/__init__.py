@@ -1,3 +1,3 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The frames that a goal may name."""
+"""The frames of tf2 that a goal may name."""

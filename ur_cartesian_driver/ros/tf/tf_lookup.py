@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Frames of other nodes, from tf2 if that is installed; tf2 is not on PyPI.
+Frames of other nodes, from tf2 if it is installed; tf2 is not on PyPI.
 
-A goal is refused if a transform is missing or old: moving to where a part was some time ago is
-worse than not moving.
+A goal is refused if a transform is missing or old: moving to the former place of a part is worse
+than not moving.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from ur_cartesian_driver.srv import RunScript
 
 
 def _run_scripts(row: UrName, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
-    """Run each script that comes, where ``allow_scripts`` lets the driver; log what goes wrong."""
+    """Run each script that comes, if the driver's ``allow_scripts`` permits it; log failures."""
     driver.client(RunScript, row.source)
 
     def report(done: Future[ServiceAnswer]) -> None:
@@ -37,8 +37,8 @@ class _FreedriveSwitch:
     """
     Switches freedrive with the messages, and off when they stop.
 
-    One call at a time: while it still switches off, the driver would answer 'on' with success.
-    'Off' is repeated until the driver confirms it.
+    There is only one call at a time, because the driver would answer 'on' with success while it
+    still switches off. 'Off' is repeated until the driver confirms it.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class _FreedriveSwitch:
         self._follow()
 
     def _end(self) -> None:
-        """Switch freedrive off, because nobody is left who could."""
+        """Switch freedrive off, because nothing else will."""
         if self._may_be_on:
             self._driver.call(SetBool, self._row.source, SetBool.Request(data=False))
 
@@ -76,7 +76,7 @@ class _FreedriveSwitch:
 
     def _follow(self) -> None:
         """
-        Make the driver do what is wanted, unless a request is pending.
+        Switch freedrive as wanted, unless a call is pending.
 
         'On' is repeated with each message, because a stop of the program ends freedrive.
         """

@@ -3,8 +3,8 @@
 """
 The services of the dashboard client.
 
-Where the driver has a service of the same name it is called, and answers when the robot reports
-the effect. For the other commands the line goes to the dashboard as it is.
+If the driver has a service of the same name, this service is called; it answers when the robot
+reports the effect. All other commands are sent to the dashboard as lines of text.
 """
 
 from __future__ import annotations
@@ -287,7 +287,7 @@ def _services() -> Iterable[UrName]:
     yield Service(
         name=f'{DASHBOARD}/connect',
         type=_NO_FIELDS,
-        # The driver dials for each request: this one shows that the robot answers.
+        # The driver connects for each request, so this one shows that the robot answers.
         source='dashboard/program_running',
         source_type=Trigger,
         words=lambda value: 'The robot answers.',

@@ -26,12 +26,12 @@ ANSWER_TIMEOUT = 60.0
 DISCOVERY_TIMEOUT = 5.0
 #: Older statuses are ignored; the driver publishes one every second [s].
 STATUS_TIMEOUT = 5.0
-#: Period in which waiting calls are looked at [s].
+#: Period in which waiting calls are checked [s].
 CHECK_PERIOD = 0.2
 
 
 class DriverSilent(Exception):
-    """The driver's node does not answer; the text says what was asked."""
+    """A call to the driver's node gets no answer; the text says why."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -59,7 +59,7 @@ class DriverNode:
         Prepare to call.
 
         :param node: the node that calls.
-        :param name: of the driver's node; without a leading ``/`` it is relative to the
+        :param name: the name of the driver's node; without a leading ``/`` it is relative to the
             namespace of ``node``.
         """
         self.node, self.name = node, name
@@ -107,7 +107,7 @@ class DriverNode:
         self._on_close.append(callback)
 
     def client(self, kind: Any, name: str) -> Any:
-        """Return the client of a service of the driver's node; each has one."""
+        """Return the client of a service of the driver's node; each service has one client."""
         with self._lock:
             if name not in self._clients:
                 self._clients[name] = self.node.create_client(
@@ -193,7 +193,7 @@ class DriverNode:
             _finish(call.future, DriverSilent(text))
 
     def _takes_for_sending(self, call: _PendingCall) -> bool:
-        """Return whether this thread sends a call, as one does once the service is there."""
+        """Claim a call for this thread to send; False = it is sent, or its service is missing."""
         with self._lock:
             if call.is_sent or not call.client.service_is_ready():
                 return False

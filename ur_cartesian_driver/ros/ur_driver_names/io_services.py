@@ -39,7 +39,7 @@ _DIGITAL = (
     (8, SetIO.Request.CONFIGURABLE_DIGITAL),
     (0, SetIO.Request.STANDARD_DIGITAL),
 )
-#: The outputs of each function of SetIO have the pins 0 to this one.
+#: The last pin of the outputs of each function of SetIO.
 _LAST_PIN = {'FUN_SET_DIGITAL_OUT': 17, 'FUN_SET_ANALOG_OUT': 1}
 _TOOL_VOLTAGES = (0, 12, 24)
 
@@ -119,7 +119,7 @@ def _set_payload(row: Service, driver: DriverNode, request: Message) -> Future[S
 
 
 def _set_gravity(row: Service, driver: DriverNode, request: Message) -> Future[ServiceAnswer]:
-    """Set the gravity, which points down in the request and up in the driver's."""
+    """Set the gravity, which points down in the request and up in the driver's request."""
     frame, down = request.gravity.header.frame_id, request.gravity.vector
     if frame.endswith(BASE_LINK):
         up = (down.x, down.y, -down.z)  # base is base_link turned by half a turn about z
@@ -161,7 +161,7 @@ def _row(
     """
     Return the row of a service.
 
-    :param kind: the name of its type; empty = it is called like the driver's.
+    :param kind: the name of its type; empty = the name of the driver's type.
     :param source: the driver's service; empty = it has the same name.
     """
     package = 'std_srvs' if source_type is Trigger else 'ur_msgs'

@@ -27,7 +27,7 @@ from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode, Driv
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import Served, UrName
 
-#: How long the arm may take to the target mode after the last command [s].
+#: How long the arm may take to reach the target mode after the last command [s].
 MODE_TIMEOUT = 30.0
 #: The modes that a goal may have.
 TARGETS = (RobotMode.POWER_OFF, RobotMode.IDLE, RobotMode.RUNNING)
@@ -119,7 +119,7 @@ class _ModeServer:
 
 
 class ModeRun:
-    """What one goal does, in a thread of its own."""
+    """The run of one goal, in a thread of its own."""
 
     def __init__(
         self,
@@ -149,15 +149,15 @@ class ModeRun:
             self._finish(True, self._go())
         except (_Ended, DriverSilent) as error:
             self._finish(False, str(error))
-        except Exception as error:  # a goal without a result would refuse all later ones
+        except Exception as error:  # a goal without a result would block all later ones
             self._driver.warn(traceback.format_exc())
             self._finish(False, f'A defect of set_mode: {type(error).__name__}: {error}.')
 
     def _go(self) -> str:
         """
-        Bring the robot to the target.
+        Bring the robot to the target mode.
 
-        :raises _Ended: it cannot be reached.
+        :raises _Ended: the mode cannot be reached.
         """
         goal = self.handle.request
         target = _target(goal.target_robot_mode)
@@ -224,7 +224,7 @@ class ModeRun:
         self._wait(lambda: self._mode is target, f'The robot is not {target.name}')
 
     def _play(self) -> None:
-        """Start the robot program: headless ours, else the loaded one."""
+        """Start the robot program: in headless mode ours, else the loaded one."""
         if self._status.program_running:
             return
         request = GetParameters.Request(names=['headless_mode'])
@@ -236,7 +236,7 @@ class ModeRun:
         """
         Call a service of the driver, and wait for its answer.
 
-        :raises _Ended: it failed, or the goal was cancelled.
+        :raises _Ended: the service failed, or the goal was cancelled.
         """
         self._check()
         answer = self._driver.call(Trigger, service, Trigger.Request())

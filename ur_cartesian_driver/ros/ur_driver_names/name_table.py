@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The table of names: all that users of the UR ROS 2 driver call, and what becomes of it here.
+The table of names: everything that users of the UR ROS 2 driver call, and its counterpart here.
 
 The node is built from this table, and the page ``doc/coming_from/ur_driver.md`` is made from it.
 """

@@ -108,7 +108,7 @@ def _settings(node: Node) -> NamesSettings:
     :raises ParameterError: a name is unknown or a value invalid.
     """
     declarations = tuple(declarations_of(NamesSettings))
-    # Those of the driver come, too, if they are given to all nodes.
+    # Parameters of the driver come here, too, if they are given to all nodes.
     for name in defaults():
         if node.has_parameter(name):
             node.undeclare_parameter(name)

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The node with the UR driver's names as a process that ends with the driver's.
+A process for the node with the UR driver's names; it ends with the driver's process.
 
-In a process of its own it takes no time from the driver's executor, and its defects stop no arm.
+In this process the node takes no time from the driver's executor, and its defects stop no arm.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ class NamesProcess:
         Start the process.
 
         :param driver: the full name of the driver's node.
-        :param arguments: of the driver's command: remappings and parameters. Parameters of the
-            driver mean nothing here.
+        :param arguments: the arguments of the driver's command: remappings and parameters; the
+            driver's own parameters have no effect.
         """
         own = ['--ros-args', '-r', '__node:=ur_driver_names', '-p', f'driver:={driver}', '--']
         module = f'{__package__}.names_node'

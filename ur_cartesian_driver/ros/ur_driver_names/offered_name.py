@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The rows of the table of names: what each one is called, and how it is offered.
+The kinds of rows in the table of names; each row has a name, and serves it.
 
-Types are texts, ``ur_msgs/srv/SetIO``: the packages of most of them are not on PyPI.
+Types are texts, such as ``ur_msgs/srv/SetIO``, because most of their packages are not on PyPI.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class UrName:
     type: str
     #: The driver's topics, services or actions that serve it, separated by commas; empty = none.
     source: str = ''
-    #: The only release that has it; empty = all have.
+    #: The only release that has the name; empty = all releases have it.
     release: str = ''
 
     def is_in(self, release: str) -> bool:
@@ -55,7 +55,7 @@ class UrName:
         Start to serve; by default there is nothing to do.
 
         :param kind: the class of the type.
-        :returns: what the node has to keep, and to ``close()`` if it can be.
+        :returns: an object that the node keeps, and closes if it has a method ``close()``.
         """
         return None
 
@@ -94,13 +94,13 @@ class Served(UrName):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Topic(UrName):
-    """A topic that is published with each message of one of the driver's."""
+    """A topic that relays the messages of one of the driver's topics."""
 
     kind: str = 'topic'
 
     #: The class of the messages of the driver's topic.
     source_type: Any
-    #: Returns the message for one of the driver's; None = nothing is published.
+    #: Converts a message of the driver's topic; None = nothing is published.
     convert: Callable[[Any, Message, NamesSettings], Message | None]
     #: Late subscribers get the last message.
     latched: bool = False
@@ -108,7 +108,7 @@ class Topic(UrName):
     repeated: bool = False
 
     def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
-        """Publish what the driver publishes."""
+        """Publish the converted messages of the driver."""
         return _Relay(self, driver, settings, kind)
 
 
@@ -135,7 +135,7 @@ class _Relay:
         )
 
     def _listen_if_heard(self) -> None:
-        """Take messages only while somebody wants them: each costs a millisecond."""
+        """Take messages only while there are subscribers: each message costs a millisecond."""
         is_heard = self._publisher.get_subscription_count() > 0
         if is_heard and self._subscription is None:
             self._listen(STATE_QOS)
@@ -165,12 +165,12 @@ def same_request(row: Service, driver: DriverNode, request: Message) -> Future[S
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Service(UrName):
-    """A service that calls one of the driver's, and responds when that has answered."""
+    """A service that calls one of the driver's services, and responds with its answer."""
 
     kind: str = 'service'
 
-    #: The class of the driver's service; None = the source is a topic of which the node keeps the
-    #: last message.
+    #: The class of the driver's service; None = the source is a topic whose last message the node
+    #: keeps.
     source_type: Any
     #: Starts the driver's call for a request; gets the row, too.
     call: Call = same_request
@@ -178,9 +178,9 @@ class Service(UrName):
     timeout: float = ANSWER_TIMEOUT
     #: Writes the text of an answer into the fields of the response.
     #:
-    #: :raises ValueError: the text is not what the response can say.
+    #: :raises ValueError: the text does not fit the fields.
     fill: Callable[[Message, str], None] = lambda response, text: None
-    #: Returns what the response says for the text of a successful answer.
+    #: Returns the text of the response for the text of a successful answer.
     words: Callable[[str], str] = str
 
     def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:

@@ -3,10 +3,10 @@
 """
 A sequence of motion primitives as a goal: primitive i becomes point i and segment i.
 
-The fields mean what they mean to motion_primitives_controllers and the UR driver's hardware
-interface: an arc has its goal first and its via second, joint positions are in the order of the
-arm, and a move_time of more than 0 replaces velocity and acceleration; an arc that has both is
-executed at its velocity.
+The fields have the same meaning as in motion_primitives_controllers and in the UR driver's
+hardware interface: an arc has its goal first and its via second, joint positions are in the order
+of the arm, and a move_time of more than 0 replaces velocity and acceleration; an arc that has both
+is executed at its velocity.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ def goal_of_sequence(motions: Sequence[Message], tf_prefix: str) -> Goal:
     Return the goal for the ``motions`` of a ``MotionPrimitiveSequence``.
 
     :param tf_prefix: the prefix of the driver's joint and frame names.
-    :raises InvalidGoal: the sequence is empty, or a primitive cannot be executed as it says; the
-        text names the primitive and its field.
+    :raises InvalidGoal: the sequence is empty, or a primitive cannot be executed; the text names
+        the primitive and its field.
     """
     check_targets(motions)
     primitives = [_Primitive.of(i, motion) for i, motion in enumerate(motions)]
@@ -62,7 +62,9 @@ def goal_of_sequence(motions: Sequence[Message], tf_prefix: str) -> Goal:
 
 def check_targets(motions: Sequence[Message]) -> None:
     """
-    Refuse what the controller rejects: no primitives, unknown types, targets that do not suit one.
+    Refuse an empty sequence, unknown types, and targets that do not suit their type.
+
+    The controller rejects these, too.
 
     :raises InvalidGoal: the text names the primitive and its field.
     """
@@ -74,7 +76,7 @@ def check_targets(motions: Sequence[Message]) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Primitive:
-    """A primitive whose fields have been checked, but not yet beside those of the others."""
+    """A primitive whose own fields have been checked, but not yet against other primitives."""
 
     index: int
     message: Message
@@ -186,7 +188,7 @@ def _arguments(index: int, message: Message) -> Mapping[str, float]:
 
 
 def _check_times(primitives: Iterable[_Primitive]) -> None:
-    """Refuse a sequence of which only a part has times."""
+    """Refuse a sequence in which only some primitives have times."""
     first, *others = primitives
     for other in others:
         if bool(other.time) != bool(first.time):
@@ -201,7 +203,7 @@ def _check_times(primitives: Iterable[_Primitive]) -> None:
 
 
 def _frame(primitives: Iterable[_Primitive], base: str) -> str:
-    """Return the frame of all poses; '' = the controller's base, left empty or named."""
+    """Return the frame of all poses; '' = the controller's base, whether named or not."""
     first: str | None = None
     for primitive in primitives:
         for k, pose in enumerate(primitive.message.poses):

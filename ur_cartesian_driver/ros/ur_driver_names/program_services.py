@@ -3,8 +3,8 @@
 """
 The dashboard client's services for program files, which robots with PolyScope X have.
 
-The driver takes and returns programs as text; these services name files. Otherwise any caller
-could read and write any file, so only files in ``program_directory`` are allowed.
+The driver takes and returns programs as text; these services name files. Only files in
+``program_directory`` are allowed; otherwise any caller could read and write any file.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def _download(
 def _response(
     kind: Any, request: Message, answer: ServiceAnswer, settings: NamesSettings
 ) -> Message:
-    """Return the response; of a download, after its text has been written."""
+    """Return the response; for a download, write the program to its file first."""
     response = kind.Response(success=answer.ok, answer=answer.text)
     if not answer.ok:
         return response
@@ -116,7 +116,7 @@ def _response(
 
 
 def _list(response: Message, text: str) -> None:
-    """Fill in the names of the programs; the driver knows no more of them."""
+    """Fill in the names of the programs; the driver knows nothing else about them."""
     information = class_of('ur_dashboard_msgs/msg/ProgramInformation')
     response.programs = [information(name=name) for name in text.splitlines()]
 

@@ -3,8 +3,8 @@
 """
 The action of motion_primitives_controllers: each sequence becomes a goal of the driver's action.
 
-What the controller rejects is rejected here, too: a goal while one runs, and targets that do not
-suit their type. A rejection carries no reason, which therefore is logged.
+This server rejects the same goals as the controller: a goal while another one runs, and targets
+that do not suit their type. The reason is logged, because a rejection carries none.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class _SequenceForwarder(GoalForwarder):
     target_type = FollowCartesianTrajectory
 
     def rejection(self, goal: Message) -> str:
-        """Return why the controller rejects a sequence; empty = it does not."""
+        """Return the reason why the controller rejects a sequence; empty = it does not."""
         try:
             check_targets(goal.trajectory.motions)
         except InvalidGoal as error:
@@ -65,7 +65,7 @@ class _SequenceForwarder(GoalForwarder):
         return self.action.Feedback(current_primitive_index=index)
 
     def result(self, result: Message) -> Message:
-        """Return code and sentence, the latter with the name of the driver's code."""
+        """Return a result; for a failure, its text begins with the name of the driver's code."""
         code = ErrorCode(result.error_code)
         if code is ErrorCode.SUCCESSFUL:
             return self.action.Result(error_string=result.error_string)

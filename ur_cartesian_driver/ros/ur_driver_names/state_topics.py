@@ -30,7 +30,7 @@ def _same(kind: Any, message: Message, settings: NamesSettings) -> Message:
 
 
 def _percent(kind: Any, message: Message, settings: NamesSettings) -> Message:
-    """Return 0 to 100: what that driver publishes, although its documentation says 0 to 1."""
+    """Return 0 to 100, as the UR driver publishes, although its documentation says 0 to 1."""
     return kind(data=100.0 * message.data)
 
 

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The action of the tool contact controller: each goal becomes one of the driver's own action.
+The action of the tool contact controller: each goal becomes a goal of the driver's own action.
 
-As there, a goal is rejected while another one watches. Goals and results have no fields, so the
-reason why a goal is aborted is logged.
+Like the controller, the server rejects a goal while another one watches. Goals and results have no
+fields, so the reason why a goal is aborted is logged.
 """
 
 from __future__ import annotations

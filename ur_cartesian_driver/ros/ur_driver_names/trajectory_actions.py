@@ -3,8 +3,8 @@
 """
 The actions of the trajectory controllers: each forwards its goals to the driver's joint action.
 
-What a controller of ros2_control rejects is rejected here, before the driver sees it. Goals get
-the tolerances that the UR driver's configuration gives them.
+Goals that a controller of ros2_control rejects are rejected here, before the driver sees them. All
+others get the tolerances of the UR driver's configuration.
 """
 
 from __future__ import annotations
@@ -34,20 +34,20 @@ from ur_cartesian_driver.ros.ur_driver_names.driver_node import DriverNode
 from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import Served, UrName
 
-#: From the UR driver's configuration of its controllers: how far a joint may be off its path [rad]
-#: and, at the end, off its last point [rad], and how fast it may still be there [rad/s].
+#: From the UR driver's configuration of its controllers: largest distance of a joint from its path
+#: [rad] and, at the end, from its last point [rad], and its largest speed there [rad/s].
 PATH_TOLERANCE, GOAL_TOLERANCE, STOPPED_VELOCITY = 0.2, 0.1, 0.2
-#: In place of a goal_time_tolerance of 0, which there means no bound [s].
+#: In place of a goal_time_tolerance of 0, which means no bound to ros2_control [s].
 NO_TIME_TOLERANCE = 3600.0
 #: Largest velocity at the last point that counts as rest [rad/s].
 REST = 1e-6
-#: How long the driver's action may be gone before its goals are given up [s]; period of the look.
+#: How long the driver's action may be gone before its goals are given up [s]; check period [s].
 LOST_TIMEOUT, LOOK_PERIOD = 5.0, 1.0
 
 
 def rejection(trajectory: Message, now: int) -> str:
     """
-    Return why a controller of ros2_control rejects a trajectory; empty = it does not.
+    Return the reason why a controller of ros2_control rejects a trajectory; empty = it does not.
 
     :param now: time of the node's clock [ns].
     """
@@ -79,7 +79,7 @@ def with_default_tolerances(goal: Message, tolerance: Any) -> Message:
     """
     Return a goal with the tolerances that ros2_control's controller would use.
 
-    There 0 means the value of the configuration, and a negative value no bound.
+    To this controller, 0 means the value of the configuration, and a negative value no bound.
 
     :param tolerance: the class of ``JointTolerance``.
     """
@@ -128,16 +128,16 @@ class ForwardedGoal:
         #: The driver's goal; None = the driver has not accepted it yet.
         self.forwarded: Any = None
         self.seconds_lost = 0.0
-        #: Who published feedback when the goal was sent; a driver that is started again differs.
+        #: The publishers of feedback when the goal was sent; a restarted driver has others.
         self.publishers: Endpoints = frozenset()
 
 
 class GoalForwarder(ABC):
-    """An action server whose goals an action of the driver executes."""
+    """An action server that forwards its goals to an action of the driver."""
 
-    #: A goal replaces the one that runs; if not, it is rejected meanwhile.
+    #: Whether a new goal replaces the running one; if not, the new one is rejected.
     preempts = False
-    #: The class of the driver's action; None = it is the class of the action that is served.
+    #: The class of the driver's action; None = the class of the served action.
     target_type: Any = None
 
     def __init__(
@@ -162,10 +162,10 @@ class GoalForwarder(ABC):
         )
         steady_timer(node, LOOK_PERIOD, self._look_for_driver, group)
 
-    # -- what subclasses convert ------------------------------------------------------------------
+    # -- conversions of subclasses ---------------------------------------------------------------
 
     def rejection(self, goal: Message) -> str:
-        """Return why a goal is rejected; empty = it is not."""
+        """Return the reason for rejecting a goal; empty = it is accepted."""
         return ''
 
     def forward(self, run: ForwardedGoal) -> None:
@@ -177,7 +177,7 @@ class GoalForwarder(ABC):
         return feedback
 
     def result(self, result: Message) -> Message:
-        """Return the result of the goal for that of the driver's goal."""
+        """Convert the result of the driver's goal."""
         return result
 
     @abstractmethod
@@ -187,7 +187,7 @@ class GoalForwarder(ABC):
     # -- the same for all ------------------------------------------------------------------------
 
     def send(self, run: ForwardedGoal, goal: Message) -> None:
-        """Send the driver's goal for a goal."""
+        """Send a goal to the driver, on behalf of a client's goal."""
         run.publishers = self._publishers()
         self._client.send_goal_async(
             goal,
@@ -281,7 +281,7 @@ class _TrajectoryForwarder(GoalForwarder):
     """The action of a trajectory controller."""
 
     preempts = True
-    #: Goals get the tolerances of ros2_control's controller.
+    #: Whether goals get the tolerances of ros2_control's controller.
     has_defaults = True
 
     def rejection(self, goal: Message) -> str:
@@ -327,7 +327,7 @@ def _row(
 
 
 TRAJECTORY_ACTIONS = (
-    # Its release for Lyrical has no scaled controller: the other one scales.
+    # The UR driver's release for Lyrical has no scaled controller: the other one scales.
     _row('scaled_joint_trajectory_controller/follow_joint_trajectory', release='jazzy'),
     _row('joint_trajectory_controller/follow_joint_trajectory'),
     _row('passthrough_trajectory_controller/follow_joint_trajectory', _PassthroughForwarder),
