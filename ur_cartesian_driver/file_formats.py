@@ -23,7 +23,7 @@ _LOG = logging.getLogger(__name__)
 
 
 class FileFormats(Generic[_Format]):
-    """All formats of one group: those that are read, or those that are written."""
+    """All formats of one group: the formats to read, or the formats to write."""
 
     def __init__(
         self, group: str, built_in: Mapping[str, str], refusals: tuple[type[Exception], ...]
@@ -55,7 +55,7 @@ class FileFormats(Generic[_Format]):
                 _LOG.warning('the entry points of %s are damaged; reinstall it', package.name)
                 continue
             for entry in entries:
-                # Of a package that is installed twice (with an overlay), only the first is used.
+                # If a package is installed twice (with an overlay), only the first one is used.
                 found.setdefault(entry.name.lower(), {}).setdefault(package.name, entry)
         return found
 

@@ -100,8 +100,8 @@ def private_ros_graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]
 
 def _lock_domain(domain: int, stack: contextlib.ExitStack) -> bool:
     """Lock a domain until the stack closes; return False if another run has locked it."""
-    # A name without a file, in Linux's abstract namespace: no user of the computer can leave a
-    # lock behind that another one may not open, and processes share it that share the network.
+    # The socket has a name in Linux's abstract namespace, and no file. So no user can leave a lock
+    # behind that others may not open, and processes with the same network share the lock.
     lock = stack.enter_context(socket.socket(socket.AF_UNIX))
     try:
         lock.bind(f'\0ur_cartesian_driver_test_domain_{domain}')

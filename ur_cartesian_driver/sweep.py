@@ -89,7 +89,7 @@ class Variant:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Margins:
-    """How close a planned motion comes to limits at which goals are refused; NaN = not known."""
+    """Distances of a planned motion from the limits at which goals are refused; NaN = unknown."""
 
     #: Smallest distance of any joint from its limits [rad].
     joint_limit: float = nan
@@ -130,7 +130,7 @@ def at_places(
     rz: Sequence[float] = (0.0,),
 ) -> list[Variant]:
     """
-    Return each variant at all places of a grid around the place that it has already.
+    Return each variant at all places of a grid around its present place.
 
     Coordinates are the sums of all offsets, for the axes that have several values.
 
@@ -198,7 +198,8 @@ def sweep(
     Plan goals in parallel, and return their results in the order of the goals.
 
     A goal that is refused, or whose planning fails, does not affect the others. Neither does a
-    goal that ends its process, unless ``executor`` is given: if this breaks, all goals left fail.
+    goal that ends its process, unless ``executor`` is given: if the executor breaks, all remaining
+    goals fail.
 
     :param goals: variants, or goals and paths for a UR5e in its home position.
     :param executor: runs the planning, and is not shut down; None = a process for each core.
@@ -217,7 +218,7 @@ def sweep(
     results = []
     for variant, result in zip(variants, found, strict=True):
         if isinstance(result, BrokenExecutor):
-            # A process that dies breaks the pool, so each goal left gets a process of its own.
+            # A process that dies breaks the pool, so each remaining goal gets its own process.
             with _processes(1) as pool:
                 (result,) = _gather(pool, [variant], lambda: None)
         results.append(_failed(variant, result) if isinstance(result, Exception) else result)
@@ -392,7 +393,7 @@ def _axes(results: Sequence[SweepResult]) -> list[str]:
     for result in results:
         for name, value in result.variant.coordinates.items():
             values.setdefault(name, set()).add(value)
-    # The arm's calibration only where there is nothing to choose.
+    # The calibration comes last, because nobody can choose it.
     return sorted(values, key=lambda name: (name == 'calibration', -len(values[name])))[:2]
 
 

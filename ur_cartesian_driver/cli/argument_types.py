@@ -69,7 +69,7 @@ class OutputFile(str):
 
 
 def output_file(text: str) -> OutputFile:
-    """Return the name of a file; refuse one that cannot be written before the work begins."""
+    """Return the name of a file; before the work begins, refuse one that cannot be written."""
     try:
         check_writable(text)
     except OSError as error:
@@ -81,7 +81,7 @@ def check_outputs(arguments: argparse.Namespace) -> None:
     """
     Refuse to write over the file that a command reads.
 
-    :raises ValueError: an output is that file, maybe by another name.
+    :raises ValueError: an output is this file, perhaps by another name.
     """
     read = getattr(arguments, 'file', None)
     for written in vars(arguments).values():
@@ -111,7 +111,7 @@ def check_writable(name: str) -> None:
 
 
 def picture_file(text: str) -> OutputFile:
-    """Return the name of a picture; refuse its format or place before the work begins."""
+    """Return the name of a picture; before the work begins, check its format and its place."""
     from ur_cartesian_driver.preview.pictures import check_suffix
 
     try:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""``ur-cartesian cell``: list and draw the bodies of a cell, and find those that touch already."""
+"""``ur-cartesian cell``: list and draw the bodies of a cell, and find the ones that touch."""
 
 from __future__ import annotations
 
@@ -89,16 +89,16 @@ def cell_table(cell: Cell) -> str:
 
 
 def cell_notes(cell: Cell) -> list[str]:
-    """Return the pairs that may touch, and what is odd."""
+    """Return the pairs that may touch, and remarks on oddities."""
     pairs = sorted(map(sorted, cell.may_touch))
     return [*(f'may touch: {a} and {b}' for a, b in pairs), *cell_remarks(cell)]
 
 
 def touching_lines(pairs: Sequence[tuple[Pair, float]], cell: Cell) -> list[str]:
     """
-    Return what is too close, and the field of the cell that allows it.
+    Return the pairs that are too close, and the field of the cell that would allow them.
 
-    :param pairs: each with its distance [m].
+    :param pairs: the pairs, each with its distance [m].
     """
     lines = []
     for (a, b, clearance), distance in pairs:
@@ -119,7 +119,7 @@ def touching_lines(pairs: Sequence[tuple[Pair, float]], cell: Cell) -> list[str]
 def closest_lines(
     cell: Cell, arm: Arm, q: Joints, T_flange_tcp: Pose, tool_radius: float
 ) -> list[str]:
-    """Return how close an arm is that touches nothing."""
+    """Return the smallest distances of an arm that touches nothing."""
     lines = ['nothing touches']
     for title, group in groups_of_pairs(cell).items():
         distances = CellDistances(arm, T_flange_tcp, group, tool_radius)

@@ -55,7 +55,7 @@ def check_robot(arguments: argparse.Namespace) -> int:
             observed = tuple(findings)
             for finding in experiment_findings(address, observed, ask, recordings):
                 findings.append(finding)
-    finally:  # Ctrl-C keeps what was found until then
+    finally:  # Ctrl-C keeps the findings so far
         path, found = Path(arguments.report), report(findings, recordings, address.host)
         path.write_text(json.dumps(_without_nan(found)), encoding='utf-8')
         print(f'\nreport: {path}')
@@ -186,10 +186,10 @@ def report(
 
 
 def _names_of_addresses(host: str) -> dict[str, str]:
-    """Return what the report says in place of the addresses of the robot and of this computer."""
+    """Return the report's names for the addresses of the robot and of this computer."""
     names = {}
     with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.connect((host, 9))  # finds the way to the robot, and sends nothing
+        probe.connect((host, 9))  # finds the route to the robot, and sends nothing
         names[probe.getsockname()[0]] = 'COMPUTER'
         names[probe.getpeername()[0]] = 'ROBOT'
     return names | {host: 'ROBOT'}

@@ -125,7 +125,7 @@ def _add_demo(command: CommandParser) -> None:
     command.add_argument(
         '--picture',
         type=argument_types.picture_file,
-        default=Path('demo.png'),  # not checked as a text would be: matplotlib is optional
+        default=Path('demo.png'),  # no text, which would be checked: matplotlib is optional
         help='picture of the planned and executed path',
     )
     command.add_argument(
@@ -261,7 +261,7 @@ def _add_send(command: CommandParser) -> None:
 
 
 def _add_pose(command: CommandParser) -> None:
-    """Add where the arm stands, and its TCP."""
+    """Add the joint positions of the arm, and its TCP."""
     command.add_argument(
         '--joints',
         type=joints,
@@ -272,7 +272,7 @@ def _add_pose(command: CommandParser) -> None:
 
 
 def _add_planning(command: CommandParser, optional: bool = False) -> None:
-    """Add the goal, and the options that give what a driver would read from its robot."""
+    """Add the goal, and options for the values that a driver would read from its robot."""
     _add_goal(command, optional)
     command.add_argument(
         '--ur-type',

@@ -201,7 +201,7 @@ def process(
         env=environment,
         stdout=stdout,
         text=True,
-        # Ctrl-C reaches only us: we end the processes in order.
+        # Ctrl-C reaches only the demo, which ends its processes in order.
         start_new_session=True,
     )
     try:

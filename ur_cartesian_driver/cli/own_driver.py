@@ -15,7 +15,7 @@ from ur_cartesian_driver.driver import Driver, DriverConfig
 @contextmanager
 def ready_driver(arguments: argparse.Namespace, **settings: Any) -> Iterator[Driver]:
     """
-    Run a driver in headless mode during the block, once the robot of the arguments is ready.
+    Run a driver in headless mode during the block, which begins when the robot is ready.
 
     :param settings: further fields of the driver's configuration.
     :raises RobotNotReady: the robot is not ready in time; the text says what to do.

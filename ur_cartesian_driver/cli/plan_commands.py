@@ -3,8 +3,9 @@
 """
 ``ur-cartesian validate`` and ``show``: check and plan a goal without a driver.
 
-The command line gives what a driver would read from its robot: model, calibration, joint positions
-and TCP. Only ``show --live`` reads joint positions and TCP from a robot. There are no tf2 frames.
+The command line gives the values that a driver would read from its robot: model, calibration,
+joint positions and TCP. Only ``show --live`` reads joint positions and TCP from a robot. There are
+no tf2 frames.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ HELP = (
     'Enter takes a point like the one before; l: a line to it, j: a joint motion, p: a line of a '
     'process, a: here is the middle of an arc, and the next Enter its end; u: undo, q: write, end'
 )
-#: The file of a lesson for which none is named; it is not replaced.
+#: The file of a lesson if none is named; an existing file is not replaced.
 DEFAULT_OUTPUT = 'path.yaml'
 #: Longest time until the arm can be guided, and until the robot holds it again [s].
 FREEDRIVE_TIME = 10.0
@@ -83,9 +83,9 @@ def teach_frame(arguments: argparse.Namespace) -> int:
 
 def _check_options(arguments: argparse.Namespace) -> None:
     """
-    Refuse options of what is not taught.
+    Refuse options that do not belong to the lesson.
 
-    :raises InvalidGoal: one is given.
+    :raises InvalidGoal: such an option is given.
     """
     others: tuple[str, ...] = ()
     if arguments.fixed_tool or arguments.held_part:
@@ -124,7 +124,7 @@ def guide(
     """
     Keep freedrive on while keys are read, and end it afterwards, even after an error.
 
-    The key q ends a lesson that is incomplete only if it comes twice.
+    The key q ends an incomplete lesson only if it comes twice.
 
     :raises RobotNotReady: freedrive does not begin, or ends by itself.
     """
@@ -156,7 +156,7 @@ def guide(
 
 
 class Taught(Protocol):
-    """What keys teach while the arm is guided."""
+    """A lesson that keys build up while the arm is guided."""
 
     #: The meanings of the keys.
     HELP: ClassVar[str]
@@ -165,7 +165,7 @@ class Taught(Protocol):
         """Carry out a key, and return a text about the result; InvalidGoal = not taken."""
 
     def missing(self) -> str:
-        """Return a sentence that says what the lesson lacks; '' = it may end."""
+        """Return a sentence on the parts that the lesson lacks; '' = it may end."""
 
 
 class Lesson:

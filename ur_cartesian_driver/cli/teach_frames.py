@@ -18,7 +18,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector3, vector3
 from ur_cartesian_driver.motion.goal.known_frames import BASE, TOOL0
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
-#: Touches of the tip of a fixed tool: one more than its position needs; and points of a part.
+#: Least touches of the tip of a fixed tool, one more than its position needs; points of a part.
 MIN_TIPS, MIN_POINTS = 2, 4
 #: Points nearer than this give no direction [m].
 _MIN_DISTANCE = 0.005
@@ -36,7 +36,7 @@ class _FrameLesson(ABC):
         """
 
     def missing(self) -> str:
-        """Return a sentence: why the touches make no frame yet; '' = they do."""
+        """Return a sentence on the reason why the touches make no frame yet; '' = they do."""
         try:
             self.report()
         except InvalidGoal as error:
@@ -64,7 +64,7 @@ class FixedToolLesson(_FrameLesson):
         self._touches: list[tuple[str, Vector3]] = []
 
     def press(self, key: str, state: RobotState) -> str:
-        """Carry out a key where the TCP is, and return a text about the result."""
+        """Carry out a key at the TCP's present place, and return a text about the result."""
         if key == 'u':
             return _undone(self._touches)
         if key not in ('', 'z', 'x'):
@@ -110,8 +110,8 @@ class HeldPartLesson(_FrameLesson):
     """
     A part in the hand, whose known points touch the tip of a fixed tool one after the other.
 
-    :param points: places on the part, in its frame [m].
-    :param tip: where they touch, in base [m].
+    :param points: points on the part, in its frame [m].
+    :param tip: the place at which they touch, in base [m].
     """
 
     HELP: ClassVar[str] = (
@@ -136,7 +136,7 @@ class HeldPartLesson(_FrameLesson):
         self._touches: list[Vector3] = []
 
     def press(self, key: str, state: RobotState) -> str:
-        """Carry out a key where the flange is, and return a text about the result."""
+        """Carry out a key at the flange's present pose, and return a text about the result."""
         if key == 'u':
             return _undone(self._touches)
         if key:

@@ -3,12 +3,12 @@
 """
 Two beads side by side, at two speeds, and the dead times of the valve that laid them.
 
-The output switches at the same two places of both beads. At the speed v, a valve that opens a time
-after its output begins the bead ``v * open`` behind the first place, and ends it ``v * close``
-behind the second. So the fast bead begins ``(fast - slow) * open`` behind the slow one, and ends
-``(fast - slow) * close`` behind it. Only these two distances have to be measured: the places and
-the offset of the nozzle cancel out. The lengths of the beads do not suffice: they differ by
-``(fast - slow) * (close - open)``, whatever ``open`` is.
+The output switches at the same two places of both beads. At the speed v, a valve with the dead
+times ``open`` and ``close`` begins a bead ``v * open`` behind the first place, and ends it
+``v * close`` behind the second. So the fast bead begins ``(fast - slow) * open`` behind the slow
+one, and ends ``(fast - slow) * close`` behind it. Only these two distances have to be measured:
+the places and the offset of the nozzle cancel out. The lengths of the beads do not suffice: they
+differ by ``(fast - slow) * (close - open)``, whatever ``open`` is.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ DIRECTIONS = {
 }
 #: The points of the path to which the beads lead.
 BEAD_POINTS = (1, 8)
-#: Shortest time of a bead in which the speed of the arm is reported, once in 40 ms [s].
+#: Shortest time of a bead [s], so that the speed of the arm, reported each 40 ms, is known in it.
 SHORTEST = 0.08
-#: A dead time that is negative by more standard uncertainties is a mistake of the measurement.
+#: A dead time below 0 by more standard uncertainties than this is a mistake of the measurement.
 _MAX_NEGATIVE = 3.0
-#: A ruler shows no smaller part of its uncertainty: a distance below it has another unit.
+#: A ruler shows no distance below its uncertainty divided by this: a smaller one has another unit.
 _FINEST = 4.0
 
 
@@ -92,7 +92,7 @@ class Beads:
         """
         Return the path of both beads, which begins with the run-up to the slow one.
 
-        :param start: where the tool is, with its nozzle as far above the work as for a bead.
+        :param start: the pose of the tool, with its nozzle as high above the work as for a bead.
         """
         path = Path(start).safe(valve, False)
         path = self._bead(path, self.slow, valve).at(speed=TRAVEL_SPEED)
@@ -130,12 +130,12 @@ def dead_times(
     """
     Return the dead times that two beads show.
 
-    Each distance is the difference of two readings. In addition each output switches up to half a
-    cycle before or behind its place, equally likely everywhere in between, which has the standard
-    deviation ``cycle / sqrt(12)``.
+    Each distance is the difference of two readings. In addition, each output switches up to half a
+    cycle before or behind its place. This deviation has a uniform distribution, whose standard
+    deviation is ``cycle / sqrt(12)``.
 
-    :param begins: how far the fast bead begins behind the slow one [m]; ``ends``: how far it ends
-        behind that one.
+    :param begins: distance by which the fast bead begins behind the slow one [m]; ``ends``:
+        distance by which it ends behind the slow one [m].
     :param slow: speed of the slow bead [m/s]; ``fast``: of the fast one.
     :param reading: standard uncertainty of one reading of the ruler [m].
     :param cycle: the cycle time of the controller [s].

@@ -37,7 +37,7 @@ HOW_TO_READ = (
     'reach farther.'
 )
 LATER = 'To measure later, press Ctrl-C now, and then run:'
-#: Below this part of its speed the arm was slowed down by the slider.
+#: Below this fraction of its speed the arm was slowed down by the slider.
 _FULL_SPEED = 0.99
 
 
@@ -46,7 +46,7 @@ def measure_valve(arguments: argparse.Namespace) -> int:
     kind, pin = parse_output(' '.join(arguments.output))
     if kind is OutputKind.STANDARD_ANALOG:
         raise ValueError('output is analog, but valve switches the output; name a digital one.')
-    # Name and output are refused before beads are laid; the times follow from the beads.
+    # A wrong name or output is refused before beads are laid; the times follow from the beads.
     lead = Lead(name=arguments.name, output=kind, pin=pin, open=0.0, close=0.0)
     file = Path(arguments.lead_file)
     if file.exists():
@@ -75,7 +75,7 @@ def measure_valve(arguments: argparse.Namespace) -> int:
     )
     today = date.today().isoformat()
     lead = replace(lead, open=times.open, close=times.close, date=today)
-    # Before the file, which may be one that cannot be written.
+    # Printed first, because it may be impossible to write the file.
     print(report(arguments.name, times, beads.fast))
     write_lead(file, lead)
     print(
@@ -87,7 +87,7 @@ def measure_valve(arguments: argparse.Namespace) -> int:
 
 def lay_beads(driver: Driver, beads: Beads, valve: Output, agrees: Callable[[str], bool]) -> bool:
     """
-    Lay the beads from where the tool is, if the person agrees; return whether they were laid.
+    Lay the beads from the tool's place, if the person agrees; return whether they were laid.
 
     :raises DriverError: the path was refused or not completed, or a bead cannot have its speed.
     :raises RobotNotReady: the robot reports no state, or its slider is below 100 % before or
@@ -129,7 +129,7 @@ def lay_beads(driver: Driver, beads: Beads, valve: Output, agrees: Callable[[str
 
 
 def _check_speeds(beads: Iterable[Sequence[float]]) -> None:
-    """Refuse beads of which one was laid below full speed, or without a report of the speed."""
+    """Refuse the beads if one was laid below full speed, or without a report of the speed."""
     for speeds in beads:
         if not speeds:
             raise RobotNotReady(
@@ -143,7 +143,7 @@ def _check_speeds(beads: Iterable[Sequence[float]]) -> None:
 
 
 def later_command(arguments: argparse.Namespace) -> str:
-    """Return the command that takes the distances of the beads that these arguments laid."""
+    """Return the command that takes the distances later, for beads laid with these arguments."""
     speeds = [f'--slow={arguments.slow:g}', f'--fast={arguments.fast:g}']
     beads = [f'--length={1e3 * arguments.length:g}mm', f'--ruler={1e3 * arguments.ruler:g}mm']
     words = [arguments.name, '--output', *arguments.output, *speeds, *beads]
@@ -153,7 +153,7 @@ def later_command(arguments: argparse.Namespace) -> str:
 
 
 def ask_distance(which: str, read: Callable[[str], str]) -> float:
-    """Return how far behind the slow bead the fast one starts, or ends, as a person says [mm]."""
+    """Ask a person for the distance by which the fast bead starts or ends behind the slow [mm]."""
     while True:
         answer = read(
             f'How far behind the {which} of the slow bead does the fast one {which} [mm]? '
@@ -168,7 +168,7 @@ def ask_distance(which: str, read: Callable[[str], str]) -> float:
 
 
 def report(name: str, times: DeadTimes, speed: float) -> str:
-    """Return what was found, and what it means for a bead at a speed [m/s]."""
+    """Return the dead times, and their uncertainty in a bead at a speed [m/s]."""
     return (
         f'{name} opens {1e3 * times.open:.1f} ms after its output and closes '
         f'{1e3 * times.close:.1f} ms after it, each +/- {1e3 * times.uncertainty:.1f} ms: '

@@ -1,3 +1,3 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of motions: what a client was told, and what a recording has."""
+"""Pictures of motions, from the feedback to a client and from recordings."""
