@@ -110,7 +110,7 @@ def type_name(value: Value) -> str:
     return names.get(type(value), type(value).__name__)
 
 
-#: Types of numbers; a bool is none.
+#: Types of numbers; bool is not among them.
 NUMBERS = frozenset({int, float})
 
 

@@ -37,7 +37,7 @@ from ur_cartesian_driver.urscript.script_errors import CompileError
 MAX_NODES = 400
 
 
-#: The code of the functions compiled lately, see :func:`_function_code`.
+#: Cache of compiled functions, see :func:`_function_code`.
 _functions: dict[Hashable, FunctionCode] = {}
 MAX_FUNCTIONS = 2000
 
@@ -55,8 +55,8 @@ def compile_program(
 
     :param known: the functions that exist already, by the identity of their scopes.
     :param interleaves: whether threads may be switched between any two statements.
-    :param prefix: begin of the names of all generated functions.
-    :raises CompileError: more loops in loops than Python can have.
+    :param prefix: first part of the names of all generated functions.
+    :raises CompileError: loops are nested more deeply than Python allows.
     """
     scopes = list(root.walk())
     functions = {
@@ -81,11 +81,12 @@ def compile_program(
 
 def _function_code(scope: Scope, shared: Shared, names: Hashable) -> FunctionCode:
     """
-    Return the code of a function, which is compiled only once.
+    Return the code of a function, from the cache if possible.
 
     Clients send programs that differ in a constant or two, such as a port.
 
-    :param names: all that the names in the function can mean; None = compile in any case.
+    :param names: the meanings of all names in the function, as a key of the cache; None = compile
+        without the cache.
     """
     key = names, shared.functions[id(scope)], scope.definition
     found = _functions.get(key) if names and scope.definition else None
@@ -109,11 +110,11 @@ class _FunctionCompiler(ExpressionCompiler):
         super().__init__(scope, shared)
         self._function = shared.functions[id(scope)]
         self._parts: list[CodeType] = []
-        #: Loops around the present statement in the present part.
+        #: Number of loops around the current statement in the current part.
         self._loops = 0
-        #: The statements by which the present part leaves code around it; None = this is no part.
+        #: The jumps out of the current part; None = the current code is not in a part.
         self._exits: set[str] | None = None
-        #: Global variables that the present part assigns to.
+        #: Global variables that the current part assigns.
         self._assigned: set[str] = set()
 
     def code(self) -> FunctionCode:
@@ -140,20 +141,20 @@ class _FunctionCompiler(ExpressionCompiler):
         body: list[ast.stmt],
         parameters: Sequence[tree.FunctionParameter] = (),
     ) -> CodeType:
-        """Compile the definition of a function of Python."""
+        """Compile the definition of a Python function."""
         self.at(self._scope.owner)
         if self._assigned:
             body.insert(0, self.node(ast.Global, sorted(self._assigned)))
-        if self._function.suspends:  # also if nothing in it takes time
+        if self._function.suspends:  # a generator even if nothing in it takes time
             body.append(self.if_true(self.constant(False), [self.do(self.wait())]))
-        # Python wants a default for each parameter behind the first one that has one.
+        # Python requires a default for each parameter after the first one with a default.
         optional = [i for i, each in enumerate(parameters) if each.default is not None]
         defaults = len(parameters) - optional[0] if optional else 0
         names = (DEPTH, *(local_name(parameter.name) for parameter in parameters))
         function = self.function(name, names, defaults, body)
         try:
             return compile(ast.Module([function], []), FILE_NAME, 'exec', dont_inherit=True)
-        except SyntaxError as error:  # too many loops in loops
+        except SyntaxError as error:  # too many nested loops
             owner = self._scope.owner
             text = f'syntax_error_on_line:{owner.line}:'
             raise CompileError(owner.line, owner.column, text, error.msg) from None
@@ -161,7 +162,7 @@ class _FunctionCompiler(ExpressionCompiler):
     # Statements of the program
 
     def _block(self, statements: tree.StatementBlock, owner: tree.SyntaxNode) -> list[ast.stmt]:
-        """Compile consecutive statements; all their nodes are paid for at the beginning."""
+        """Compile consecutive statements; the code pays for all their nodes at the beginning."""
         weight = 1
         body: list[ast.stmt] = []
         for run in self._runs(statements):
@@ -174,8 +175,8 @@ class _FunctionCompiler(ExpressionCompiler):
         return [self.pay(weight), exceed, *body]
 
     def _runs(self, statements: tree.StatementBlock) -> Iterator[tree.StatementBlock]:
-        """Divide statements into runs; each of several ones is compiled as a part."""
-        # The variables of a function are not global.
+        """Divide statements into runs; a run of several statements is compiled as a part."""
+        # Parts share global variables only, so the code of a function is not divided.
         sizes = [0 if self._scope.definition else _count_nodes(each) for each in statements]
         if sum(sizes) < 2 * MAX_NODES:
             yield from ((statement,) for statement in statements)
@@ -190,7 +191,7 @@ class _FunctionCompiler(ExpressionCompiler):
             yield statements[begin:]
 
     def _part(self, statements: tree.StatementBlock) -> tuple[list[ast.stmt], int]:
-        """Compile statements as a function of their own; all their variables are global."""
+        """Compile statements as a separate Python function; all their variables are global."""
         around = self._loops, self._exits, self._assigned
         self._loops, exits, self._assigned = 0, set[str](), set()
         self._exits = exits
@@ -221,7 +222,7 @@ class _FunctionCompiler(ExpressionCompiler):
         ], weight
 
     def _leave(self, jump: str) -> ast.stmt:
-        """Leave a loop, or the function; outside of loops, `break` and `continue` do that, too."""
+        """Leave a loop or the function; a part returns the jump to the code that calls it."""
         if self._loops and jump != _RETURN:
             return self.node(ast.Break if jump == _BREAK else ast.Continue)
         if self._exits is None:
@@ -230,7 +231,7 @@ class _FunctionCompiler(ExpressionCompiler):
         return self.node(ast.Return, self.constant(jump))
 
     def _statement_at_switch(self, node: tree.Statement) -> tuple[list[ast.stmt], int]:
-        """Compile a statement before which threads may be switched; return also its cost."""
+        """Compile a statement, after a place for a thread switch; return the code and its cost."""
         if isinstance(node, tree.LabelStatement | tree.FunctionDefinition):
             return [], 0
         python, weight = self._statement(node)
@@ -292,7 +293,7 @@ class _FunctionCompiler(ExpressionCompiler):
         return [self.set(name, value.python)], 1 + value.weight
 
     def _assigned_variable(self, name: str, qualifier: str = '') -> str:
-        """Return the name of a variable that is assigned to."""
+        """Return the generated name of an assigned variable; note it if it is global."""
         variable = self.variable(name, qualifier)
         if variable == global_name(name):
             self._assigned.add(variable)
@@ -312,7 +313,7 @@ class _FunctionCompiler(ExpressionCompiler):
         return [*python, self.set(name, changed)], 1 + value.weight + weight
 
     def _path(self, target: tree.Expression) -> tuple[tree.NameExpression, list[ast.expr], int]:
-        """Return the variable, the keys of its part from outside to inside, and their cost."""
+        """Return the variable, the keys of its part (the outermost first), and their cost."""
         if isinstance(target, tree.NameExpression):
             return target, [], 0
         assert isinstance(target, tree.FieldExpression | tree.IndexExpression)
@@ -387,7 +388,7 @@ class _FunctionCompiler(ExpressionCompiler):
 
 
 def _count_nodes(node: tree.SyntaxNode) -> int:
-    """Return the number of nodes that are compiled with a node."""
+    """Count the nodes of a tree, without function definitions: these are compiled separately."""
     if isinstance(node, tree.FunctionDefinition):
         return 0
     return 1 + sum(map(_count_nodes, tree.children(node)))

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Compiles expressions to expressions of Python.
+Compiles URScript expressions to Python expressions.
 
 Numbers are nearly always floats, so an operation on two of them is Python's own; everything else
 is a call of one of the `operations`. Lists are values in this language: a list that is stored,
@@ -28,7 +28,7 @@ from ur_cartesian_driver.urscript.compiling.scopes import bind, Builtin, Scope
 from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
 from ur_cartesian_driver.urscript.script_values import Value
 
-#: Operators that Python has for floats, and which of them return a truth value.
+#: Python's operators for floats.
 _ARITHMETIC: dict[str, ast.operator] = {
     '+': ast.Add(), '-': ast.Sub(), '*': ast.Mult(), '/': ast.Div(),
 }  # fmt: skip
@@ -46,15 +46,15 @@ class CompiledExpression:
 
     python: ast.expr
     weight: int = 1
-    #: Whether the value is True or False.
+    #: Whether the value is a bool.
     is_truth: bool = False
-    #: Whether evaluating it twice costs next to nothing and changes nothing.
+    #: Whether a second evaluation is cheap and has no effect.
     is_simple: bool = False
 
 
 @dataclass(slots=True)
 class Shared:
-    """What the functions of a program have in common."""
+    """The data that all functions of a program share."""
 
     builtins: Mapping[str, Builtin]
     interleaves: bool
@@ -70,7 +70,7 @@ class ExpressionCompiler(PythonWriter):
         self._scope = scope
         self._shared = shared
         self._temporaries = 0
-        #: Values that the code finds by name; none of them can change.
+        #: Immutable values that the code looks up by name.
         self._constants: dict[str, Value] = {}
 
     def temporary(self) -> str:
@@ -120,7 +120,7 @@ class ExpressionCompiler(PythonWriter):
         raise AssertionError(node)
 
     def condition(self, node: tree.Expression) -> CompiledExpression:
-        """Compile an expression of which only the truth counts."""
+        """Compile an expression as a condition, whose value is a bool."""
         return self._truth(self.expression(node))
 
     def _truth(self, code: CompiledExpression) -> CompiledExpression:
@@ -155,7 +155,7 @@ class ExpressionCompiler(PythonWriter):
         return isinstance(node, stored) and not isinstance(code.python, ast.Constant)
 
     def _twice(self, code: CompiledExpression) -> tuple[ast.expr, ast.expr]:
-        """Return code that evaluates an expression, and code that has its value afterwards."""
+        """Return code that evaluates an expression, and code that reads its value again."""
         if code.is_simple:
             return code.python, code.python
         name = self.temporary()
@@ -240,7 +240,7 @@ class ExpressionCompiler(PythonWriter):
         return CompiledExpression(self.choose(is_quick, quick, slow), weight, is_truth)
 
     def _is_fixed(self, code: CompiledExpression) -> bool:
-        """Return whether nothing but this function changes the value of simple code."""
+        """Return whether only the compiled function itself can change the value of simple code."""
         return isinstance(code.python, ast.Constant) or (
             isinstance(code.python, ast.Name) and not code.python.id.startswith('g_')
         )
@@ -253,7 +253,11 @@ class ExpressionCompiler(PythonWriter):
         right: ast.expr,
         right_is_simple: bool,
     ) -> ast.expr | None:
-        """Return a condition for Python's own operation, which also evaluates both operands."""
+        """
+        Return the condition for Python's own operation; None if both operands are constants.
+
+        The condition also evaluates both operands.
+        """
         check = self.is_number if symbol in _COMPARISONS else lambda x: self.has_type(x, 'float')
         checks = [
             check(operand)
@@ -262,7 +266,7 @@ class ExpressionCompiler(PythonWriter):
         ]
         if len(checks) < 2 or right_is_simple:
             return self.both(checks) if checks else None
-        # `and` would leave out the right operand if the left one is no float.
+        # `and` would skip the right operand if the check of the left one fails.
         return self.node(ast.BinOp, checks[0], ast.BitAnd(), checks[1])
 
     def _logical(self, node: tree.LogicalExpression) -> CompiledExpression:
@@ -356,7 +360,7 @@ class ExpressionCompiler(PythonWriter):
 
 
 def _number(python: ast.expr) -> int | float | None:
-    """Return the value of a constant that is a number, with its sign; None = it is none."""
+    """Return the signed value of a numeric constant; None = other code."""
     if isinstance(python, ast.Constant) and values.is_number(python.value):
         number: int | float = python.value
         return number

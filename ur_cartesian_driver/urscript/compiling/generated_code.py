@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Python code that was made of a program, and the way back from it to the program's text.
+Python code generated from a program, and the way back from it to the program's text.
 
-Each function and thread of a program is a function of Python; one that can take time is a
-generator function. Their instructions have the lines and columns of the program's text, so the
-position of an error, or of a call, is that of its instruction.
+Each function and thread of a program becomes a Python function; if it can take time, a generator
+function. The instructions have the lines and columns of the program's text, so an error or a call
+has the position of its instruction.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ MAX_CALL_DEPTH = 100
 #: take time.
 SWITCH = object()
 
-#: The steps of a thread, up to the next time that it takes time or lets another thread run.
+#: The steps of a thread. Each step ends when the thread takes time or lets another thread run.
 ScriptSteps = Generator[Any, None, Value]
 #: Line and column.
 Place = tuple[int, int]
@@ -53,9 +53,9 @@ class GeneratedFunction:
 class FunctionCode:
     """The code of a function and of its parts."""
 
-    #: Each defines a function of Python when it is executed.
+    #: Each defines a Python function when executed.
     units: Sequence[CodeType]
-    #: Values that the code finds by name; none of them can change.
+    #: Immutable values that the code looks up by name.
     constants: dict[str, Value]
 
 
@@ -93,7 +93,7 @@ def place_of_call(frame: FrameType | None) -> Place:
 
 
 def place_of_steps(steps: ScriptSteps) -> Place:
-    """Return the place in generated code at which a thread waits; 0, 0 = it does not."""
+    """Return the place in generated code at which a thread waits; 0, 0 = it does not wait."""
     place = (0, 0)
     inner: Iterator[Any] | None = steps
     while isinstance(inner, GeneratorType):
@@ -104,7 +104,7 @@ def place_of_steps(steps: ScriptSteps) -> Place:
 
 
 def runtime_exception(error: Exception) -> RuntimeException:
-    """Turn an error of generated code, or of what it has called, into one with a place."""
+    """Turn an error of generated code or its callees into a runtime exception with a place."""
     traceback, innermost = error.__traceback__, None
     while traceback is not None:
         if traceback.tb_frame.f_code.co_filename == FILE_NAME:

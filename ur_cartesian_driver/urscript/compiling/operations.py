@@ -1,9 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What generated code calls where Python's own operation is not that of the language.
+Operations for generated code, where Python's own operations differ from the language.
 
-Each of them pays for the items of long values, which take longer than one node of the tree.
+Each operation pays for the items of long values, because these take longer than one node of the
+tree.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ class Runtime(Protocol):
 
 
 def operations(runtime: Runtime) -> dict[str, Any]:
-    """Return the names that generated code uses, beside those of the program and its builtins."""
+    """Return the operations by name, as global names for generated code."""
 
     def pay(items: int) -> None:
         runtime.fuel -= items
@@ -72,13 +73,13 @@ def operations(runtime: Runtime) -> dict[str, Any]:
             runtime.exceed_budget()
 
     def paid(value: Value) -> Value:
-        """Return the result of a builtin."""
+        """Return the result of a builtin; pay for its items."""
         if type(value) in SIZED:
             pay(values.size_of(value))
         return value
 
     def copied(value: Value) -> Value:
-        """Return a value that is stored or passed on."""
+        """Return a copy of a value, to store it or pass it on; pay for its items."""
         if type(value) is list and FLOATS.issuperset(map(type, value)):
             pay(len(value))
             return value[:]
@@ -101,7 +102,7 @@ def operations(runtime: Runtime) -> dict[str, Any]:
         return values.get_part(container, key)
 
     def call(target: Value, method: str, arguments: list[Value]) -> Value:
-        """Call a method; the result may be a generator, which then takes time."""
+        """Call a method; if the result is a generator, the call takes time."""
         if isinstance(target, values.RemoteObject):
             return target.call(method, arguments)
         # Shifting the items of a list is quicker than copying them.
@@ -114,7 +115,7 @@ def operations(runtime: Runtime) -> dict[str, Any]:
         def binary(a: Value, b: Value) -> Value:
             kind_a, kind_b = type(a), type(b)
             if compute is not None and (kind_a is list or kind_b is list):
-                # Nearly all lists have floats only; none of the results needs a check.
+                # Nearly all lists contain only floats; their results need no check.
                 if kind_b in NUMBERS:
                     if FLOATS.issuperset(map(type, a)):
                         pay(len(a) + 1)
@@ -169,5 +170,5 @@ def _halt() -> NoReturn:
 
 
 def _refuse_depth() -> NoReturn:
-    """Raise the error of a function that is called too deeply, at the place of the call."""
+    """Raise the error for calls nested too deeply, at the place of the call."""
     raise recursion_error(*place_of_call(sys._getframe(2)))

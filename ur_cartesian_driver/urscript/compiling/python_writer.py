@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Makes nodes of Python's syntax tree that have the places of a program's syntax tree."""
+"""Makes nodes of Python's syntax tree with the places of the program's nodes."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _LOAD, _STORE = ast.Load(), ast.Store()
 
 
 class PythonWriter:
-    """Makes nodes at the place of one node of the program, until the next one is chosen."""
+    """Makes nodes at the place of a program's node; `at` chooses that node."""
 
     def __init__(self) -> None:
-        #: Arguments of all nodes that are made now.
+        #: Position arguments of the next nodes.
         self._place: dict[str, Any] = {}
 
     def at(self, node: tree.SyntaxNode) -> None:
-        """Give all nodes from now on the place of a node."""
+        """Set the place of all nodes made from now on."""
         line, column = node.line, node.column
         self._place = {
             'lineno': line, 'col_offset': column, 'end_lineno': line, 'end_col_offset': column,
@@ -123,7 +123,7 @@ class PythonWriter:
         """
         Return the definition of a function.
 
-        :param defaults: number of the last parameters that are UNSET in a call without them.
+        :param defaults: number of parameters, counted from the last, with the default UNSET.
         """
         arguments = ast.arguments(
             posonlyargs=[],
@@ -132,7 +132,7 @@ class PythonWriter:
             kw_defaults=[],
             defaults=[self.name('UNSET')] * defaults,
         )
-        # Type parameters are wanted from Python 3.12 on.
+        # Python 3.12 and later require type parameters.
         wanted: dict[str, Any] = (
             {'type_params': []} if 'type_params' in ast.FunctionDef._fields else {}
         )

@@ -81,7 +81,7 @@ def resolve(
     """
     Check a program and return the scope of its body.
 
-    :param enclosing: scope of the program that this one continues; that scope is not changed.
+    :param enclosing: scope of the program that this program continues; it stays unchanged.
     :raises CompileError: a name is unknown, or a call has wrong arguments.
     """
     root = Scope(
@@ -206,7 +206,7 @@ class _NameChecker:
 
     def _function(self, scope: Scope, definition: tree.FunctionDefinition) -> None:
         inner = scope.functions[definition.name]
-        if inner.definition is not definition:  # replaced by a later definition of its name
+        if inner.definition is not definition:  # a later definition has replaced this one
             return
         self.block(inner, definition.parameters)
         self.block(inner, definition.body)

@@ -8,8 +8,8 @@ This module parses programs and statements; expressions are in
 
 Line ends do not matter: a statement ends where its expression cannot continue, so `a = 1 b = 2`
 are two statements, and an operator at the end of a line continues the expression. There are two
-exceptions: the value of `return` must be on the line of `return`, and a further text of a label on
-the line of the label's first text.
+exceptions: the value of `return` must be on the line of `return`, and all texts of a label must be
+on one line.
 
     program     = ("def" | "sec") NAME "(" ")" ":" block "end"
     block       = { statement }
@@ -94,7 +94,7 @@ class Parser(ExpressionParser):
     def __init__(self, text: str) -> None:
         super().__init__(text)
         self._loops = 0
-        #: The first token of the first block whose `end` is in another column than that token.
+        #: The first token of the first block that begins and ends in different columns.
         self._misaligned: Token | None = None
 
     # Programs, functions and blocks

@@ -51,7 +51,7 @@ class TokenKind(Enum):
 
 
 class Token(NamedTuple):
-    """A token; the `text` of a string is what is between its quotes."""
+    """A token; the `text` of a string excludes its quotes."""
 
     kind: TokenKind
     text: str

@@ -4,8 +4,8 @@
 Compiles lines for a running program, as in interpreter mode.
 
 A line is any number of statements or function definitions. Each line sees the global variables and
-functions of the program and of earlier lines. The variables and functions that lines define can be
-forgotten, all of them at once.
+functions of the program and of earlier lines. The program can forget the variables and functions
+of all lines at once.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ class LineCompiler:
         return CompiledLine(self._steps(code), calls)
 
     def _steps(self, code: GeneratedCode) -> ScriptSteps:
-        """Return the steps of a line, whose constants are dropped after them."""
+        """Return the steps of a line; its constants are dropped after the last step."""
         steps, (statements, *_) = self._runtime.begin(code), code.code
         if not statements.constants:
             return steps

@@ -11,9 +11,9 @@ that evaluates more nodes than its budget in one frame ends the program with an 
 The manual guarantees less than this, so two settings make the order of threads less certain. With
 `thread_delay` a new thread begins some frames later. With `interleaving` threads take turns at
 random: in a random order, between any two statements, and before an assignment stores its value in
-a global variable, except in a critical section. A critical section is no lock; it only stops these
-switches. If a thread takes time in one, the other threads run and may enter critical sections,
-too, and a thread that is killed in one blocks no other.
+a global variable, except in a critical section. A critical section is not a lock; it only stops
+these switches. If a thread takes time in one, the other threads run and can enter critical
+sections, too. A thread that is killed in one blocks no other thread.
 
 The program ends when its main thread ends, and all other threads end with it. When a thread ends
 by itself, the threads that it started continue; when it is killed, they are killed, too.
@@ -51,9 +51,10 @@ BUDGET_EXCEEDED = (
     'The program used too much time without instructing the robot what to do. '
     'Consider using a Wait or sync() in the loop.'
 )
-#: The manual gives no limit; threads that start threads would soon use all time and memory.
+#: The manual gives no limit; without one, threads that start threads would soon use all time and
+#: memory.
 MAX_THREADS = 256
-#: Probability that threads are switched at a place where they can be.
+#: Probability of a thread switch at each place where one is possible.
 SWITCH_PROBABILITY = 0.1
 
 
@@ -122,7 +123,7 @@ class ScriptInterpreter:
         self.on_thread_end: Callable[[Hashable], None] | None = None
         #: Set by `pause`; a step does nothing until `resume`.
         self.paused = False
-        #: The runtime exception that ended the program; None = no exception has.
+        #: The runtime exception that ended the program; None = no exception.
         self.error: RuntimeException | None = None
         self.fuel = 0
         self.interleaves = interleaving is not None
@@ -171,7 +172,7 @@ class ScriptInterpreter:
 
     @property
     def location(self) -> tuple[int, int]:
-        """Line and column of the running call; for the builtin that is called."""
+        """Line and column of the running call, for use in the called builtin."""
         return place_of_call(sys._getframe())
 
     @property
@@ -288,7 +289,7 @@ class ScriptInterpreter:
             self._end(thread)
 
     def _end(self, thread: _Thread) -> None:
-        """End a thread; it is the current one meanwhile, so that builtins clean up for it."""
+        """End a thread as the current thread, so that builtins clean up for it."""
         thread.alive = False
         previous, self._current = self._current, thread
         try:
