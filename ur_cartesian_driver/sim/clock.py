@@ -19,8 +19,8 @@ from typing import Literal, Protocol
 #: therefore asks to be woken this much too early, and sleeps for the remaining time.
 _LOOP_GRAIN = 0.001
 #: A clock that is late by more than this [s] (suspended process, overloaded machine) restarts
-#: instead of catching up. While it caught up, no client could answer in time, because robot
-#: programs count their timeouts (commonly 0.2 s) in cycles, which would be shorter then.
+#: instead of catching up. Robot programs count their timeouts (commonly 0.2 s) in cycles, and
+#: cycles would be so short while the clock caught up that no client could answer in time.
 _MAX_LAG = 0.1
 _MAX_SAMPLES = 20_000
 

@@ -74,20 +74,20 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 #: The controller's clock at the start [s]: RTDE clients believe that a controller that has been
 #: up for less than 40 s is still booting.
 START_TIME = 60.0
-#: Number of past cycles whose joint positions programs can ask for.
+#: Number of past cycles whose joint positions programs can read.
 MAX_HISTORY = 100
 _MAX_POPUPS = 100
 #: The first major version of PolyScope X.
 POLYSCOPE_X = 10
 #: Error code of a protective stop (C209).
 _PROTECTIVE_STOP_CODE = 209
-#: Delay [s] of the unlocking of a protective stop after a client's `set unlock protective stop`.
-#: Assumed; it is only known that a real robot does not unlock immediately.
+#: Time [s] from a client's `set unlock protective stop` until the stop is unlocked. Assumed: it is
+#: only known that a real robot does not unlock immediately.
 UNLOCK_TIME = 0.02
 
 
 class CycleFaults(Protocol):
-    """The faults of a controller, as the controller's cycle uses them."""
+    """The fault injector, as the controller's cycle uses it."""
 
     #: Whether `step` has to be called in each cycle.
     active: bool
@@ -195,8 +195,8 @@ class Controller:
         """
         The controller's clock as clients read it [s].
 
-        The time that was skipped because this computer was too busy is included: otherwise clients
-        that compare timestamps with their own clock would consider the states too old.
+        It includes the skipped time: otherwise clients that compare timestamps with their own
+        clock would consider the states too old.
         """
         return self.time + self.skipped_time
 
@@ -271,7 +271,7 @@ class Controller:
         """
         Return the actual joint positions of an earlier cycle [rad].
 
-        :param steps: how many cycles ago.
+        :param steps: number of cycles before the last one.
         :raises RuntimeException: ``steps`` is negative, or larger than the history.
         """
         if not 0 <= steps < MAX_HISTORY:
@@ -303,7 +303,7 @@ class Controller:
         self.actual.step()
         self._joint_history.append(self.actual.q)
         self._report_motion_events()
-        # Also if the emergency stop is released while the arm still moves.
+        # The power is cut even if the emergency stop is released while the arm still moves.
         self._cuts_power |= self.safety.mode in POWERLESS
         if self._cuts_power and self.at_rest:
             self._cuts_power = False
@@ -369,7 +369,7 @@ class Controller:
             self.ownership.brake()
 
     def run_preamble(self) -> None:
-        """Set what the installation sets in front of a program that the pendant starts."""
+        """Apply the installation's settings, which precede a program started on the pendant."""
         self.motion.motion_version = self.config.motion_version
 
     def begin_program(self) -> None:
@@ -377,7 +377,7 @@ class Controller:
         self.motion.begin_program()
 
     def end_modes(self) -> None:
-        """End the modes and settings that end with a program."""
+        """End the modes and settings that do not outlive a program."""
         self.freedrive = FreedriveState.OFF
         self.contact.force_mode = None
         self.motion.path_offset.end_of_program()
@@ -419,7 +419,7 @@ class Controller:
 
     def load_program(self, name: str) -> str:
         """
-        Load a program by its file name; return the reason of a refusal, else an empty string.
+        Load a program by its file name; return the reason for a refusal, else an empty string.
 
         Directories in the name are ignored.
         """
@@ -439,7 +439,7 @@ class Controller:
 
     def load_program_aside(self, name: str, then: Callable[[str], None]) -> None:
         """
-        Load a program as :meth:`load_program` does, after compiling it beside the cycles.
+        Load a program like :meth:`load_program`, but compile it in parallel with the cycles first.
 
         :param then: called with the result, at once or later.
         """
@@ -452,21 +452,21 @@ class Controller:
             then(self.load_program(name))
 
     def _stored_program(self, file: str) -> SavedProgram | None:
-        """Return a stored program, as text unless it is generated when it is played."""
+        """Return a stored program: its text, unless the text is generated when it is played."""
         program = self.stored_programs.program(file)
         if isinstance(program, ProgramTree) and not program.has_external_control:
             return program.script(file, FetchedScript())
         return program
 
     def power_on(self) -> str:
-        """Power up to IDLE; return the reason of a refusal, else an empty string."""
+        """Power up to IDLE; return the reason for a refusal, else an empty string."""
         if self.safety.mode in POWERLESS:
             return f'the safety mode is {self.safety.mode.name}'
         self.power.on(self.time)
         return ''
 
     def release_brakes(self) -> str:
-        """Power up to RUNNING; return the reason of a refusal, else an empty string."""
+        """Power up to RUNNING; return the reason for a refusal, else an empty string."""
         if self.safety.mode in POWERLESS:
             return f'the safety mode is {self.safety.mode.name}'
         self.power.release_brakes(self.time)
@@ -480,7 +480,7 @@ class Controller:
 
     def safety_event(self, event: SafetyEvent, reported: bool = False) -> str:
         """
-        Pass an event to the safety system; return the reason of a refusal, else an empty string.
+        Pass an event to the safety system; return the reason for a refusal, else an empty string.
 
         :param reported: whether the error code of the protective stop has been sent already.
         """

@@ -114,7 +114,7 @@ class SimulatedRobot:
         :param clock: the clock for the cycles; None = a clock with the rate of the configuration.
         """
         self.config = config or SimulatorConfig()
-        #: The error that has ended the thread; None = none has.
+        #: The error that has ended the thread; None = no error.
         self._failure: Exception | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         #: Called in the robot's thread with a peer's port and the bytes received from this peer.
@@ -292,7 +292,7 @@ class SimulatedRobot:
         while True:
             await self._clock.next_cycle()
             if self._compiler is not None and isinstance(self._clock, VirtualClock):
-                # Runs repeat: a program starts in a cycle that no speed of this computer changes.
+                # Runs are repeatable: no program starts later because this computer is slow.
                 await self._compiler.wait_until_idle()
             self.controller.skipped_time = self._clock.skipped
             self.controller.step()
@@ -375,7 +375,7 @@ class SimulatedRobot:
         self.call(lambda _: self._faults.add(*parsed))
 
     def clear_faults(self) -> None:
-        """Forget faults that have not happened and end those that last."""
+        """Forget pending faults and end lasting faults."""
         self.call(lambda _: self._faults.clear())
 
     def set_speed_slider(self, fraction: float) -> None:
@@ -446,7 +446,7 @@ class SimulatedRobot:
         """
         Answer the windows of the pendant that request a value: open ones first, then later ones.
 
-        :param answers: what the person types: `yes` or `no` for a boolean, a number, or a text.
+        :param answers: the typed answers: `yes` or `no` for a boolean, a number, or a text.
         """
         self.call(lambda controller: controller.pendant.answers.extend(map(str, answers)))
 

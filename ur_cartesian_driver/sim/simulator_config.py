@@ -84,8 +84,8 @@ class SimulatorConfig:
     #: Rotation [rad] that takes as long in a movel as a metre; 4 was recorded, the manual has 1.
     #: movec, movep and optimovel use 1.
     turn_ratio: float = ASSUMED_LAWS.turn_ratio
-    #: Measured laws, by which this robot moves; laws that were not measured are assumed. They
-    #: come before ``turn_ratio``, figures of ``imperfections`` and, in motion version 2,
+    #: Measured laws of this robot's motion; laws that were not measured are assumed. Measured laws
+    #: override ``turn_ratio``, figures of ``imperfections`` and, in motion version 2,
     #: ``blend_fraction``. The twin must be of this model, software and motion version.
     twin: Twin | None = None
     #: Motion version of movej and movel at the start, and of programs that are played: 1 or, from
@@ -123,8 +123,8 @@ class SimulatorConfig:
     contacts: Sequence[ContactBody | str] = ()
     #: Digital inputs that are on from the start, such as 'standard 3'.
     inputs: Sequence[str] = ()
-    #: What the person at the pendant types when programs request values, in this order; a program
-    #: that requests more waits.
+    #: Answers of the person at the pendant when programs request values, in this order; a program
+    #: that requests more values waits.
     answers: Sequence[object] = ()
     contact_bodies: tuple[ContactBody, ...] = field(init=False, default=())
     #: ``imperfections`` with the figures of the twin.
@@ -135,12 +135,12 @@ class SimulatorConfig:
     #: threads switch only when the running thread calls a function that takes time.
     interleaving_seed: int | None = None
     #: Programs that can be loaded: file name -> URScript, or the tree of a program on the pendant.
-    #: `external_control.urp` is a node of External Control unless a program here has that name.
+    #: `external_control.urp` has a node of External Control unless a program here has that name.
     programs: Mapping[str, SavedProgram] = field(default_factory=dict)
     #: Name of the program that is loaded from the start; empty = an empty, unnamed program.
     program: str = ''
-    #: Host and port of External Control in the installation: from there its node fetches its
-    #: program when it is played.
+    #: Host and port of External Control in the installation; its node fetches its program from
+    #: there when it is played.
     external_control_host: str = '127.0.0.1'
     external_control_port: int = 50002
 

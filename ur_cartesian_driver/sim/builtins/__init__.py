@@ -7,10 +7,10 @@ To add a function, add a public method to the class of its subject; a function t
 belongs to ``urscript/core_builtins.py``. Programs can call every public method of the classes in
 :data:`BUILTIN_GROUPS` by the method's name. The parameters of a method have the names and defaults
 of the script manual, because programs can pass arguments by name. A function that takes time is a
-generator that yields once per controller cycle. One that only checks its arguments is marked with
-`without_effect`. `scripts/make_script_functions.py` makes the page doc/script_functions.md from
-the methods, their first lines and these marks. `test/sim/programs` has at least one program for
-each function.
+generator that yields once per controller cycle. A function that only checks its arguments is
+marked with `without_effect`. `scripts/make_script_functions.py` makes the page
+doc/script_functions.md from the methods, the first lines of their docstrings and these marks.
+`test/sim/programs` has at least one program for each function.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The base class of all groups of script functions, and the mark of those without an effect.
+The base class of all groups of script functions, and the mark of functions without an effect.
 
 The package :mod:`~ur_cartesian_driver.sim.builtins` says how to add a function.
 """
@@ -19,7 +19,7 @@ _WITHOUT_EFFECT: set[Callable[..., Any]] = set()
 
 
 def without_effect(function: F) -> F:
-    """Mark a script function that only checks its arguments: what it sets is not simulated."""
+    """Mark a script function whose effect is not simulated: it only checks its arguments."""
     _WITHOUT_EFFECT.add(function)
     return function
 
@@ -30,7 +30,7 @@ def has_effect(function: Callable[..., Any]) -> bool:
 
 
 class BuiltinGroup:
-    """The functions of one subject: a subclass has them as public methods, see the package."""
+    """The functions of one subject, as the public methods of a subclass; see the package."""
 
     def __init__(self, controller: Controller) -> None:
         """Give the functions access to the state of this controller."""

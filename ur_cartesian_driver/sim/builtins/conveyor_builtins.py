@@ -4,8 +4,8 @@
 Conveyors and their encoders; the simulated belts stand still.
 
 No pulses arrive, so only programs change the tick count of an encoder. While a belt is tracked,
-the moves of a program are ordinary moves, because the belt does not move. A program that changes
-the tick count of the tracked belt is ended, because the arm would have to follow the belt.
+the moves of a program are ordinary moves, because the belt does not move. Changing the tick count
+of the tracked belt ends the program, because the arm would have to follow the belt.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ def _runstate(count: int, states: int = RUN_STATES) -> Callable[[Any, Value, Val
 
 
 def _runstate_list(count: int) -> Callable[[Any, Value], None]:
-    """Return the older script function, given a list of the outputs to be high in a program."""
+    """Return the older script function; its list has the outputs that are high in a program."""
 
     @without_effect
     def choose(_: Any, outputs: Value) -> None:

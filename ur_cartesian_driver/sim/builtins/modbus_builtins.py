@@ -39,7 +39,7 @@ MAX_REGISTERS = 123
 class _Signal:
     values: list[Value]
     is_output: bool
-    #: How many values a program may write.
+    #: Number of values that a program can write.
     writable: int
 
     @property
@@ -213,7 +213,7 @@ def _given(
     signal: _Signal, kind: type, signal_name: Value, value: Value, name: str
 ) -> list[Value]:
     """
-    Return the values to write, one or a list.
+    Return the values to write, as a list; a program passes one value or a list.
 
     :param kind: the type that the values of the signal must have.
     :param name: the argument's name.

@@ -27,8 +27,8 @@ from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState, Step
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import Struct, Value
 
-# The defaults that a signature shows. A program that leaves `a` or `v` out passes these very
-# objects, and gets the values of the robot's own laws.
+# The defaults in the signatures. A call without `a` or `v` passes these very objects, and then the
+# robot's own laws supply the values.
 _JOINT_A, _JOINT_V = ASSUMED_LAWS.timed_joint_acceleration, ASSUMED_LAWS.timed_joint_speed
 _LINEAR_A, _LINEAR_V = ASSUMED_LAWS.timed_linear_acceleration, ASSUMED_LAWS.timed_linear_speed
 

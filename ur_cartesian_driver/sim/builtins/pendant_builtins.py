@@ -24,7 +24,7 @@ class _Requested:
     name: str
     #: The type of the value on the primary interface.
     number: int
-    #: Converts what the person typed, or raises ValueError.
+    #: Converts the typed text, or raises ValueError.
     read: Callable[[str], Value]
 
 

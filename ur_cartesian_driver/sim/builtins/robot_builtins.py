@@ -34,9 +34,9 @@ from ur_cartesian_driver.urscript.script_values import (
     Value,
 )
 
-#: The clock of the system (`time(2)`) when the controller's clock is 0: 2026-01-01 00:00 GMT [s].
+#: System time (`time(2)`) at time 0 of the controller's clock: 2026-01-01 00:00 GMT [s].
 SYSTEM_TIME = 1_767_225_600
-#: Largest joint position that set_pos takes [rad]; of a robot it is not known.
+#: Largest joint position that set_pos accepts [rad]; the bound of a real robot is not known.
 MAX_TURN = 1000.0
 
 
@@ -200,7 +200,7 @@ class RobotBuiltins(BuiltinGroup):
         )
 
     def _change_payload(self, payload: Payload) -> None:
-        """Set the payload; this zeroes the force sensor too, which CB3 arms do not have."""
+        """Set the payload and zero the force sensor; CB3 arms have no sensor to zero."""
         self._controller.payload = payload
         if self._controller.config.robot_model.series != 'CB3':
             self._controller.contact.zero()

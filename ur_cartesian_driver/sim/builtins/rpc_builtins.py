@@ -35,7 +35,7 @@ from ur_cartesian_driver.urscript.script_values import (
 
 #: A longer answer [bytes] is treated as an error of the server.
 MAX_ANSWER = 1024 * 1024
-#: Size of the parts in which a request is sent [bytes]; the socket keeps four of them.
+#: Size of the parts in which a request is sent [bytes]; the socket buffers up to four parts.
 MAX_PART = 16_384
 
 

@@ -22,9 +22,9 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import INT_MAX, INT_MIN, to_text, Value
 
 CONNECT_TIMEOUT = 2.0
-#: Largest number of reads of one socket in a cycle; a further read waits for the next
-#: cycle. Without it, a peer that never stops writing would keep the program reading for ever; with
-#: it, TCP's flow control slows the peer down. The bound of a real controller is not published.
+#: Largest number of reads of one socket in a cycle; a further read waits for the next cycle.
+#: Without this bound, a peer that never stops writing would keep the program reading for ever.
+#: With it, TCP's flow control slows the peer down. A real controller's bound is not published.
 READS_PER_CYCLE = 32
 #: Most values in one read of numbers; most characters in one string that is read without a suffix.
 MAX_NUMBERS, MAX_CHARACTERS = 30, 1023

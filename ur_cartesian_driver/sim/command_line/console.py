@@ -30,7 +30,7 @@ def run_command(
     ended_by = signal.SIGINT
 
     def end(number: int, frame: FrameType | None) -> None:
-        """Do what Ctrl-C does here: within asyncio.run(), cancel the main task."""
+        """Act like Ctrl-C: within asyncio.run(), cancel the main task."""
         nonlocal ended_by
         ended_by = signal.Signals(number)
         interrupt = signal.getsignal(signal.SIGINT)
@@ -53,14 +53,14 @@ def run_command(
         _discard_unwritten_output()
         notes = getattr(error, '__notes__', ())
         is_output_closed = isinstance(error, BrokenPipeError)
-        if notes or not is_output_closed:  # as of `| head`, which has seen enough
+        if notes or not is_output_closed:  # `| head` closes it on purpose
             with contextlib.suppress(OSError):
                 print(f'{name}: {"; ".join([_sentence(error), *notes])}', file=sys.stderr)
         return SIGNAL_STATUS + signal.SIGPIPE if is_output_closed else 1
 
 
 def _sentence(error: Exception) -> str:
-    """Return the text of an error; that of the system without its number, behind the file."""
+    """Return the text of an error; for a system error, its file and its text without a number."""
     if isinstance(error, OSError) and error.filename and error.strerror:
         return f'{error.filename}: {error.strerror}'
     return str(error)

@@ -32,7 +32,7 @@ from ur_cartesian_driver.sim.programs.stored_programs import (
 from ur_cartesian_driver.sim.simulated_robot import SimulatedRobot
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 
-#: The model of a robot for which neither an option nor a twin names one.
+#: The model of the robot if neither an option nor a twin names one.
 _MODEL = 'ur5e'
 
 
@@ -63,7 +63,7 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
     programs, loaded = {}, ''
     if arguments.programs:
         found = [file for file in arguments.programs.iterdir() if file.suffix in _READERS]
-        # PolyScope writes a .script beside each .urp, which comes later and takes its place.
+        # PolyScope writes a .script beside each .urp; the .urp comes later and replaces it.
         programs = dict(map(_read_if_possible, sorted(found, key=lambda file: file.suffix)))
     if arguments.program and _is_built_in(arguments.program):
         loaded = str(arguments.program)
@@ -89,12 +89,12 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
 
 
 def _is_built_in(file: Path) -> bool:
-    """Return whether a name means a program that every simulated robot has."""
+    """Return whether a name means a built-in program; an existing file takes precedence."""
     return str(file) in BUILT_IN_PROGRAMS and not file.exists()
 
 
 def _read_if_possible(file: Path) -> tuple[str, SavedProgram]:
-    """Read a program file; if that fails, list it all the same, and refuse to load it."""
+    """Read a program file; an unreadable file is listed, too, but the robot refuses to load it."""
     try:
         return _read_program(file)
     except (OSError, ValueError) as error:
@@ -106,7 +106,7 @@ def _read_program(file: Path) -> tuple[str, SavedProgram]:
     """
     Return the name by which a program file is loaded, and the program.
 
-    :raises ValueError: the file is no program, or has a node that the simulator does not run.
+    :raises ValueError: the file is not a program, or has a node that the simulator does not run.
     :raises OSError: the file cannot be read.
     """
     return _READERS.get(file.suffix, _read_script)(file)

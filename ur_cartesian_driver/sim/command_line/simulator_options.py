@@ -25,7 +25,7 @@ def add_simulator_options(command: argparse.ArgumentParser) -> None:
     """Add all options of the simulator."""
     take_negative_numbers(command)
     add_model(command, '--model')
-    command.set_defaults(model='')  # that of the twin, else ur5e
+    command.set_defaults(model='')  # the twin's model, else ur5e
     _add_network(command)
     _add_arm(command)
     _add_surroundings(command)
