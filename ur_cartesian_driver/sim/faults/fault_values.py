@@ -3,7 +3,7 @@
 """
 The faults of the simulated robot: each fault is a value that contains its effect and its trigger.
 
-`fault_parser` reads faults from text; `injector` makes them happen.
+`fault_parser` reads faults from text; `injector` triggers them.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class FaultEvent(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EventFault(Fault):
-    """An event of safety, power or program for which the client did not ask."""
+    """An event of safety, power or program that the client did not request."""
 
     action: FaultEvent
 

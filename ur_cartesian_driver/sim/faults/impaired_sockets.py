@@ -39,7 +39,7 @@ class ImpairedSockets:
         self._sockets.open(name, address, port)
 
     def state(self, name: str) -> SocketState:
-        """Return the state of a socket; a delay also delays the end of its data."""
+        """Return the state of a socket; it stays open until the delayed bytes have arrived."""
         state = self._sockets.state(name)
         impaired = self._impaired.get(name)
         if impaired is None or state is not SocketState.CLOSED or name not in self._names:

@@ -67,7 +67,7 @@ class DelayLine:
             self.size += len(data)
 
     def clear(self) -> None:
-        """Lose what is held back."""
+        """Lose the bytes that are held back."""
         self._pieces.clear()
         self.size = 0
 
@@ -110,11 +110,11 @@ class ImpairedConnection:
 
     @property
     def is_drained(self) -> bool:
-        """Whether all data have come through that will."""
+        """Whether no bytes are held back, and the connection is not frozen."""
         return not (self.frozen or self.incoming.size or self.outgoing.size)
 
     def freeze(self) -> None:
-        """Carry no data any more, nor what is held back."""
+        """Carry no more data, and lose the bytes that are held back."""
         self.frozen = True
         self.incoming.clear()
         self.outgoing.clear()

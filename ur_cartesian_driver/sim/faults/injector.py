@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Makes faults happen to the simulated robot when they are triggered.
+Injects faults into the simulated robot when they are triggered.
 
 :class:`FaultInjector` uses the controller's clock, so it is as deterministic as the controller.
 While no fault is set, the injector costs no time.
@@ -71,7 +71,7 @@ _ACTIONS: Mapping[FaultEvent, Callable[[Controller], object]] = {
 
 @dataclass(slots=True)
 class _PendingFault:
-    """A fault that has not happened yet, with time and travel of the TCP when it was set."""
+    """A pending fault, with the time and the travel of the TCP when it was set."""
 
     fault: Fault
     set_at: float
@@ -94,7 +94,7 @@ class _ActiveFault:
 
 
 class FaultInjector:
-    """The faults of one robot: those that wait for their trigger and those that last."""
+    """The faults of one robot: pending ones, which wait for their trigger, and lasting ones."""
 
     def __init__(self, controller: Controller) -> None:
         """Begin without faults."""
@@ -131,7 +131,7 @@ class FaultInjector:
 
     def clear(self) -> None:
         """
-        Forget faults that have not happened, and end those that last.
+        Forget pending faults, and end lasting faults.
 
         Effects that have happened remain: a stop, a dropped or half-open connection.
         """
@@ -226,7 +226,7 @@ class FaultInjector:
         )
 
     def _impairments(self) -> dict[str, Impairment]:
-        """Return interface -> impairment, which combines all faults of the interface."""
+        """Return the impairment of each interface, combined from all its faults."""
         found: dict[str, Impairment] = {}
         for running in self._active:
             fault = running.fault

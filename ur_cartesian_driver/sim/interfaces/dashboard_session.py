@@ -29,7 +29,7 @@ from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 _log = logging.getLogger(__name__)
 
-#: The states of a program in the words of dashboard and Robot API.
+#: The states of a program in the words of the dashboard and the Robot API.
 RUNTIME_WORDS = {
     RuntimeState.STOPPING: 'STOPPED',
     RuntimeState.STOPPED: 'STOPPED',
@@ -229,16 +229,16 @@ _VALUES: Mapping[str, str] = {
 
 
 class DashboardSession(ClientSession):
-    """Answers one command after the other, some of them when the robot has carried them out."""
+    """Answers commands in order; some answers wait until the robot has carried them out."""
 
     def __init__(self, controller: Controller) -> None:
-        """Begin with the right to control that the client has on connecting."""
+        """Note whether the client may control the robot, as decided when it connects."""
         self._controller = controller
         self._may_control = controller.takes_scripts
         self._handlers = DashboardHandlers(controller)
         self._server = DashboardServerCodec(controller.config.version[:2])
         self._requests: deque[DashboardRequest | str] = deque()
-        #: The answer to the first request, while it is being made.
+        #: The generator of the answer to the first request; None = not begun.
         self._answering: Generator[None, None, bytes] | None = None
 
     @property
@@ -251,7 +251,7 @@ class DashboardSession(ClientSession):
         return encode_line(BANNER)
 
     def feed(self, data: bytes) -> bytes:
-        """Take a part of a line; return the answers that are available, one line to each line."""
+        """Take bytes of commands; return the answers that are available, one line per command."""
         if data:
             self._requests += self._server.feed(data)
         answers = b''

@@ -21,12 +21,12 @@ from ur_cartesian_driver.sim.programs.script_upload import (
 #: Error code of a script port that is read-only.
 READ_ONLY = 210
 
-#: Published programs send the number behind it without a blank.
+#: In published programs the number follows without a blank.
 _SET_SPEED = 'set speed'
 _CONTROL: Mapping[str, Callable[[Controller], object]] = {
     'power on': Controller.power_on,
     'power off': Controller.power_off,
-    # The question of a robot that has been switched on: not asked here.
+    # A real robot asks for this after it is switched on; the simulator does not.
     'confirm user safety parameters': lambda _: None,
     'set robotmode run': Controller.release_brakes,
     'set unlock protective stop': Controller.unlock_soon,

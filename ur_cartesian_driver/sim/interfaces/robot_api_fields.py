@@ -14,7 +14,7 @@ from typing import Any
 
 from ur_cartesian_driver.sim.controller import Controller
 
-#: Fields of a request; those of a form are bytes.
+#: Fields of a request; the fields of a form are bytes.
 Body = Mapping[str, Any]
 #: Fields of an answer.
 Fields = Mapping[str, Any]
@@ -31,7 +31,7 @@ class Refused(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A request whose answer is due when the robot has carried it out, or cannot."""
+    """A request that is answered when the robot has carried it out, or has failed."""
 
     #: Raises `Refused` if the request has failed.
     is_done: Callable[[Controller], bool]
@@ -40,7 +40,7 @@ class Waiting:
 
 def read_body(data: bytes, content_type: str) -> Body:
     """
-    Return the fields of a request: of a form with files, otherwise of a JSON object.
+    Return the fields of a request, which is a form with files or a JSON object.
 
     :raises ValueError: the body is neither.
     """

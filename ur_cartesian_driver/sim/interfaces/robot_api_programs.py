@@ -96,7 +96,7 @@ def _file(body: Body) -> bytes:
     """
     Return the file of a form.
 
-    :raises ValueError: there is none.
+    :raises ValueError: the form has no file.
     """
     data = body.get('file')
     if not isinstance(data, bytes):

@@ -63,7 +63,7 @@ _FORBIDDEN = {
 
 
 Handler = Callable[[Controller, Body], 'Fields | Waiting']
-#: Action -> its effect, and whether the action is done and can be answered.
+#: Action -> function that begins it, and function that returns whether the action is done.
 Actions = Mapping[str, tuple[Callable[[Controller], object], Callable[[Controller], bool]]]
 
 
@@ -108,7 +108,7 @@ def _has_started(controller: Controller) -> bool:
     """
     Return whether the program has started; a short one may have ended since.
 
-    :raises Refused: it will not start.
+    :raises Refused: the program will not start.
     """
     programs = controller.programs
     if programs.starting:
@@ -253,7 +253,7 @@ class RobotApiSession(ClientSession):
         """Wait for requests."""
         self._controller = controller
         self._buffer = bytearray()
-        #: Size of the request whose head has come, so that a long body is not copied each time.
+        #: Size of the request whose head has arrived, so that a long body is not copied each time.
         self._request_size = 0
         self._waiting: Waiting | None = None
         self._waits_until = 0.0
@@ -298,7 +298,7 @@ class RobotApiSession(ClientSession):
         return b''
 
     def _next_request(self) -> tuple[str, str, bytes, str] | None:
-        """Return method, path, body and its type of the next request; None = it is incomplete."""
+        """Return method, path, body and content type of the next request; None = incomplete."""
         if len(self._buffer) < self._request_size:
             return None
         head, end, rest = bytes(self._buffer).partition(b'\r\n\r\n')
@@ -329,7 +329,7 @@ class RobotApiSession(ClientSession):
         """Carry out a request and return the answer; empty if the answer comes later."""
         route, name = path.removeprefix(BASE_PATH), ''
         if route.startswith('/programs/v1/'):
-            # The list is asked for with and without the slash.
+            # Clients request the list with and without the slash.
             name = unquote(route.removeprefix('/programs/v1/'))
             route = '/programs/v1/{name}' if name else '/programs/v1'
         version = self._controller.config.version[:2]
@@ -355,7 +355,7 @@ class RobotApiSession(ClientSession):
         return _response(HTTPStatus.ACCEPTED if accepted else HTTPStatus.OK, answer)
 
     def _not_found(self, path: str) -> bytes:
-        """Return the answer to an unknown path; a known path with a last slash is redirected."""
+        """Return the answer to an unknown path; redirect a known path with a trailing slash."""
         known = {f'{BASE_PATH}{route}/' for _, route in _ROUTES}
         if path in known:
             return _response(HTTPStatus.TEMPORARY_REDIRECT, {}, location=path.rstrip('/'))

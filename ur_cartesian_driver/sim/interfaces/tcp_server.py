@@ -41,7 +41,7 @@ class ClientSession(ABC):
 
     @property
     def is_busy(self) -> bool:
-        """Whether requests wait that are carried out even if the client hangs up meanwhile."""
+        """Whether requests wait; these are carried out even if the client hangs up meanwhile."""
         return False
 
     def open(self) -> bytes:
@@ -73,9 +73,9 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
         self._transport: asyncio.Transport | None = None
         #: Bytes that a fault holds back, or has held back; None = the connection is sound.
         self._impaired: ImpairedConnection | None = None
-        #: Whether the session has hung up: it gets nothing more, but what is held back goes out.
+        #: Whether the session has hung up: it gets no more data, but held-back bytes are sent.
         self._has_hung_up = False
-        #: Whether the client has: what is held back is still carried out and answered.
+        #: Whether the client has hung up: held-back requests are still carried out and answered.
         self._has_ended = False
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -247,7 +247,7 @@ class TcpServer(Generic[S]):
         """
         Start to listen.
 
-        :raises OSError: the port is taken, or the host is not ours; the text names both.
+        :raises OSError: the port is taken, or the host is not this computer; the text names both.
         """
         loop = asyncio.get_running_loop()
         self.closing = False

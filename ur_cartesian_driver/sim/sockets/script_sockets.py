@@ -38,7 +38,7 @@ class ScriptSockets(Protocol):
         """Send without waiting; return whether the socket accepted the data."""
 
     def close(self, name: str) -> None:
-        """Close; an unknown name is no error."""
+        """Close; an unknown name is not an error."""
 
     def close_all(self) -> None:
         """Close every socket; also called when a program ends."""

@@ -22,7 +22,7 @@ from ur_cartesian_driver.sim.sockets.script_sockets import SocketState
 _MAX_BUFFERED = 65_536
 _IN_PROGRESS = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK, errno.EINTR)
 _CONNECTED = (0, errno.EISCONN)
-#: Raised for a name without an address; the last one for a name that is none.
+#: Errors of a look-up: the name has no address; the text cannot be a name.
 _NO_ADDRESS = (OSError, UnicodeError)
 
 #: Addresses of IPv4, of IPv6, and of a Python without IPv6; connecting to the last kind fails.
@@ -159,7 +159,7 @@ class TcpScriptSockets:
             resolved = socket.getaddrinfo(
                 host, port, type=socket.SOCK_STREAM, flags=socket.AI_NUMERICHOST
             )
-        except UnicodeError:  # no host name: a part of it is empty or too long
+        except UnicodeError:  # not a host name: a part of it is empty or too long
             connection.close()
             return
         except OSError:

@@ -105,7 +105,7 @@ class ControllerMessages:
         Report that a window is shown.
 
         The body is: u32 number and u32 type of the request, u8 each for warning, error and
-        blocking, u8 length of the title, title, text. Six published clients read it so.
+        blocking, u8 length of the title, title, text. Six published clients read this layout.
         """
         title = _cut(popup.title, 255).encode(errors='replace')
         flags = bytes([popup.warning, popup.error, popup.blocking])
@@ -126,7 +126,7 @@ class ControllerMessages:
         Report that a window requests a value.
 
         The body is: u32 number of the request (0), u32 type of the value, text. Three published
-        clients read it so; the numbers of the types are assumed.
+        clients read this layout; the numbers of the types are assumed.
 
         :param kind: the type of the value; 0 = boolean, 1 = integer, 2 = float, 3 = string.
         """
@@ -143,7 +143,7 @@ class ControllerMessages:
 
 
 def _cut(text: str, length: int = _MAX_TEXT_LENGTH) -> str:
-    """Return the text, shortened to a number of bytes, at most four a character."""
+    """Return the text, cut to ``length`` bytes in UTF-8, which has at most four per character."""
     if len(text) <= length // 4:
         return text
     return text.encode(errors='replace')[:length].decode(errors='ignore')

@@ -39,7 +39,7 @@ class Pendant:
     user_role: str = 'PROGRAMMER'
     #: NONE: no client controls the operational mode.
     operational_mode: str = 'NONE'
-    #: What the person types into the next windows that request a value.
+    #: Answers of the person to the next windows that request a value.
     answers: deque[str] = field(default_factory=deque)
 
 

@@ -112,7 +112,7 @@ class SafetySystem:
 
     def step(self, event: SafetyEvent, now: float) -> str:
         """
-        Process an event; return the reason of a refusal, else an empty string.
+        Process an event; return the reason for a refusal, else an empty string.
 
         :param now: the controller's clock [s].
         """
