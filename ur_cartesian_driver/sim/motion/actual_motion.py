@@ -7,7 +7,7 @@ The simulated arm follows its targets exactly, so actual values equal the target
 is compliant or configured as imperfect, or a fault makes them deviate. A deviation of the pose
 changes the joint positions accordingly, but not the twist, as with a faulty measurement. A
 deviation of the twist changes the joint speeds, but not the pose. A deviation of the acceleration
-also makes twist and joint speeds drift, by its integral, because many clients differentiate these
+also makes twist and joint speeds drift, by its integral, because many clients differentiate speeds
 instead of reading the accelerometer.
 """
 
@@ -28,7 +28,7 @@ from ur_cartesian_driver.sim.motion import MotionGenerator
 from ur_cartesian_driver.sim.motion.contact.contact_motion import ContactMotion
 from ur_cartesian_driver.sim.motion.imperfect_arm import ImperfectArm, Imperfections, Motion
 
-# A solution this far [rad] from the undisturbed joints is taken for another branch.
+# A solution this far [rad] from the undisturbed joints is treated as another branch.
 _BRANCH_JUMP = 0.5
 
 

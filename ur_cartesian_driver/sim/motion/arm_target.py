@@ -65,13 +65,13 @@ class ArmTarget:
         self.T_base_tcp = self.forward(self.q)
 
     def activate_tcp(self) -> None:
-        """Use the TCP that was set last for the motion that begins now."""
+        """Use the latest TCP for the motion that begins now."""
         self.T_tcp_flange = self._T_flange_tcp.inverse()
         self._active_tcp = self._T_flange_tcp
 
     @property
     def tcp_is_active(self) -> bool:
-        """Whether the running motion uses the TCP that was set last."""
+        """Whether the running motion uses the latest TCP."""
         return self._active_tcp is self._T_flange_tcp
 
     @property

@@ -93,7 +93,7 @@ class ControllerPathOffset:
         """Whether the offset is enabled, or still displaces the target."""
         return self.enabled or self.target is not None
 
-    # -- what programs do ----------------------------------------------------------------------
+    # -- called for programs -------------------------------------------------------------------
 
     def set(self, frame: int, offset: Vector6) -> None:
         """Set the offset in a frame [m, rad], clamped to the limits."""
@@ -218,7 +218,7 @@ class ControllerPathOffset:
         )
 
     def _displaced(self, pose: Pose) -> Pose:
-        """Return the pose that results when the offset displaces a pose of the motion."""
+        """Return a pose of the motion, displaced by the offset."""
         offset = self._applied
         if self._frame == TCP:
             return pose @ Pose.from_rotation_vector(offset)

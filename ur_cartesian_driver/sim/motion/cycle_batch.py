@@ -71,7 +71,7 @@ class CycleBatch:
 
     def next(self, motion: PathMotion, duration: float, max_tool_speed: float) -> CycleStep | None:
         """
-        Advance a motion by its next solved cycle; None = the caller has to solve it.
+        Advance a motion by its next solved cycle; None = the caller has to solve the cycle.
 
         :param duration: the path time per cycle [s].
         :param max_tool_speed: bound on the tool speed [m/s].

@@ -29,8 +29,8 @@ ROUNDING = 1.0 + 1e-6
 # A step is shortened this many times before its end is considered out of reach.
 _ATTEMPTS = 12
 # Near a singularity, half a step turns the joints almost as far as the whole step. A step that is
-# too long by a factor is therefore divided by a power of the factor: the largest exponent, and the
-# largest divisor as a multiple of the factor.
+# too long by a factor is therefore divided by a power of the factor. The bounds: the largest
+# exponent, and the largest divisor as a multiple of the factor.
 _MAX_POWER, _MAX_OVERCUT = 4.0, 2.0
 # A tool motion is stuck if it stays slower than this fraction of the planned speed, ...
 _STALLED = 0.01
@@ -39,7 +39,7 @@ _STALLED_AFTER = 1.0
 # ... while no joint is faster than this fraction of its limit, as in passing a singularity.
 _TURNING = 0.2
 # A joint line whose first step is too long by more than this factor jumps: it does not begin at
-# the joints where the tool path before it ends.
+# the final joints of the tool path before it.
 _JUMP_RATIO = 50.0
 
 
@@ -107,7 +107,7 @@ class CycleStepper:
         return self._target.forward(q)
 
     def _jumps(self, q: Vector6, setpoint: Setpoint, joints: float) -> bool:
-        """Return whether a step is a branch jump: a shorter step turns the joints as far."""
+        """Return whether a step is a branch jump: a shorter step would turn the joints as far."""
         if isinstance(setpoint, Pose):
             return is_singular(self._target.q, q, self._target.T_base_tcp, setpoint)
         return self._on_tool_path and joints > _JUMP_RATIO

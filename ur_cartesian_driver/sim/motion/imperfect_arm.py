@@ -62,7 +62,8 @@ class Imperfections:
     #: Noise of measured joint positions, peak to peak [rad]. Recorded, including the resolution:
     #: 0.00005 to 0.00017.
     position_noise: float = 1e-4
-    #: Resolution of measured joint positions [rad]. Assumed: 17 bits, as the least noise recorded.
+    #: Resolution of measured joint positions [rad]. Assumed: 17 bits, equal to the lowest noise
+    #: recorded.
     position_resolution: float = 2.0 * pi / 2**17
     #: Noise of measured joint speeds, peak to peak [rad/s]. Assumed.
     speed_noise: float = 0.002
@@ -131,7 +132,7 @@ class ImperfectArm:
         ]
         self._cycle = 0
         self._qd: Vector6 | None = None
-        #: The joint speeds of the cycle before.
+        #: The joint speeds of the previous cycle.
         self._qd_before = ZERO6
         self._pose: tuple[Vector6, Pose, Pose] | None = None
         self.q = ZERO6
@@ -235,7 +236,7 @@ class _Joint:
         :param direction: -1 to 1, direction of the previous motion; scales the static error.
         """
         self._imperfections, self._cycle = imperfections, cycle
-        # With this fraction, a ramp is followed with exactly the lag, independent of the cycle.
+        # With this fraction, the joint follows a ramp with exactly the lag, whatever the cycle.
         self._follow_share = cycle / (cycle + imperfections.lag)
         self._drag_share = 1.0 - exp(-cycle / imperfections.friction_time)
         decay, omega = imperfections.ringing_decay, 2.0 * pi * imperfections.ringing_frequency

@@ -5,7 +5,7 @@ Turns motion calls into one target per control cycle.
 
 A call (``movel`` ...) returns a :class:`Move` at once; ``step`` does one cycle of the motion. The
 caller polls ``Move.returned``. If the next call comes in the cycle in which ``returned`` becomes
-true, the motion goes on without an idle cycle.
+true, the motion continues without an idle cycle.
 
 Speed scaling and the limits of the arm stretch the time and never change the path. Tool motions
 are solved by inverse kinematics in each cycle, starting from the previous solution. If a path
@@ -87,7 +87,7 @@ class MotionGenerator:
         #: The laws of motion.
         self.laws = laws
         self.max_tool_speed = MAX_TOOL_SPEED
-        #: The motion version of movej and movel, 1 or 2; and what version 2 does.
+        #: The motion version of movej and movel, 1 or 2; and the laws of version 2.
         self.motion_version = 1
         self.second_version = SecondMotionVersion()
         #: The target of the motion, without the path offset.
@@ -147,12 +147,12 @@ class MotionGenerator:
 
     @property
     def moving(self) -> bool:
-        """Whether the target moved in the last cycle or is about to."""
+        """Whether the target moved in the last cycle or is about to move."""
         return self._active.moving
 
     @property
     def has_motion(self) -> bool:
-        """Whether a motion is running; false already in the cycle in which it has ended."""
+        """Whether a motion is running; false already in the cycle in which it ends."""
         return self._active.motion is not None
 
     @property
@@ -356,8 +356,8 @@ class MotionGenerator:
         Make the next path start slowly.
 
         Within the ``start_time`` of the laws, the rate of the path's time grows from 0 to 1, by
-        the same step in each cycle, so the path takes longer by half of this time less a cycle.
-        Recorded joint moves of a UR3, and of the manufacturer's simulator, follow this within
+        the same step in each cycle, so the path takes longer by half of (``start_time`` - cycle).
+        Recorded joint moves of a UR3, and of the manufacturer's simulator, follow this law within
         1e-12 rad.
         """
         self._start_rate = 0.0 if self.laws.start_time > 0.0 else 1.0

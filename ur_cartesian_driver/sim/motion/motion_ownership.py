@@ -102,10 +102,10 @@ class MotionOwnership:
         """
         Return whether a call that could return at once has to take a cycle.
 
-        A move to the present position takes one, because programs repeat it. The first such move
-        after a motion that has ended in this cycle takes none, so that moves follow each other
-        without an idle cycle. A set-point without a duration takes none: a loop of these is an
-        error on a robot, too.
+        A move to the present position takes a cycle, because programs repeat such moves. The first
+        one after a motion that has ended in this cycle returns at once, so that moves follow each
+        other without an idle cycle. A set-point without a duration also returns at once: a loop of
+        such set-points is an error on a robot, too.
         """
         motion = self._motion
         if not motion.moving:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 
 class MotionError(Exception):
-    """Raised if a motion call is refused before anything moves; programmers read the text."""
+    """Raised for a motion call that is refused before the arm moves; programmers read the text."""
 
 
 @dataclass(slots=True)
@@ -35,7 +35,7 @@ class MotionFault:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionWarning:
-    """A robot error code of warning level; the motion goes on."""
+    """A robot error code of warning level; the motion continues."""
 
     code: int
     argument: int

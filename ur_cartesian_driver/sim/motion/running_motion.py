@@ -19,7 +19,7 @@ from ur_cartesian_driver.sim.motion.servo_motions import (
     ToolStopMotion,
 )
 
-#: Deceleration [rad/s^2] if a path move is called that cannot begin while the arm moves.
+#: Deceleration [rad/s^2] before a path move that cannot begin while the arm moves.
 UNATTENDED_DECELERATION = 15.0
 
 
@@ -41,7 +41,7 @@ class RunningMotion:
 
     @property
     def moving(self) -> bool:
-        """Whether the target moved in the last cycle or is about to."""
+        """Whether the target moved in the last cycle or is about to move."""
         return self.motion is not None or self._target.qd != STILL
 
     @property
@@ -54,7 +54,8 @@ class RunningMotion:
         self.abort()
         self._target.activate_tcp()
         if not isinstance(self.motion, SetpointMotion):
-            self.rate = self.scale  # the new motion begins at the speed before, by this scale
+            # The nominal speed of the new motion, times this rate, is the present speed.
+            self.rate = self.scale
         self.motion, self.move = motion, Move()
         if isinstance(motion, SetpointMotion) and motion.duration is not None:
             self.move.returned = motion.is_over
@@ -89,13 +90,13 @@ class RunningMotion:
         return ToolStopMotion(self._target.T_base_tcp, self._twist(), a, a_rot)
 
     def nominal_joint_speed(self) -> Vector6:
-        """Return the joint speed as it would be without speed scaling."""
+        """Return the joint speed without speed scaling."""
         if isinstance(self.motion, JointSpeedMotion | ServoMotion):
             return self.motion.qd
         return self._unscaled(self._joint_speed())
 
     def nominal_twist(self) -> Vector6:
-        """Return the twist of the TCP as it would be without speed scaling."""
+        """Return the twist of the TCP without speed scaling."""
         if isinstance(self.motion, ToolSpeedMotion):
             return self.motion.twist
         return self._unscaled(self._twist())

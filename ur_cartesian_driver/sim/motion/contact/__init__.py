@@ -1,3 +1,3 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Bodies that the tool can touch, and its motion against them."""
+"""Bodies that the tool can touch, and the tool's motion against them."""

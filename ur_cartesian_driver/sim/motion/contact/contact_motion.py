@@ -177,7 +177,7 @@ class ContactMotion:
         return (*force, 0.0, 0.0, 0.0)
 
     def _bend(self, wrench: Vector6, free: Sequence[bool] = (False,) * 6) -> None:
-        """Bend the arm along the axes of a frame that are not free; values are in that frame."""
+        """Bend the arm along the axes that are not free; all values are in the same frame."""
         self._bent = vector6(
             0.0 if is_free else bent + self._share * (force / stiffness - bent)
             for is_free, bent, force, stiffness in zip(

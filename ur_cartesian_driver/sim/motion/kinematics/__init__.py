@@ -1,3 +1,3 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Joints and tool of the simulated arm: branches of the inverse, rates, motion of a point."""
+"""Joints and tool of the simulated arm: IK branches, rates, limits, motion of a point."""

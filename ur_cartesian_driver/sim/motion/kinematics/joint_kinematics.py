@@ -78,7 +78,7 @@ class JointKinematics:
 
     def _branch_signs(self, q: Vector6) -> tuple[float, float, float]:
         """
-        Return three numbers whose signs name the branch.
+        Return three numbers whose signs identify the branch.
 
         The first is the distance [m] of the wrist centre in front of the shoulder, for the nominal
         arm (a calibrated arm has the same sign); the others are the sines of elbow and wrist 2.
@@ -120,7 +120,7 @@ class JointKinematics:
         """
         Return a mask (n,) of the steps between rows that the arm can make in one cycle.
 
-        The limits of the joints are those of :meth:`overspeed_factor`.
+        The limits of the joints are the same as in :meth:`overspeed_factor`.
 
         :param q: joint positions (n + 1, 6) [rad]; the first row is the arm's present position.
         :param on_branch: whether a step must also stay on the IK branch.
