@@ -4,8 +4,8 @@
 External Control: the URCap of CB3 and PolyScope 5, and the URCapX of PolyScope X.
 
 When a program with such a node is played, the pendant requests the text of the node from a host,
-once, before the first line runs. If that fails, the node is a window with the reason (URCap), or
-empty (URCapX). doc/simulation.md has the evidence.
+once, before the first line runs. If the request fails, the node becomes a window with the reason
+(URCap), or stays empty (URCapX). doc/simulation.md has the evidence.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _log = logging.getLogger(__name__)
 
 _BEGIN, _END = '# HEADER_BEGIN', '# HEADER_END'
 
-#: The text that the host has sent, or why there is none.
+#: The text from the host, or the error of the request.
 HostAnswer: TypeAlias = str | OSError
 #: Requests the program from the host; calls its argument with the answer, at once or later.
 RequestScript: TypeAlias = Callable[[Callable[[HostAnswer], None]], None]
@@ -31,12 +31,12 @@ RequestScript: TypeAlias = Callable[[Callable[[HostAnswer], None]], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RequestLimits:
-    """How long the pendant waits for the host [s]."""
+    """The time limits of a request to the host [s]."""
 
     connect: float
-    #: Until the first byte of the answer; None = for ever.
+    #: Limit for the first byte of the answer; None = no limit.
     answer: float | None
-    #: For how long the last answer is taken in place of a new one.
+    #: Time during which the last answer is used again.
     cache: float = 0.0
 
 
@@ -50,7 +50,7 @@ class UrCap:
         self._host, self._port = host, port
 
     def problem(self, answer: HostAnswer) -> str:
-        """Return the sentence that says why there is no program; empty = there is one."""
+        """Return a sentence with the reason why there is no program; empty = no problem."""
         if isinstance(answer, str):
             return ''
         return (
@@ -67,9 +67,9 @@ class UrCap:
         return os.strerror(error.errno) if error.errno else str(error)
 
     def fetched(self, answer: HostAnswer) -> FetchedScript:
-        """Return the parts of the program; a failure is a program that shows a window."""
+        """Return the parts of the program; after a failure, of a program that shows a window."""
         if isinstance(answer, str):
-            # The URCap reads lines, and a line from a host that hangs up is Java's null.
+            # The URCap reads lines; if the host hangs up, the line is Java's null.
             lines = answer.splitlines() or ['null']
             header, control_loop = _split('\n'.join(f' {line}' for line in lines))
             return FetchedScript(header=header, control_loop=control_loop)
@@ -86,7 +86,7 @@ class UrCapX(UrCap):
     limits = RequestLimits(connect=0.1, answer=5.0, cache=2.0)
 
     def problem(self, answer: HostAnswer) -> str:
-        """Return the sentence that says why there is no program; empty = there is one."""
+        """Return a sentence with the reason why there is no program; empty = no problem."""
         if isinstance(answer, str) and answer.strip():
             return ''
         reason = 'Did not receive any script lines' if isinstance(answer, str) else answer
@@ -113,7 +113,7 @@ def _is_unknown_host(error: OSError) -> bool:
 
 
 def _split(text: str) -> tuple[str, str]:
-    """Return the header, with its markers, and the rest; without markers all is the rest."""
+    """Return the header with its markers, and the rest; without markers the header is empty."""
     begin = text.find(_BEGIN)
     end = text.find(_END, begin)
     if begin < 0 or end < 0:

@@ -4,8 +4,8 @@
 The tree of a program on the pendant, and the URScript that PolyScope generates from the tree.
 
 URScript is generated anew whenever the program is played. The URCap External Control (CB3,
-PolyScope 5) puts its header in front of its first node, even inside the loop of the program; the
-URCapX (PolyScope X) puts it in front of the program.
+PolyScope 5) puts its header before its first node, even inside the loop of the program; the URCapX
+(PolyScope X) puts its header before the program.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ TreeNode: TypeAlias = ScriptText | ExternalControlNode
 class FetchedScript:
     """The program that External Control has fetched, in its two parts; each may be empty."""
 
-    #: Functions and variables, once in a program.
+    #: Functions and variables, which a program contains once.
     header: str = ''
     #: The text at each node.
     control_loop: str = ''
-    #: Whether the header stands in front of the program, rather than in front of the first node.
+    #: Whether the header stands before the program, rather than before the first node.
     header_first: bool = False
 
 
@@ -82,23 +82,23 @@ class ProgramTree:
 
 
 class UnloadableProgram(ValueError):
-    """The program that is loaded from the start cannot be loaded."""
+    """The program that the robot is configured to load cannot be loaded."""
 
 
 @dataclass(frozen=True, slots=True)
 class UnreadableProgram:
     """A program that the robot has on its disk, but refuses to load."""
 
-    #: Why, as a sentence without its full stop.
+    #: The reason, as a sentence without its full stop.
     reason: str
 
 
-#: A program on the disk of a robot: URScript, a tree, or why it is neither.
+#: A program on the disk of a robot: URScript, a tree, or the reason why it cannot be loaded.
 SavedProgram: TypeAlias = str | ProgramTree | UnreadableProgram
 
 
 def function_name(program: str) -> str:
-    """Return the name of a program's function: that of the program, as far as URScript allows."""
+    """Return the name of a program's function: the program's name, as far as URScript allows."""
     name = re.sub(r'\W', '_', program, flags=re.ASCII) or 'program'
     return name if name[0].isalpha() and name not in KEYWORDS else f'_{name}'
 

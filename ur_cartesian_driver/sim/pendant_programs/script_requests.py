@@ -3,9 +3,9 @@
 """
 Requests programs from a script sender over TCP, while the cycles of the controller go on.
 
-An answer has no length and no end. It is over when the host hangs up, or has been silent for
-:data:`SILENCE`, as for the URCapX. The URCap of CB3 and PolyScope 5 does not wait at all: it takes
-the lines that have arrived, so a host that pauses loses the rest there, and not here.
+An answer has no length and no end mark. It is complete when the host hangs up or has been silent
+for :data:`SILENCE`, as for the URCapX. The real URCap of CB3 and PolyScope 5 does not wait at all:
+it takes the lines that have arrived, and loses the rest if the host pauses.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import socket
 
 from ur_cartesian_driver.sim.pendant_programs.external_control import HostAnswer, RequestLimits
 
-#: The request; the same bytes stand in the driver's protocol, which a simulator does not ask.
+#: The request; defined here and in the driver's protocol, which the simulator does not use.
 REQUEST = b'request_program\n'
 #: Silence of the host after which its answer is complete [s].
 SILENCE = 0.1
@@ -29,7 +29,7 @@ class _AnswerCollector(asyncio.Protocol):
         """
         Prepare.
 
-        :param limit: how long to wait for the first byte [s]; None = for ever.
+        :param limit: limit for the first byte [s]; None = no limit.
         """
         self._loop = asyncio.get_running_loop()
         self.answer: asyncio.Future[HostAnswer] = self._loop.create_future()
@@ -44,12 +44,12 @@ class _AnswerCollector(asyncio.Protocol):
             self._restart(self._limit, TimeoutError('Connection timeout'))
 
     def data_received(self, data: bytes) -> None:
-        """Keep a part of the answer, and wait for the next one."""
+        """Keep a part of the answer, and wait for the next part."""
         self._text += data
         self._restart(SILENCE, None)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Take what has arrived; a connection that was reset is a failure."""
+        """End the answer; a connection that was reset is a failure."""
         self._finish(exc if isinstance(exc, OSError) else None)
 
     def _restart(self, delay: float, failure: OSError | None) -> None:
@@ -78,7 +78,7 @@ class ScriptRequests:
         """
         self._host, self._port, self._limits, self._own_host = host, port, limits, own_host
         self._tasks: set[asyncio.Task[None]] = set()
-        #: The last program, and until when it is taken in place of a new one.
+        #: The last program, and the time until which it is used again.
         self._cached: tuple[str, float] | None = None
 
     def request(self, then: Callable[[HostAnswer], None]) -> None:
@@ -112,7 +112,7 @@ class ScriptRequests:
                     local_addr=self._local_address(),
                 )
             return await collector.answer
-        except UnicodeError as error:  # of a name that can be no host
+        except UnicodeError as error:  # the name cannot be a host
             return socket.gaierror(socket.EAI_NONAME, str(error))
         except OSError as error:
             return error
@@ -126,7 +126,7 @@ class ScriptRequests:
         return (self._own_host, 0) if on_loopback else None
 
     async def close(self) -> None:
-        """Give up all requests; their answers are not passed on."""
+        """Cancel all requests; their answers are not passed on."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)

@@ -3,7 +3,7 @@
 """
 Reads program files of PolyScope 3 and 5 (.urp): XML, compressed by gzip or not.
 
-The format is not published; what is read here is what public files and tools have::
+The format is not published; this reader knows the elements of public files and tools::
 
     <URProgram name="seam"><children>
       <MainProgram runOnlyOnce="false"><children>
@@ -39,8 +39,8 @@ def read_urp(data: bytes, name: str) -> ProgramTree:
     """
     Return the tree of a program file.
 
-    :param name: the name of the file, with which an error text begins.
-    :raises ValueError: it is no program file, or has a node that the simulator does not run.
+    :param name: the name of the file, for errors.
+    :raises ValueError: it is not a program file, or has a node that the simulator does not run.
     """
     try:
         xml = _decompressed(data) if data.startswith(_GZIP_MAGIC) else data

@@ -24,8 +24,8 @@ T = TypeVar('T')
 #: Longest time [s] for which a compiling thread keeps the interpreter lock when a cycle needs the
 #: lock; Python's default of 5 ms is longer than a cycle.
 SWITCH_INTERVAL = 1e-4
-#: If compiling made more new objects than this, they are frozen (``gc.freeze``), because a
-#: collection would delay the cycles by a second; reference cycles among them stay in memory.
+#: If compiling creates more new objects than this, the objects are frozen (``gc.freeze``), because
+#: a collection would delay the cycles by a second; reference cycles among them stay in memory.
 MAX_NEW_OBJECTS = 100_000
 
 
@@ -73,7 +73,7 @@ class CompileThread:
 
     def close(self) -> None:
         """
-        Tell the thread to end after the program that it is compiling, without waiting.
+        Make the thread end after its current program, without waiting for the end.
 
         Call this in the event loop.
         """

@@ -5,10 +5,10 @@ Interpreter mode: a program executes the statements that clients send, in order.
 
 A statement is compiled and numbered when it arrives, answered with `ack: <number>: <statement>` or
 `discard: <reason>: <statement>`, and executed after the previous statements. While no program is
-in interpreter mode, statements wait without an answer. They also wait after a statement that calls
-clear_interpreter or end_interpreter until it has taken effect, because they could name a variable
-that is about to be deleted. The interface's own commands (`abort`, `skipbuffer`, `state...`) are
-executed at once, before waiting statements.
+in interpreter mode, statements wait without an answer. After a call of clear_interpreter or
+end_interpreter, the next statements also wait until the call has taken effect, because they could
+name a variable that is about to be deleted. The interface's own commands (`abort`, `skipbuffer`,
+`state...`) are executed at once, before waiting statements.
 
 Assumed, because not documented: statements that arrive while no program runs at all are discarded,
 and `abort` and `skipbuffer` are always acknowledged with the number of the last statement.
@@ -30,8 +30,8 @@ from ur_cartesian_driver.urscript import (
 
 #: Bound on statements that wait to be compiled or executed; a robot accepts about as many.
 MAX_QUEUED_STATEMENTS = 500
-#: A statement that calls one of these functions, and not within another statement, is executed
-#: before the next one is compiled.
+#: A line that calls one of these functions in an outermost statement is executed before the next
+#: line is compiled.
 _BARRIERS = frozenset({'clear_interpreter', 'end_interpreter'})
 
 AnswerCallback = Callable[[str], None]
@@ -45,7 +45,7 @@ class InterpreterMode:
         Begin with no statements.
 
         :param programs: the runner whose interpreter compiles and runs the statements.
-        :param ownership: the ownership of the motion, which `abort` stops.
+        :param ownership: the ownership of the motion; `abort` stops the motion.
         """
         self._programs = programs
         self._ownership = ownership
@@ -66,12 +66,12 @@ class InterpreterMode:
         self._interpreter: ScriptInterpreter | None = None
         self._interpreted = self._executed = self._cleared = 0
         self._closing = self._clear_wanted = self._end_wanted = False
-        #: Whether the statement that is executed clears or ends the mode.
+        #: Whether the statement that is being executed clears or ends the mode.
         self._is_running_barrier = False
         self._queue.clear()
         self._discard_waiting('the program has ended')
 
-    # What clients send
+    # Called for clients
 
     def receive(self, statement: str, answer: AnswerCallback) -> None:
         """
@@ -121,7 +121,7 @@ class InterpreterMode:
             statement, answer = self._uncompiled.popleft()
             answer(f'discard: {reason}: {statement}')
 
-    # What programs call
+    # Called for programs
 
     def run(self, clear_queue: bool, clear_on_end: bool) -> Steps:
         """

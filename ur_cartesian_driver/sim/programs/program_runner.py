@@ -12,7 +12,7 @@ Programs from start to end: one primary program, and secondary programs in paral
 
 If a program is stopped while the arm moves, the controller stops the arm on its path; the next
 program starts when the arm stands still. A program that does not compile is refused with line and
-column of the error, and the running program goes on.
+column of the error, and the running program continues.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ def _parse_cached(text: str, is_line: bool = False) -> ScriptProgram:
     return replace(parse_line(text), name='unnamed') if is_line else parse(text)
 
 
-#: The code of the programs that were compiled last, for all controllers of this process: each with
-#: the program, whose identity is part of the key.
+#: Cache of compiled programs, for all controllers of this process. The identity of a program is
+#: part of the key, so the cache also keeps the program.
 _compiled: dict[Hashable, tuple[ScriptProgram, GeneratedCode]] = {}
 MAX_COMPILED = 8
 
@@ -96,7 +96,7 @@ class ProgramArm(Protocol):
         """Stop the arm because the program has ended."""
 
     def run_preamble(self) -> None:
-        """Set what the installation sets in front of a program that the pendant starts."""
+        """Apply the installation's settings, which precede a program started on the pendant."""
 
     def begin_program(self) -> None:
         """Get ready for the first motion of a program."""
@@ -143,11 +143,11 @@ class ProgramRunner:
         self._queued: tuple[str, ScriptInterpreter] | None = None
         self._secondaries: list[ScriptInterpreter] = []
         self._loaded: ScriptProgram | GenerateScript | None = None
-        #: Marks the start that waits for its generated program; None = no start does.
+        #: Marks the start that waits for its generated program; None = no start waits.
         self._awaited: object | None = None
-        #: Why the program that `play` should start has not started; empty = it has.
+        #: The reason why `play` has not started its program; empty = the program has started.
         self.start_failure = ''
-        #: What compiled code depends on, beside the program.
+        #: The builtins, on which compiled code depends in addition to the program.
         self._signatures = frozenset(
             (name, getattr(function, '__code__', function)) for name, function in builtins.items()
         )
@@ -216,7 +216,7 @@ class ProgramRunner:
                 interpreter = self._compile(program)
         except CompileError as error:
             return error
-        except Exception as error:  # a defect of ours must not end the thread that compiles
+        except Exception as error:  # a defect of the simulator must not end the thread
             _log.exception('A program cannot be compiled')
             return CompileError(1, 1, 'internal_error', f'internal error: {error!r}')
         return CompiledProgram(program, interpreter)
@@ -226,7 +226,7 @@ class ProgramRunner:
             self._queue_start(name, interpreter)
 
     def _refuses(self, name: str) -> bool:
-        """Return whether no program can run now, and say why."""
+        """Return whether no program can run now, and report the reason."""
         reason = self._arm.start_refusal()
         if reason:
             self._messages.text(f'Program {name} was not started: {reason}.')
@@ -235,9 +235,9 @@ class ProgramRunner:
 
     def compile_first(self, text: str, then: Callable[[str], None]) -> None:
         """
-        Compile a program beside the cycles, so that loading it afterwards takes no time.
+        Compile a program in parallel with the cycles, so that loading it afterwards takes no time.
 
-        :param then: called with the mistake in the program; empty = there is none.
+        :param then: called with the mistake in the program; empty = no mistake.
         """
 
         def end(compiled: CompiledProgram | CompileError) -> None:
@@ -247,7 +247,7 @@ class ProgramRunner:
 
     def load(self, name: str, text: str) -> str:
         """
-        Load the program that `play` starts; return the reason of a refusal, else an empty string.
+        Load the program that `play` starts; return the reason for a refusal, else an empty string.
 
         As on the robot, a script that a client has sent is not loaded, so it cannot be played once
         it has been stopped.
@@ -264,9 +264,9 @@ class ProgramRunner:
 
     def load_generated(self, name: str, generate: GenerateScript) -> str:
         """
-        Load a program whose URScript is generated when `play` starts it; return as `load` does.
+        Load a program whose URScript is generated when `play` starts it; return like `load`.
 
-        Mistakes in it are found when it is played.
+        Mistakes in the program are found when it is played.
         """
         if self.running:
             return 'a program is running'
@@ -274,7 +274,7 @@ class ProgramRunner:
         return ''
 
     def _start_generated(self, name: str, generate: GenerateScript) -> None:
-        """Start a program when it is generated, unless it is stopped or replaced by then."""
+        """Start a program once it is generated, unless it has been stopped or replaced by then."""
         start = self._awaited = object()
 
         def end_wait(compiled: CompiledProgram | CompileError) -> None:
@@ -338,12 +338,12 @@ class ProgramRunner:
         self._messages.key('PROGRAM_XXX_STARTED', self.name)
 
     def unpause(self) -> None:
-        """Resume a paused program; start none."""
+        """Resume a paused program; never start one."""
         if self.state in PAUSED:
             self.play()
 
     def play(self) -> str:
-        """Resume the program or start the loaded one; return the reason of a refusal, or ''."""
+        """Resume the program or start the loaded one; return the reason for a refusal, or ''."""
         reason = self._arm.start_refusal()
         if reason:
             return reason
@@ -363,7 +363,7 @@ class ProgramRunner:
         return ''
 
     def pause(self) -> str:
-        """Pause on the path; return the reason of a refusal, else an empty string."""
+        """Pause on the path; return the reason for a refusal, else an empty string."""
         if self.state not in (RuntimeState.PLAYING, RuntimeState.RESUMING):
             return 'no program is playing'
         self.state = RuntimeState.PAUSING

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The program files of a robot: those that it was configured with, and those that clients upload.
+The program files of a robot: from its configuration, and uploaded by clients.
 
-PolyScope X keeps a program as JSON (`.urpx`): its tree, its information, and the URScript that was
-generated from them, which is what runs here.
+PolyScope X stores a program as JSON (`.urpx`): its tree, its information, and the URScript that
+was generated from them. The simulator runs the URScript.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def read_urpx(data: bytes) -> tuple[str, Mapping[str, Any]]:
     name = _text_in(content, 'program', 'programInformation', 'name')
     if not name or not _text_in(content, *_SCRIPT):
         raise ValueError('the file lacks the name or the script of a program')
-    if '/' in name:  # programs are known by the names of their files
+    if '/' in name:  # the name becomes the name of a file
         raise ValueError(f'the name of the program, {name!r}, contains a /')
     return name, content
 
