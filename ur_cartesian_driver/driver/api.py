@@ -96,7 +96,7 @@ LOOP_LOST = 'The robot loop ended unexpectedly, or hangs; the robot program stop
 
 #: Longest time from the cancel of a motion to its outcome [s], whatever the robot does.
 CANCEL_TIMEOUT = 2.0 * STOP_TIMEOUT + 1.0
-# An arm whose joints have turned by no more than this has not moved: a mm at the tool [rad].
+# Joint changes up to this [rad], about a mm at the tool, do not count as motion.
 _SAME_JOINTS = 1e-3
 
 
@@ -131,7 +131,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         :param frames: the frames that paths can name; None = the standard frames.
         :param auto_heartbeat: whether a thread of the driver sends the heartbeats. An owner that
             can hang (a ROS executor) sets False and calls :meth:`heartbeat` itself.
-        :param logger: takes what the driver logs; of several drivers, each may have one.
+        :param logger: receives the driver's messages; each of several drivers may have its own.
         :raises ValueError: ``ur_type`` is unknown.
         """
         self.config = config
@@ -185,7 +185,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         self._running.abort('The driver was closed.')
 
     def heartbeat(self) -> None:
-        """Tell the robot loop that the owner is alive, at least once every ``node_timeout``."""
+        """Tell the robot loop that the owner is alive; due at least every ``node_timeout``."""
         self._send(OwnerHeartbeat())
 
     # ---- state and status ---------------------------------------------------------------------
@@ -248,7 +248,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         self._robot.servo_listeners.append(callback)
 
     def add_pulse_listener(self, callback: Callable[[Pulse], None]) -> None:
-        """Call back with each pulse of a goal (``pulses``), in the order in which they come."""
+        """Call back with each pulse of a goal (``pulses``), in order."""
         self._robot.pulse_listeners.append(callback)
 
     def wait_ready(self, timeout: float) -> None:
@@ -288,7 +288,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
 
     def renewed(self, plan: Plan) -> Plan:
         """
-        Return a plan, made again if it begins with a travel and the arm has moved since.
+        Return the plan, or a new one if it begins with a travel and the arm has moved since.
 
         :raises GoalRefused: the goal fails a check from where the arm stands now.
         :raises RobotNotReady: the robot does not report its state.
@@ -302,7 +302,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
 
     def air_travel(self, **settings: Any) -> AirTravel:
         """
-        Return what :meth:`.Path.travel_to` and :func:`.join` need: the arm, where it stands now.
+        Return the arm and its present state, for :meth:`.Path.travel_to` and :func:`.join`.
 
         :param settings: other fields of :class:`~.traveller.AirTravel`, such as ``retract`` [m].
         :raises RobotNotReady: the robot does not report its state.
@@ -325,8 +325,8 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
 
         :raises RobotNotReady: the robot program is not connected, a motion is running, or the plan
             was made for another robot program.
-        :raises GoalRefused: the cell has changed since the plan was made, and it would touch; or
-            the plan was made again, as :meth:`renewed` does, and the goal is refused.
+        :raises GoalRefused: the cell has changed since the plan was made, and the arm would touch
+            it; or :meth:`renewed` refuses the goal.
         :raises LocalProtocolError: a value of the plan does not fit into a message.
         """
         if plan.older_program != self.config.dialect.older_program:
@@ -360,8 +360,8 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         """
         Plan and run a goal or path, and wait for its outcome; a refusal is an outcome too.
 
-        :param preempt: whether to stop a running motion for this goal, after the goal has passed
-            all checks from where the arm would come to rest; False = refuse the goal while a
+        :param preempt: whether to stop a running motion for this goal, once the goal has passed
+            all checks from the arm's predicted place at rest; False = refuse the goal while a
             motion runs.
         :raises TimeoutError: no outcome came within ``timeout`` [s]; the motion was cancelled, and
             its end was awaited for at most :data:`CANCEL_TIMEOUT`.
@@ -385,7 +385,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         """
         Stop the running motion for another one, and wait until it ends as PREEMPTED.
 
-        :param by: a noun phrase for the other motion, which the text of the outcome contains.
+        :param by: the other motion, as a noun phrase for the text of the outcome.
         :returns: whether a motion ran; if so, plans made before its end have to be made again.
         :raises RobotNotReady: the running motion cannot be preempted now and goes on, or it did
             not end in time.
@@ -542,7 +542,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         return active.motion
 
     def _make_appender(self, active: ActiveMotion, part: AppendPlan) -> Appender:
-        """Return the appender, which plans and offers the points appended to a goal."""
+        """Return the appender, which plans further points and offers them to the loop."""
         motion, cell = active.motion, self.options.cell
 
         def planning_inputs() -> tuple[Arm, PlanningOptions]:

@@ -37,10 +37,10 @@ from ur_cartesian_driver.planning.append.replaced_tail import (
 )
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_plan
 
-#: How long the robot loop may take to answer [s]. A loop that is silent for this long is replaced,
-#: which stops the arm (:data:`~.loop.loop_host.SILENCE_TIMEOUT`).
+#: Longest wait for an answer of the robot loop [s]. A loop that is silent for this long is
+#: replaced, which stops the arm (:data:`~.loop.loop_host.SILENCE_TIMEOUT`).
 ANSWER_TIMEOUT = 5.0
-#: How many points may be ahead of the arm, as a multiple of ``max_points``.
+#: Largest number of points ahead of the arm, as a multiple of ``max_points``.
 MAX_AHEAD = 2
 
 
@@ -48,7 +48,7 @@ MAX_AHEAD = 2
 class AppendResult:
     """The result of an append."""
 
-    #: How many points the goal has now.
+    #: The present number of points of the goal.
     points: int
     #: The number of the first new point.
     first: int
@@ -94,7 +94,7 @@ class Appender:
         :param planning_inputs: returns the present arm and planning options.
         :param progress: returns the newest progress report of the motion.
         :param on_appended: called with each part that the loop has accepted.
-        :param timeout: how long to wait for an answer [s].
+        :param timeout: longest wait for an answer [s].
         """
         self._timeout = timeout
         self._motion = motion
@@ -287,7 +287,7 @@ def _from_rest(timed: bool) -> str:
     """
     Return the sentence about points that continue from rest.
 
-    It does not say by how much the points are late: the arm may have waited, or may still wait.
+    The sentence has no figure for the delay: the arm may have waited, or may still wait.
     """
     clause = ', later than their times' if timed else ''
     return f' The arm had come to rest before these points; it goes on from there{clause}.'

@@ -14,7 +14,7 @@ T = TypeVar('T')
 
 
 def run_callback(callback: Callable[[T], None], argument: T, log: logging.Logger) -> None:
-    """Call user code; an exception that it raises is logged, and does not end the thread."""
+    """Call user code; log its exceptions, so that they do not end the thread."""
     try:
         callback(argument)
     except Exception as error:

@@ -1,11 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The cell of a driver, which its owner and its goals change while it runs.
+The cell of a driver; the owner and running goals change it.
 
-The options of the driver are replaced as a whole, so that every plan has one cell. What is left of
-a running motion is checked in the new cell by a thread of its own: the robot loop never waits for
-it.
+The options of the driver are replaced as a whole, so that every plan has one cell. A separate
+thread checks the rest of a running motion in the new cell; the robot loop never waits for it.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ class ChangeableCell(ABC):
     #: Guards the replacement of the options, and the attributes below; set by the driver.
     _cell_lock: threading.Lock
     _cell_listeners: list[Callable[[Cell], None]]
-    #: Counts the changes that running motions have to be checked for.
+    #: Number of changes; a check that sees a new one starts again.
     _cell_changes = 0
     _is_checking = False
 
@@ -59,11 +58,11 @@ class ChangeableCell(ABC):
 
     @abstractmethod
     def _end_session_for(self, motion: MotionHandle, by: str) -> None:
-        """End a motion if it is a live session; ``by``: what takes its place."""
+        """End a motion if it is a live session; ``by``: its successor, as a noun phrase."""
 
     @property
     def cell(self) -> Cell:
-        """The bodies of the cell now, with those that the tool carries."""
+        """The present bodies of the cell, including bodies that the tool carries."""
         return self.options.cell
 
     def add_cell_listener(self, callback: Callable[[Cell], None]) -> None:
@@ -82,14 +81,14 @@ class ChangeableCell(ABC):
         """
         Change the bodies of the cell; make all changes, or none.
 
-        A running goal of which the rest would touch now is stopped soon after, as COLLISION. A
-        live session ends as PREEMPTED: the next target begins another one.
+        If the rest of a running goal would now touch a body, the goal soon ends as COLLISION. A
+        live session ends as PREEMPTED; the next target begins another one.
 
-        :param bodies: bodies to add; those of the same names are replaced. The pairs of a cell
-            that may touch, and its clearance for these bodies, come along.
+        :param bodies: bodies to add; they replace bodies of the same names. A :class:`.Cell`
+            brings its clearance for these bodies and its pairs that may touch.
         :param remove: names of bodies to remove first.
-        :param attach: names of bodies that the tool carries from now on, from where they are.
-        :param release: names of bodies that stay where the tool has them now.
+        :param attach: names of bodies that the tool picks up at their present poses.
+        :param release: names of bodies that the tool leaves at their present poses.
         :param may_touch: pairs of names that may touch from now on.
         :returns: the new cell.
         :raises InvalidGoal: a change cannot be made; the text says why.
@@ -131,7 +130,7 @@ class ChangeableCell(ABC):
     # ---- changes by goals ---------------------------------------------------------------------
 
     def _take_part_change(self, change: PartChange, q: Joints, T_flange_tcp: Pose) -> None:
-        """Take over a change at a point that the arm has passed; ``q``: the joints there [rad]."""
+        """Apply the change at a point that the arm has passed; ``q``: the joints there [rad]."""
         with self._cell_lock:
             try:
                 cell = changed(self.options.cell, change, self.arm, q, T_flange_tcp)
@@ -147,10 +146,10 @@ class ChangeableCell(ABC):
 
     def _check_cell_of(self, plan: Plan, planned_in: Cell | None) -> Cell:
         """
-        Check a plan that was made in another cell, and return the present cell.
+        Return the present cell, after checking a plan made in another one.
 
-        :param planned_in: the cell of the plan; None = it is not known.
-        :raises GoalRefused: the plan would touch, or changes bodies that are not there.
+        :param planned_in: the cell of the plan; None = unknown.
+        :raises GoalRefused: the plan would touch a body, or changes bodies that do not exist.
         """
         options = self.options
         if planned_in == options.cell:
@@ -166,7 +165,7 @@ class ChangeableCell(ABC):
         return options.cell
 
     def _check_running_soon(self) -> None:
-        """Have a thread check what is left of the running motion."""
+        """Start a thread that checks the rest of the running motion, unless one does already."""
         with self._cell_lock:
             self._cell_changes += 1
             if self._is_checking or not self._running.active:
@@ -188,7 +187,7 @@ class ChangeableCell(ABC):
                     return
 
     def _touches(self, active: ActiveMotion) -> str:
-        """Return why a motion cannot go on in the present cell, as a clause; '' = it can."""
+        """Return the reason why a motion must end in the present cell, as a clause; '' = none."""
         try:
             if active.path is not None:
                 active.path.check(self.arm, lambda: self.options)
@@ -207,7 +206,7 @@ def _with_bodies(cell: Cell, bodies: Cell | Iterable[CellBody]) -> Cell:
     """
     Return a cell with more bodies.
 
-    :raises InvalidGoal: something else than a body is given.
+    :raises InvalidGoal: an item is no body.
     """
     given = list(bodies.bodies if isinstance(bodies, Cell) else bodies)
     for body in given:
@@ -223,9 +222,9 @@ def _with_bodies(cell: Cell, bodies: Cell | Iterable[CellBody]) -> Cell:
 
 def _names(what: str, names: Iterable[str]) -> list[str]:
     """
-    Return names in a list.
+    Return names in a list; a single text counts as one name.
 
-    :raises InvalidGoal: a single text is given, or something else than texts.
+    :raises InvalidGoal: a name is no text.
     """
     given = [names] if isinstance(names, str) else list(names)
     for name in given:

@@ -3,8 +3,8 @@
 """
 Live sessions and freedrive, as methods of a driver.
 
-Both are motions, as goals are: only one motion runs at a time, each can be cancelled in the
-same way, and each has one outcome. But their paths are not planned before they run.
+Both are motions, like goals: only one motion runs at a time, each can be cancelled in the
+same way, and each has one outcome. Unlike goals, they have no path planned in advance.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from ur_cartesian_driver.motion.plan.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
 
-#: How far the square of a quaternion's length may be from 1.
+#: Tolerance for the squared length of a unit quaternion.
 UNIT_TOLERANCE = 1e-3
 
 
@@ -51,7 +51,7 @@ class LiveSession:
 
     def set_target(self, T_base_tcp: Pose, *, age: float = 0.0) -> None:
         """
-        Go to another target from now on; ignored by a session that has ended.
+        Go to another target from now on; no effect once the session has ended.
 
         :param T_base_tcp: the pose that the active TCP should reach, in the robot's base.
         :param age: how old the target is [s].
@@ -213,7 +213,7 @@ def plain_target(T_base_tcp: Pose, age: float) -> tuple[Pose, float]:
 
 def check_target(T_base_tcp: Pose, state: RobotState, options: PlanningOptions) -> None:
     """
-    Refuse a target that must be a mistake.
+    Refuse a malformed or distant target.
 
     :raises InvalidGoal: the target is malformed, or farther than ``max_approach_distance`` from
         the tool.
@@ -258,7 +258,7 @@ def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
         workspace=LiveWorkspace(
             planes=parse_planes(options.workspace_planes),
             # The cylinders around the links are thicker than the arm, so their clearance is
-            # checked only if it also leads to the refusal of goals.
+            # checked only if goals are refused for it, too.
             min_clearance=options.min_clearance if options.self_collision == 'refuse' else None,
             tool_radius=options.tool_radius,
             cell=options.cell,

@@ -38,7 +38,7 @@ NO_FEED_OVERRIDE = (
     'is not set in the running goal',
     'set its minimum in the goal',
 )
-#: The same: an input of the robot gives the signal.
+#: Why clients cannot slow a motion: an input of the robot gives the signal.
 HAS_FEED_INPUT = (
     'feed_override_input',
     'names an input of the robot, whose signal slows all goals',
@@ -78,13 +78,13 @@ class MotionHandle:
         """
         Stop the arm, as :meth:`cancel` does, because another motion follows.
 
-        :param by: a noun phrase for the other motion, which the text of the outcome contains.
+        :param by: the other motion, as a noun phrase for the text of the outcome.
         """
         self._send(CancelMotion(motion=self.number, preempted_by=by))
 
     def stop_before_collision(self, reason: str) -> None:
         """
-        Stop the arm, as :meth:`cancel` does, because it would touch; the outcome is COLLISION.
+        Stop the arm, as :meth:`cancel` does, because it would collide; the outcome is COLLISION.
 
         :param reason: a clause for the text of the outcome.
         """
@@ -117,8 +117,8 @@ class MotionHandle:
         :param replace_from_time: an alternative to ``replace_from_point``: the time [s], since the
             start of the goal, from which the new points replace the old ones. The motion goes on
             from its place at that time to the first new point.
-        :raises AlreadySent: the tail can no longer be replaced, because it was passed or
-            sent; the error gives the first point and time that still can be.
+        :raises AlreadySent: the tail can no longer be replaced, because it was passed or sent; the
+            error gives the first point and time that are still replaceable.
         :raises GoalRefused: a check or the robot loop refused the points, as the text explains; no
             point was accepted, and the goal goes on.
         """
@@ -201,7 +201,7 @@ class MotionHandle:
         :raises TimeoutError: no outcome came within ``timeout`` [s]; the motion goes on.
         """
         if timeout is None:
-            self._make_report()  # makes use of the time in which the arm moves
+            self._make_report()  # while the arm moves
         return self._outcome.result(timeout)
 
     def add_done_callback(self, callback: Callable[[Outcome], None]) -> None:
@@ -226,7 +226,7 @@ class ActiveMotion:
         Begin with no progress and no outcome.
 
         :param send: sends requests to the robot loop.
-        :param log: takes the errors of ``on_progress``.
+        :param log: receives the exceptions of ``on_progress``.
         :param path: follows the progress; None = the motion has no planned path.
         """
         self._outcome: Future[Outcome] = Future()

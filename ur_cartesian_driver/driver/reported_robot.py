@@ -108,7 +108,7 @@ class ReportedRobot:
             run_callback(listener, status, self._log)
 
     def _update_limits(self, limits: JointLimits) -> None:
-        """Tighten the joint limits for planning to those that the robot reports."""
+        """Tighten the joint limits for planning to the limits that the robot reports."""
         model = robot_model(self._config.ur_type).limited_to(limits)
         self.arm = Arm(model, self.arm.geometry)
         for k in sorted(model.reported_ranges):

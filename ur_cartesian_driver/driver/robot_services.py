@@ -98,7 +98,7 @@ class RobotServices(ABC):
         return self.call(calls.WatchContactCall())
 
     def end_contact_watch(self) -> ServiceAnswer:
-        """End the contact watch, whose call then gets its answer; do nothing if there is none."""
+        """End the contact watch, and so answer its call; do nothing if there is no watch."""
         return self.call(calls.EndContactWatchCall()).result()
 
     def hand_back_control(self) -> ServiceAnswer:
@@ -111,7 +111,7 @@ class RobotServices(ABC):
 
         :param script: a secondary program (``sec``), or in headless mode a primary one (``def``),
             after which the driver's own program is sent again.
-        :param timeout: how long a primary program may take [s].
+        :param timeout: longest duration of a primary program [s].
         """
         return self.call(calls.RunScriptCall(script=script, timeout=timeout)).result()
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The path of a running motion: what is left of it, and how it changes the cell."""
+"""The rest of a running motion's path, and the changes of the cell along it."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ class RunningPath:
         """
         self._start, self._take_part_change = plan.start, take_part_change
         self._T_flange_active = plan.T_flange_active
-        #: Guards the attributes below; a change of the cell and its removal from the list are
-        #: one step, in which a listener of the cell may append points.
+        #: Guards the attributes below. Reentrant: a change leaves the list in the same step in
+        #: which it is made, and a listener of the cell may append points during that step.
         self._lock = threading.RLock()
         self._paths = [PathLeft.of(plan, spline or spline_of(plan))]
-        #: The changes to come, each with the joints at its point [rad].
+        #: The pending changes, each with the joints at its point [rad].
         self._part_changes = [
             (change, joints_at(plan, change.waypoint))
             for change in sorted(plan.goal.part_changes, key=lambda each: each.waypoint)
@@ -64,7 +64,7 @@ class RunningPath:
         elif outcome.stopped is not None:
             self._pass_points(outcome.stopped.point + outcome.stopped.fraction - NO_FRACTION)
         with self._lock:
-            self._paths = []  # long ones have many rows, and the handle may stay
+            self._paths = []  # frees their rows, even if the user keeps the handle
 
     def _pass_points(self, place: float) -> None:
         """
@@ -82,9 +82,9 @@ class RunningPath:
 
     def append(self, plan: Plan, start_time: float, spline: JointSpline | None) -> None:
         """
-        Add appended points.
+        Add the plan of appended points.
 
-        :param start_time: when they take the place of what was planned before [s].
+        :param start_time: time from which it replaces the earlier plan [s].
         """
         now = 0.0 if self._progress is None else self._progress.time
         with self._lock:
@@ -94,10 +94,10 @@ class RunningPath:
 
     def check(self, arm: Arm, options_now: Callable[[], PlanningOptions]) -> None:
         """
-        Check what is left of the path in another cell.
+        Check the rest of the path in another cell.
 
-        :param options_now: returns the options with the cell, without the changes to come.
-        :raises GoalRefused: it would touch; or its joints are not known.
+        :param options_now: returns the options, whose cell does not have the pending changes.
+        :raises GoalRefused: the path would touch a body, or its joints are unknown.
         """
         with self._lock:
             progress, time, q = self._progress, 0.0, self._start
@@ -105,6 +105,6 @@ class RunningPath:
                 time, q = progress.time, progress.desired_q
             paths, changes = list(self._paths), [change for change, _ in self._part_changes]
             options = options_now()
-        for path in paths:  # of several, none changes the cell
+        for path in paths:  # a path that changes the cell is the only one
             q = path.check(arm, options, q, changes, time)
             time = max(time, path.end)

@@ -40,7 +40,7 @@ LENGTH = struct.Struct('>I')
 Buffer: TypeAlias = bytes | memoryview
 #: Arrays of at least the first size are sent beside the pickle, at multiples of the second [B].
 LARGE_ARRAY, ALIGNMENT = 1 << 16, 16
-#: The reason of the refusal that is sent when the receiver cannot read the message.
+#: The reason given if the receiver cannot read the message.
 UNREADABLE = (
     'The robot process cannot read the request, because it contains objects of classes that only '
     'your program has; use those of this package.'
@@ -172,9 +172,9 @@ class CancelMotion:
     """Stop the motion, if it is still running."""
 
     motion: int
-    #: The motion that preempts this one, as part of a sentence; empty = this one is cancelled.
+    #: The motion that preempts this one, as a noun phrase; empty = this one is cancelled.
     preempted_by: str = ''
-    #: Why what is left of the path would touch, as a clause; empty = this is not the reason.
+    #: Why the rest of the path would collide, as a clause; empty = there is another reason.
     collision: str = ''
 
 
@@ -351,7 +351,7 @@ def pack(message: Request | Notification) -> bytes:
 
 def pack_parts(message: Request | Notification) -> list[Buffer]:
     """
-    Return a message in parts, which are sent one after the other; large arrays are not copied.
+    Return a message in parts, to be sent in this order; large arrays are not copied.
 
     :raises LocalProtocolError: a part of the message cannot be pickled.
     """
@@ -384,7 +384,7 @@ def pack_parts(message: Request | Notification) -> list[Buffer]:
 
 def unpack(body: bytes) -> Request | Notification:
     """
-    Return the message in the bytes that follow the length; its large arrays are parts of them.
+    Decode the bytes after the length; large arrays of the message are views of these bytes.
 
     :raises Unreadable: the bytes are no pickles, or use classes that this process does not have.
     """

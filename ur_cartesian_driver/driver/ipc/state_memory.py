@@ -55,7 +55,7 @@ def _compile_pack() -> Callable[[RobotState], bytes]:
 
 
 def _readers() -> Iterator[tuple[int | slice, Callable[[Any], Any]]]:
-    """Yield, for each field, the place of its numbers and the function that converts them."""
+    """Yield the place of each field's numbers, and the function that converts them."""
     start = 1
     for row in STATE_TABLE:
         size = _SIZES.get(row.type, 1)
@@ -91,7 +91,7 @@ class StateMemory:
         """Map the memory; the descriptor may be closed afterwards."""
         self._memory = mmap.mmap(descriptor, _SIZE)
         self._count = 0
-        #: The count at which a state was read last, and that state.
+        #: Count and state of the last read.
         self._last_read: tuple[int, RobotState | None] = 0, None
 
     def close(self) -> None:

@@ -15,7 +15,7 @@ from ur_cartesian_driver.driver.recordings.recorder import Recorder
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.robot.link import RobotLink
 
-#: Outcomes whose sentence does not say why they happened; the event log does.
+#: Outcomes whose text lacks the cause; the event log has it.
 CODES_WITH_CAUSE = frozenset(
     {
         ErrorCode.PROTECTIVE_STOP,
@@ -27,7 +27,7 @@ CODES_WITH_CAUSE = frozenset(
 )
 #: Outcomes whose cause the robot sends on another connection, in the same cycle or soon after.
 CODES_WITH_LATE_CAUSE = frozenset({ErrorCode.PROTECTIVE_STOP, ErrorCode.EMERGENCY_STOP})
-#: How long the report of such an outcome waits for the cause [s].
+#: Longest wait for such a cause [s].
 CAUSE_TIMEOUT = 0.05
 #: Reports up to this long before the start of a motion can explain its end [s]: a program fails
 #: some cycles before its sockets close.
@@ -43,7 +43,7 @@ class EndReporter:
         """Begin with nothing to report."""
         self._link, self._pipe, self._recorder = link, pipe, recorder
         self._outputs = outputs
-        #: The end that waits for its cause or for the write of its outputs; None = no end waits.
+        #: The end that still waits for its cause, or for its outputs to be written; None = none.
         self._pending: MotionEnded | None = None
         #: Only reports since this time can explain the end [s].
         self._since = -inf
@@ -58,7 +58,7 @@ class EndReporter:
         return self._pending is not None
 
     def report(self, ended: MotionEnded) -> None:
-        """Report an end once it is known what caused it, and whether its outputs are safe."""
+        """Report an end, as soon as its cause and the state of its outputs are known."""
         self._pending = ended
         self._outputs.when_done(self._report_with_cause)
 

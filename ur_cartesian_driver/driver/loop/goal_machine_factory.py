@@ -118,7 +118,7 @@ FEEDERS: Mapping[ExecutionMode, MakeFeeder] = {
 
 
 def _feed(feeder: Feeder, bounds: FeedOverride, feed_input: FeedInput | None) -> FeedRequests:
-    """Return the feed override of whoever runs the motion: the driver or the robot program."""
+    """Return the feed override for the side that times the motion: driver or robot program."""
     if isinstance(feeder, ServoFeeder):
         return SetpointFeed(bounds, feeder.stream, feed_input)
     return ProgramFeed(bounds, feed_input)
@@ -129,7 +129,7 @@ def _monitor(request: StartMotion, config: DriverConfig) -> GoalMonitor:
 
 
 def is_slow_to_make(request: StartMotion) -> bool:
-    """Return whether making the machine takes long: for a calibrated arm, or among bodies."""
+    """Return whether making the machine is slow: for a calibrated arm, or a cell with bodies."""
     arm, live = request.arm, request.live
     if live is not None and live.settings.limits.workspace.cell:
         return True

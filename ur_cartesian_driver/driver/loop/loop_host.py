@@ -3,8 +3,8 @@
 """
 Run the robot loop in its own process, or in a thread; no other module depends on the choice.
 
-The process is not forked, because the owner may be a ROS node with many threads. It inherits two
-open descriptors: of the pipe and of the shared memory. If the process dies, its sockets close and
+The process is not forked, because the owner may be a ROS node with many threads. It inherits the
+open descriptors of the pipe and the shared memory. If the process dies, its sockets close and
 the robot program stops the arm; if the owner dies, the pipe closes and the loop stops the arm.
 """
 
@@ -26,14 +26,14 @@ from ur_cartesian_driver.driver.loop.robot_loop import serve
 MODULE = 'ur_cartesian_driver.driver'
 #: A robot loop that sends nothing for this long [s] hangs: it should send a heartbeat every 0.5 s.
 SILENCE_TIMEOUT = 5.0
-#: How long the first message of a robot loop may take [s]: a new process first imports modules.
+#: Longest wait for a robot loop's first message [s]: a new process first imports modules.
 START_TIMEOUT = 20.0
-#: How long the robot loop may take to stop the arm and end before its process is killed [s].
+#: Time for the robot loop to stop the arm and end, before its process is killed [s].
 JOIN_TIMEOUT = 2.0
 
 
 class LoopHost(Protocol):
-    """What runs a robot loop: a process or a thread."""
+    """The host of a robot loop: a process or a thread."""
 
     #: The owner's end of the pipe, a blocking socket. Its timeout is :data:`START_TIMEOUT`; after
     #: the first message, the owner shortens it to :data:`SILENCE_TIMEOUT`.

@@ -90,7 +90,7 @@ from ur_cartesian_driver.robot.rtde.register_connection import (
 
 #: Data of this size [bytes] or more takes longer than a few milliseconds to unpack or prepare.
 MIN_THREAD_SIZE = 1 << 18
-#: How long to wait at shutdown until the recording of the last motion is complete [s].
+#: Longest wait at shutdown for the recording of the last motion [s].
 RECORD_TIMEOUT = 1.0
 
 T = TypeVar('T')
@@ -413,7 +413,7 @@ class MotionRunner:
             self._recorder.add_state(state, *self._machine.motion_status())
 
     def record_signals(self, signals: Signals) -> None:
-        """Keep the newest outputs, for the states that are recorded next."""
+        """Keep the newest outputs for the next recorded states."""
         self._recorder.add_signals(signals)
 
 
@@ -431,7 +431,7 @@ def _call_soon(
 
 async def run_in_thread_if_large(size: int, function: Callable[..., T], *arguments: object) -> T:
     """
-    Call a function; if it handles much data, in a thread, so that keepalives are sent in time.
+    Call a function, in a thread if it handles much data, so that keepalives stay on time.
 
     :param size: amount of data that the function handles [bytes].
     """

@@ -34,7 +34,7 @@ class NewestState:
         self._longest_gap = self._oldest = 0.0
 
     def keep(self, state: RobotState) -> None:
-        """Keep a state, which :meth:`publish` will publish."""
+        """Keep a state for :meth:`publish`."""
         self.latest, self._is_published = state, False
 
     def publish(self) -> None:

@@ -20,7 +20,7 @@ RETRY_PERIOD, RETRY_TIMEOUT = 0.25, 5.0
 
 
 class OutputSecurer:
-    """Carries out one order after the other; a new order replaces those still to be written."""
+    """Carries out one order after the other; a new order replaces all unwritten ones."""
 
     def __init__(
         self,
@@ -39,7 +39,7 @@ class OutputSecurer:
         self._spawn, self._on_event = spawn, on_event
         #: Numbers of the newest order, and of the first one of this motion.
         self._newest = self._first = 0
-        #: How many orders to secure outputs have not ended their first attempt.
+        #: Number of orders whose first attempt has not ended.
         self._pending = 0
         #: The changed outputs with their values before the first change, until they are restored.
         self._originals: dict[tuple[int, int], SafeOutput] = {}
@@ -56,7 +56,7 @@ class OutputSecurer:
         self._spawn(self._secure(outputs, self._newest))
 
     def give_back(self) -> None:
-        """Write nothing more for the last pause, after which the robot program restores values."""
+        """Stop writing: the pause has ended, and the robot program restores the values."""
         self._newest += 1
         self._originals = {}
 

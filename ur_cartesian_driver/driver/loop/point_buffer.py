@@ -16,11 +16,11 @@ class PointBuffer:
         self._first = 0
 
     def __len__(self) -> int:
-        """Return how many records are kept."""
+        """Return the number of kept records."""
         return len(self._data) // POINT_SIZE
 
     def put(self, behind: int, data: bytes) -> None:
-        """Replace all records after the first ``behind`` records of the goal by new ones."""
+        """Replace all records of the goal, except its first ``behind`` ones."""
         del self._data[(behind - self._first) * POINT_SIZE :]
         self._data += data
 

@@ -123,8 +123,8 @@ class RobotLoop:
                     await self._serve_requests(requests)
                 finally:
                     self._motion.close()
-                    # While the link is open. Our robot program restores the TCP by itself, but
-                    # another program may be running.
+                    # This needs the open link. Our robot program would restore the TCP by
+                    # itself, but another program may be running.
                     self._tcp_restorer.restore_if_due(self._newest.latest)
                 for task in (link, ticks, *self._tasks):
                     task.cancel()

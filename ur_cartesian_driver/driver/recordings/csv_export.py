@@ -31,7 +31,7 @@ _PARTS = {
     'output': ('0', '1'),  # [A] or [V]
 }
 _SECONDS = ('time', 'lag', 'buffered')
-#: Packets whose numbers are objects of Python at a time: those of an hour would take gigabytes.
+#: Packets converted to Python numbers at a time; an hour of packets would take gigabytes.
 _BLOCK = 4096
 
 

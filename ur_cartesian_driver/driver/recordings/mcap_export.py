@@ -244,7 +244,7 @@ class _Messages:
 
 def _number_records(topic: str, values: NDArray[Any], times: list[int]) -> Iterator[_Record]:
     """
-    Yield the numbers of a column when they change, and no NaN; an unknown integer is -1.
+    Yield the numbers of a column at their changes, without NaN; an unknown integer is -1.
 
     The last number before each change is yielded too, so that a plot with straight lines shows
     steps.

@@ -46,7 +46,7 @@ MAX_PENDING_JOBS = 1000
 #: Pause of the finisher after each small part of a file [s]: if a thread never pauses, the other
 #: threads wait 5 ms and more for the interpreter.
 YIELD_PAUSE = 0.0002
-#: Segments and slow stretches that have a line in the report that is kept.
+#: Largest number of segments and slow stretches with a line in the recorded report.
 MAX_RECORDED_LINES = 1000
 MEGABYTE = 1_000_000
 
@@ -135,14 +135,14 @@ class Recorder:
         #: Slowly makes one file from the folder after the motion; None = not started yet.
         self._finisher: _Worker | None = None
         self._is_closing = False
-        #: The folder of the running motion; only the writer uses it, but for
-        #: ``lost_rows`` and ``is_plan_whole``.
+        #: The folder of the running motion; apart from ``lost_rows`` and ``is_plan_whole``,
+        #: only the writer uses it.
         self._folder: RecordingFolder | None = None
         # Buffers for rows: the buffer being filled, the bytes used in it, and the free buffers.
         self._buffer, self._used = bytearray(), 0
         self._free_buffers: SimpleQueue[bytearray] = SimpleQueue()
-        #: Start of the motion by the controller's clock; the newest packet's time since then; the
-        #: time since then at which the buffer has to be written [s].
+        #: Start of the motion by the controller's clock [s]; since then, the time of the newest
+        #: packet, and the time at which the buffer is due [s].
         self._start_time = self._time = self._flush_due = 0.0
         self._digital, self._analog = -1, (nan, nan)
         #: The previous goal's count of begun points, while the robot still reports it.
@@ -243,7 +243,7 @@ class Recorder:
             self._flush(folder)
 
     def add_signals(self, signals: Signals) -> None:
-        """Keep the newest outputs, for the packets that are recorded next."""
+        """Keep the newest outputs for the next recorded packets."""
         out = signals.outputs
         flags = (*out.standard, *out.configurable, *out.tool)
         self._digital = sum(1 << i for i, flag in enumerate(flags) if flag)
@@ -306,12 +306,12 @@ class Recorder:
             free_buffers.put(buffer)
 
         if self._writer is not None:
-            self._writer.submit(write)  # at most as many such jobs wait as there are buffers
+            self._writer.submit(write)  # never more waiting jobs than buffers
 
     def _submit(
         self, folder: RecordingFolder, work: Callable[[], None], *, always: bool = False
     ) -> bool:
-        """Give the writer a job, unless too many jobs wait; return whether it has the job."""
+        """Give the writer a job, unless too many jobs wait; return whether it took the job."""
         writer = self._writer
         if writer is None or (writer.jobs.qsize() >= MAX_PENDING_JOBS and not always):
             return False

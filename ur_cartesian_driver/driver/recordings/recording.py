@@ -51,9 +51,9 @@ class RecordedDeviation:
     #: (n,) distance [m] and angle [rad] of the controller's own target from the path.
     target_position: Floats
     target_angle: Floats
-    #: (n,) planned time, at full speed, of the place that the target has reached [s].
+    #: (n,) planned time of the target's place on the path, at full speed [s].
     planned_time: Floats
-    #: (n,) the next point of the goal at that place; -1 = no plan.
+    #: (n,) the goal's next point from that place; -1 = no plan.
     waypoint: Int32s
 
 
@@ -129,7 +129,7 @@ class Recording:
         except _NoRecording:
             raise
         except Exception as error:  # NumPy, zipfile, zlib and json each raise their own errors
-            # A changed file can lead them to a place before its beginning.
+            # EINVAL: a corrupt file refers to a place before its beginning.
             if isinstance(error, OSError) and error.errno != EINVAL:
                 raise
             raise ValueError(f'{path} is damaged: {error}') from error
@@ -137,7 +137,7 @@ class Recording:
         return found
 
     def _check_columns(self, path: Path) -> None:
-        """Refuse columns of different lengths or wrong types, which a changed file may have."""
+        """Refuse columns of different lengths or wrong types, as in a corrupt file."""
         for names, rows in (
             (_EXECUTED_COLUMNS, len(self.time)),
             (_PLANNED_COLUMNS, len(self.planned_time)),
@@ -166,7 +166,7 @@ class Recording:
     @property
     def pulses(self) -> dict[str, NDArray[np.int_]]:
         """
-        By output, such as 'standard_digital 2': (k,) the packet that shows each of its pulses.
+        (k,) the packet that shows each pulse, by output, such as 'standard_digital 2'.
 
         A packet that shows several pulses, because packets were lost, is listed once for each.
         """
@@ -179,7 +179,7 @@ class Recording:
 
     @property
     def effective_speed(self) -> Floats:
-        """(n,) how fast the motion of the program ran, 0 to 1."""
+        """(n,) speed of the program's motion, as a fraction 0 to 1."""
         speed = EffectiveSpeed()
         rows = (self.time, self.speed_scaling, self.slider, self.runtime_state)
         return np.array([speed.update(*row) for row in zip(*rows, strict=True)], dtype=np.float64)
@@ -199,9 +199,9 @@ class Recording:
 
     def on_the_part(self) -> Recording:
         """
-        Return the recording as seen from the frame of the plan, if this frame is on a held part.
+        Return the recording in the frame of the plan, if this frame is on a held part.
 
-        Poses and twists are then those of the fixed tool in that frame, as the planned poses are.
+        All poses and twists then describe the fixed tool in that frame, as the planned poses do.
         """
         known = self.metadata.get('moving_frame')
         if known is None:
@@ -234,7 +234,7 @@ class Recording:
 
         The target is followed along the path, only forwards; the measured pose is compared with
         the nearest place on the path around the target. So a path that crosses itself is followed
-        in the right order, and a robot that is slowed down is not off the path. For a recording
+        in the right order, and a slowed robot is not off its path. For a recording
         without a plan (of live targets), the numbers are NaN, and the waypoints -1.
         """
         rows = np.full((len(self.time), 6), np.nan)
@@ -318,7 +318,7 @@ def _from_folder(path: Path, max_rows: int) -> Recording:
 
 
 def _complete(columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Return all columns, also those that an older recording does not have."""
+    """Return all columns, filling in the ones that an older recording lacks."""
     unknown = {
         name: np.full((len(columns['time']), *kind.shape), disk.ADDED_COLUMNS[name], kind.base)
         for name in disk.ADDED_COLUMNS

@@ -60,7 +60,7 @@ class RecordingFolder:
         self._is_broken = False
         #: Times of the samples that the last :meth:`write_plan` has written [s].
         self._last_times: Floats = np.empty(0)
-        #: How many rows were lost because the disk was too slow.
+        #: Number of rows lost because the disk was too slow.
         self.lost_rows = 0
         #: False once a piece of the plan was lost because the disk was too slow.
         self.is_plan_whole = True
@@ -71,7 +71,7 @@ class RecordingFolder:
         self._path = _new(self._directory / f'{recording_name(self._metadata)}{disk.PART_SUFFIX}')
         self._rows = disk.GrowingArray(self._path / disk.EXECUTED_FILE, disk.EXECUTED_DTYPE)
         # The lock shows that this process writes the folder; the system releases the lock when
-        # the process ends. Another arm's process holds it at most while it looks at it.
+        # the process ends. A process of another arm holds it only for a short check.
         fcntl.flock(self._rows.file, fcntl.LOCK_EX)
         self._plan = disk.GrowingArray(self._path / disk.PLANNED_FILE, disk.PLANNED_DTYPE)
         self._events = open(self._path / disk.EVENTS_FILE, 'xb', buffering=0)  # noqa: SIM115  # open until close()

@@ -64,7 +64,7 @@ EXECUTED_STRUCT = struct.Struct(
         for name in EXECUTED_DTYPE.names or ()
     )
 )
-#: Columns that older recordings do not have, and what is read in their place.
+#: Columns that older recordings lack, with the values read in their place.
 ADDED_COLUMNS = {'wrench': np.nan, 'pulse_counts': 0}
 #: One sample of the planned path.
 PLANNED_DTYPE = np.dtype([('time', '<f8'), ('pose', '<f8', 7), ('point', '<i4')])
@@ -74,10 +74,10 @@ PART_SUFFIX = '.part'
 #: Names of the files in a folder.
 METADATA_FILE, EVENTS_FILE = 'metadata.json', 'events.jsonl'
 EXECUTED_FILE, PLANNED_FILE = 'executed.npy', 'planned.npy'
-#: How many rows are processed together, which holds the interpreter for 0.1 ms.
+#: Rows processed together, which holds the interpreter for 0.1 ms.
 CHUNK = 512
-#: How many detected events are kept. A path of a million points has a million events, but the
-#: column ``waypoint`` shows them too.
+#: Largest number of detected events kept. A path of a million points has a million events, but
+#: the column ``waypoint`` shows them too.
 MAX_EVENTS = 10_000
 #: Largest number of characters in the text of an event; the metadata has the whole outcome.
 MAX_EVENT_TEXT = 120
