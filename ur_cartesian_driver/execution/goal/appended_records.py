@@ -32,9 +32,9 @@ class AppendedRecords(Phrasing, Reporting):
         self._monitor = monitor
         #: Whether more points may come.
         self.is_open = True
-        #: How many records will run whatever is appended: all except the ending.
+        #: Number of records that will run in any case: all except the ending.
         self.committed = monitor.job.points - monitor.job.ending_records
-        #: How often the motion was brought to rest; the point after which it last came to rest.
+        #: Number of stops for lack of points; the point of the last such stop.
         self._stop_count = self._last_stop_point = 0
         self._is_resting = False
 
@@ -44,7 +44,7 @@ class AppendedRecords(Phrasing, Reporting):
         """
         Accept all points of a request, or none, and return the answer.
 
-        :param sent: how many records of the goal can no longer be replaced.
+        :param sent: number of records of the goal that can no longer be replaced.
         :param sent_until: the time until which the motion can no longer be replaced [s].
         """
         answer = partial(AnswerAppend, number=append_job.number)
@@ -69,7 +69,7 @@ class AppendedRecords(Phrasing, Reporting):
 
     def supply(self, state: GoalState, *, runs_out: bool, has_more: bool) -> Meaning:
         """
-        Return the signal that is due about the supply of points (such as STARVING), or none.
+        Return the due signal about the supply of points (such as STARVING), or none.
 
         :param runs_out: whether only the ending is left to send.
         :param has_more: whether the goal has a motion after the ending.

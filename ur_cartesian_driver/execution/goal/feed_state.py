@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 
 class FeedState(NamedTuple):
-    """What a feed override makes of a motion."""
+    """The effect of a feed override on a motion."""
 
     #: The fraction of the planned speed, 0 to 1.
     value: float = 1.0
-    #: By how much the motion is later because of it, in scaled time [s].
+    #: The delay of the motion by the override, in scaled time [s].
     delay: float = 0.0
     #: Whether a valid signal determines the fraction.
     is_valid: bool = True

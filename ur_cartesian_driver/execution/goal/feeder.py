@@ -112,7 +112,7 @@ class Appendable:
         return [AnswerAppend(number=append_job.number, refusal='The goal is not open.')]
 
     def supply(self, state: GoalState) -> Meaning:
-        """Return the signal that is due about the supply of points (such as STARVING), or none."""
+        """Return the due signal about the supply of points (such as STARVING), or none."""
         return NO_MEANING
 
 
@@ -176,7 +176,7 @@ class Ageing:
 
     def age(self, now: float) -> list[GoalCommand]:
         """
-        Drop what has grown too old, and return the warnings that are due.
+        Drop stale values, and return the due warnings.
 
         :param now: time of a steady clock [s].
         """

@@ -32,7 +32,7 @@ class SendControl(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetFeedTarget(GoalCommand):
-    """Have the robot program go to a feed, for the rest of the goal or until the next one."""
+    """Have the robot program change to a feed, until the next one or the end of the goal."""
 
     #: Fraction of the planned speed, 0 to 1.
     fraction: float

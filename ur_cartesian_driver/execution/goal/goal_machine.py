@@ -181,7 +181,7 @@ class GoalMachine:
         return commands
 
     def _seen(self, packet: RobotState) -> RobotState:
-        """Return a packet as seen from the frame of the path: its poses and rates of the tool."""
+        """Return a packet with the poses and rates of the tool in the frame of the path."""
         frame = self.job.moving_frame
         return packet if frame is None else frame.seen(packet)
 

@@ -62,25 +62,24 @@ class GoalMonitor:
         #: Whether the robot program is known to have read START: it has begun a point, or the
         #: target has moved.
         self._has_begun = False
-        #: How many motions of the goal the robot has begun: in total; and in the trajectories
-        #: before the present one.
+        #: Number of begun motions of the goal: in total, and in earlier trajectories.
         self._motions_begun = self._motions_before = 0
         #: The count reported before START (None = no trajectory of this goal was started yet);
         #: whether the robot may still report that count.
         self._stale_begun: int | None = None
         self._awaits_count = False
-        #: How long the program has been running its newest motion [s]; that motion's number.
+        #: Running time of the newest motion [s]; its number.
         self._running_time, self._running = 0.0, 0
         #: The newest packet; None before the first packet.
         self.latest: RobotState | None = None
         self._applied_offset, self._feed = NO_OFFSET, FULL_FEED
         #: Whether a watch beside the goal stops the arm at contact, and moves it back.
         self.contact_is_watched = False
-        #: Scaled time: time since the start, as the controller's clock ran [s]; by how much the
-        #: goal may end later, because the motion began late, waited or was slowed [s].
+        #: Scaled time: time since the start, as the controller's clock ran [s]; delay allowed to
+        #: the goal, because the motion began late, waited or was slowed [s].
         self.scaled_time = self.allowed_delay = 0.0
-        #: How long the slider or a pause held up the controller's clock before the newest packet
-        #: [s], whether or not the arm moved.
+        #: Delay of the controller's clock by slider and pauses, in the interval before the newest
+        #: packet [s], whether or not the arm moved.
         self.held_time = 0.0
         #: Speed of the motion's clock just before the newest packet: 0 = stopped, 1 = real time.
         self.rate = 0.0
@@ -93,12 +92,12 @@ class GoalMonitor:
 
         :param stale_begun: the count of begun motions that the robot reports until it reads START:
             the register keeps the previous goal's count, so the count is trusted once it changes.
-        :param sent: how many records of the goal were sent before.
+        :param sent: number of records of the goal that were sent before.
         """
         self._stale_begun, self._awaits_count = stale_begun, True
         self._motions_begun = self._motions_before = self.records.motions_before(sent)
         self._standstill.restart()
-        # What was late before is past, and the wait at rest is no delay of the motion.
+        # Earlier delays no longer count, and the wait at rest does not delay the motion.
         self.scaled_time, self.allowed_delay = self._tracker.time(), 0.0
 
     def update(
@@ -114,14 +113,14 @@ class GoalMonitor:
         """
         Process a packet; while the goal moves the arm, also advance time and path position.
 
-        :param begun: how many motions the robot reports as begun; None = it gives no count.
-        :param behind: by how many motions the controller's target may lag behind that count.
+        :param begun: number of begun motions that the robot reports; None = it gives no count.
+        :param behind: largest lag of the controller's target behind that count, in motions.
         :param applied_offset: the offset that displaces the path at the controller's target.
         :param feed: the feed override of the motion.
         """
         before, self.latest = self.latest, state
         self._applied_offset = applied_offset
-        # The time of the goal passes as slowly as its feed says: that is no delay.
+        # The goal may end later by the delay that its feed override asks for.
         self.allowed_delay += feed.delay - self._feed.delay
         self._feed = feed
         passed = 0.0 if before is None else max(0.0, state.timestamp - before.timestamp)
@@ -181,7 +180,7 @@ class GoalMonitor:
 
     @property
     def motions_begun(self) -> int:
-        """How many motions of the goal the robot program has begun."""
+        """The number of motions of the goal that the robot program has begun."""
         return self._motions_begun
 
     def awaits_count(self) -> bool:
@@ -205,7 +204,7 @@ class GoalMonitor:
         return max(0.0, self.records.end_time(sent) - self._tracker.time())
 
     def records_begun(self) -> int:
-        """Return how many records of this goal the robot is known to have begun."""
+        """Return the number of records of this goal that the robot has begun, as far as known."""
         return max(
             self.records.begun_records(self._motions_begun),
             self.records.count_before_waypoint(self.waypoint()),
@@ -276,7 +275,7 @@ class GoalMonitor:
         return f'{subject} executed in {self.scaled_time:.3f} s.'
 
     def location(self) -> str:
-        """Return where on the path the arm is, as a clause."""
+        """Return the place of the arm on the path, as a clause."""
         return self.script_call()[1] or f'on the way to point {self.waypoint()}'
 
     def contact_clause(self, state: RobotState) -> str:
@@ -423,7 +422,7 @@ class GoalMonitor:
         return Pose(add(planned.position, shift), planned.quaternion) if any(shift) else planned
 
     def _tracked(self, pose: Pose) -> Pose:
-        """Return a pose without path offset and yield, except yield that may be progress."""
+        """Return a pose without path offset and yield; yield that may be progress stays."""
         pose, press = self._undisplaced(pose), self._press()
         if press is None or self._tracker.time() > press.end:
             return pose

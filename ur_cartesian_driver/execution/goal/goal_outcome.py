@@ -51,7 +51,7 @@ class GoalOutcome:
 
     def late_arrival(self, tolerance: float) -> str:
         """
-        Return how late the last point was reached, as a clause; '' = in time.
+        Return the delay of the last point, as a clause; '' = in time.
 
         :param tolerance: allowed delay [s]; negative = any delay.
         """

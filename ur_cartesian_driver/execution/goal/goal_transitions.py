@@ -134,8 +134,8 @@ _RESULTS = (
 #: Stops that users, or the owner of the goal, ask for.
 _REQUESTED_STOPS = (GoalSignal.CANCEL, GoalSignal.PREEMPT, GoalSignal.COLLISION)
 
-#: Transitions if the arm stops by itself: this deeper reason replaces an outcome that is already
-#: decided and waits for the stop.
+#: Transitions if the arm stops by itself: this deeper reason replaces an outcome that is decided
+#: but still waits for the stop.
 _ON_STOP = {
     **_decide(GoalState.ENDED, *_STOPS),
     **_decide(GoalState.PROGRAM_LOST, GoalSignal.PROGRAM_STOPPED),
@@ -225,8 +225,8 @@ _SAFETY_STOPS = _EMERGENCY_STOPS | int(
 NO_STOP = SafetyStatus(0)
 #: Stops after which the robot goes on once somebody unlocks it and plays its program.
 RESUMABLE_STOPS = SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.SAFEGUARD_STOPPED
-#: Modes of newer safety functions, and the stop that each of them is. It is not documented whether
-#: the safety status has the bit of that stop, too.
+#: Modes of newer safety functions, with the kind of stop of each. UR does not document whether the
+#: safety status has the bit of that stop, too.
 _STOP_OF_MODE = {
     SafetyMode.AUTOMATIC_MODE_SAFEGUARD_STOP: SafetyStatus.SAFEGUARD_STOPPED,
     SafetyMode.SYSTEM_THREE_POSITION_ENABLING_STOP: SafetyStatus.SAFEGUARD_STOPPED,

@@ -49,12 +49,12 @@ from ur_cartesian_driver.motion.plan.primitive import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hold:
-    """Where set-points are held while the robot program does something at a point."""
+    """A pause of the set-points, while the robot program acts at a point."""
 
-    #: When the arm arrives there [s]; when the path goes on, after all planned rests [s].
+    #: Arrival at the point [s]; continuation of the path, after all planned rests [s].
     begin: float
     end: float
-    #: How many motions have begun once the robot program is done; inf = the goal ends there.
+    #: Number of begun motions once the robot program is done; inf = the goal ends there.
     motions: float
 
 
@@ -62,17 +62,17 @@ class Hold:
 class MotionJob:
     """The part of a plan that a goal machine needs."""
 
-    #: How many records the job has on the wire: motions and outputs.
+    #: Number of records on the wire: motions and outputs.
     points: int
     reference: ReferencePath
     #: Expected time from the start of the goal to the end of the motion, at full speed [s].
     duration: float
     #: When the last point is due [s]; None = the goal gives no times.
     due: float | None = None
-    #: How long after the end of the motion the last output is switched [s]; ``due`` includes it.
+    #: Delay of the last output after the end of the motion [s]; ``due`` includes it.
     output_delay: float = 0.0
     T_base_frame: Pose = IDENTITY
-    #: How the frame of the goal moves; None = it stands in the base.
+    #: The motion of the goal's frame; None = the frame is fixed in the base.
     moving_frame: MovingFrame | None = None
     #: The robot's TCP at the time of planning.
     T_flange_active: Pose = IDENTITY
@@ -98,20 +98,19 @@ class MotionJob:
     #: (records,) mask of the records that are motions, which the robot program counts; empty = all
     #: records are motions.
     is_motion: Flags = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
-    #: (records,) when each record is planned to end [s]; an output ends with its motion. Empty =
-    #: when the reference path arrives at the waypoint of the record.
+    #: (records,) planned end of each record [s]; an output ends with its motion. Empty = the
+    #: arrival of the reference path at the waypoint of the record.
     end_times: Floats = field(default_factory=lambda: np.empty(0))
-    #: (records,) when the robot program, while it runs a record, asks for the next one [s]: when
-    #: the running record ends or, with a blend at its end, when that blend begins. Empty = at
-    #: ``end_times``.
+    #: (records,) time at which the robot program, running a record, asks for the next one [s]: the
+    #: end of the record or, with a blend there, the beginning of the blend. Empty = ``end_times``.
     request_times: Floats = field(default_factory=lambda: np.empty(0))
     #: Whether points may be appended (keep_open).
     keep_open: bool = False
     #: Motion farther ahead of the arm than this time must remain replaceable [s]; 0 = need not.
     replace_horizon: float = 0.0
-    #: How many records at the end of an open goal bring the arm to rest if nothing is appended.
+    #: Number of records at the end of an open goal that bring the arm to rest if none follow.
     ending_records: int = 0
-    #: Whether at some point the robot program does something while the arm stands still.
+    #: Whether the robot program acts at some point while the arm stands still.
     has_stops: bool = False
     #: By waypoint with a wait for an input: the timeout of the wait [s], and the clause that
     #: explains a failure because the input did not come.
@@ -123,7 +122,7 @@ class MotionJob:
     presses: tuple[PressWindow, ...] = ()
     #: The values that outputs take when the motion does not go on as planned.
     safe_outputs: tuple[SafeOutput, ...] = ()
-    #: How long the motion waits for an arm that is off its path [s]; 0 = it does not wait.
+    #: Longest wait of the motion for an arm that is off its path [s]; 0 = no wait.
     stall_timeout: float = 0.0
     #: The analog outputs that follow the speed (``proportional_outputs``), and the digital ones
     #: that give pulses, in the order in which the program counts them. After a pause the robot
@@ -132,9 +131,9 @@ class MotionJob:
     pulse_outputs: tuple[tuple[OutputKind, int], ...] = ()
     #: The band within which offsets may displace the path; None = no offsets.
     offset_band: OffsetBand | None = None
-    #: The bounds within which a signal may slow the motion, all given; None = no signal may.
+    #: The bounds of a signal that may slow the motion, with defaults filled in; None = no signal.
     feed_override: FeedOverride | None = None
-    #: For SERVO: the joint positions over time, and where they are held, in order.
+    #: For SERVO: the joint positions over time, and their holds, in order.
     spline: JointSpline | None = None
     holds: tuple[Hold, ...] = ()
 
@@ -153,7 +152,7 @@ class MotionJob:
 
     @property
     def has_events(self) -> bool:
-        """Whether the robot program does something along the path or at points."""
+        """Whether the robot program acts along the path or at points."""
         return self.has_stops or not self.is_motion.all()
 
     @property
@@ -182,13 +181,13 @@ class AppendJob:
 
     #: The number of this request; the answer carries the same number.
     number: int
-    #: How many records of the goal stay; the appended records follow them, and replace any later
-    #: ones that were planned before.
+    #: Number of records of the goal that stay; the appended records follow them, and replace any
+    #: later ones.
     records_before: int
     #: The appended records, with times since the start of the goal; the reference path continues
     #: the records that stay. None = the client closes the goal, which gets no more points.
     job: MotionJob | None
-    #: When the new motion leaves the plan of the records that stay [s]; None = at their end.
+    #: Time at which the new motion leaves the plan of the kept records [s]; None = at their end.
     cut_time: float | None = None
 
 
@@ -220,7 +219,7 @@ def job_from_plan(
         points=len(is_motion),
         reference=plan.reference,
         duration=duration,
-        # A goal that was slowed as the client allows (on_too_fast) is not late because of that.
+        # A goal slowed with the client's consent (on_too_fast) is not late.
         due=max(last_time, duration) + output_delay if last_time > 0.0 else None,
         output_delay=output_delay,
         T_base_frame=goal.T_base_frame,
@@ -325,7 +324,7 @@ def _press_windows(plan: Plan) -> Iterator[PressWindow]:
 
 
 def _base_seen(goal: Goal, waypoint: int) -> Quaternion:
-    """Return the axes of the base as seen from the frame of the path, with the tool at a point."""
+    """Return the orientation of the base in the frame of the path, with the tool at a point."""
     if goal.moving_frame is None:
         return IDENTITY.quaternion
     return conjugate(goal.moving_frame.frame_under(goal.waypoints[waypoint].pose).quaternion)
@@ -345,16 +344,16 @@ def _feed_override(wanted: FeedOverride) -> FeedOverride | None:
 
 
 def _longest_delay(rows: PlannedRows, row: int) -> float:
-    """Return how long after the end of a motion its last output is switched [s]."""
+    """Return the delay of a motion's last output after the end of the motion [s]."""
     records = rows.outputs.get(row, ())
     return max((each.delay for each in records if isinstance(each, SwitchOutput)), default=0.0)
 
 
 def _blend_lead_times(rows: PlannedRows) -> Floats:
-    """Return for each motion an upper bound on how long before its end its blend begins [s]."""
+    """Return upper bounds (n,) on the time from a motion's blend to the motion's end [s]."""
     radii = blend_radii(rows.primitives)
-    # The first bound holds for a tool that is not slower in the blend than on average in the
-    # segment; for one that brakes before the blend, the time in the blend entry is longer.
+    # The first bound holds if the tool is not slower in the blend than on average in the
+    # segment. If it brakes before the blend, the time in the blend entry is longer.
     share = radii / np.maximum(np.maximum(rows.lengths, radii), 1e-300)
     times: Floats = np.maximum(rows.durations * share, rows.blend_entries[:, -1])
     return times

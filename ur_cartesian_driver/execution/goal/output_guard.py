@@ -78,7 +78,7 @@ class OutputGuard:
     def _order(
         self, action: SafeOutputsAction, outputs: tuple[SafeOutput, ...] | None = None
     ) -> list[GoalCommand]:
-        """Return an order to the robot program; None = about all outputs of the goal."""
+        """Return an order to the robot program; ``outputs``: None = all outputs of the goal."""
         if not self:
             return []
         # The token wraps around within an int32; 0 is the token of a new program.

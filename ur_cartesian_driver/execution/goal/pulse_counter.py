@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The pulses that the robot program has given, by its counts in a register."""
+"""The pulses of the robot program, found by its counters in a register."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ur_cartesian_driver.protocol.program.registers import PULSE_COUNTS
 
 
 class PulseCounter:
-    """Tells from each packet which pulses are new in it."""
+    """Finds the new pulses in each packet."""
 
     def __init__(self, outputs: Sequence[tuple[OutputKind, int]], packet: RobotState) -> None:
         """
@@ -28,10 +28,10 @@ class PulseCounter:
 
     def observe(self, packet: RobotState) -> tuple[Pulse, ...]:
         """
-        Return the pulses that are new in a packet, by output and in the order of their numbers.
+        Return the new pulses in a packet, by output and in the order of their numbers.
 
-        The packet shows the cycle of the newest one; where packets were lost, only the times and
-        poses of the others are lost.
+        The packet shows the cycle of the newest one. After a loss of packets, only the times and
+        poses of the earlier ones are lost.
         """
         before, self._register = self._register, packet.pulse_counts
         if before == packet.pulse_counts or not self._outputs:

@@ -19,7 +19,7 @@ from ur_cartesian_driver.motion.state.rtde_state import RobotState
 #: The largest distance [m] and angle [rad] of a reported TCP from the one that was sent: values
 #: on the wire have a resolution of 1e-6.
 TCP_RESOLUTION = 2e-6
-#: How long the robot may take to report a TCP that a command has set [s]; after that the command
+#: Longest time until the robot reports a TCP that a command has set [s]; after that the command
 #: is considered lost.
 SET_TIMEOUT = 0.5
 #: Shortest and longest pause before the next try to restore the TCP [s].

@@ -26,7 +26,7 @@ class WireRecords:
         self._request_times = array('d', job.request_times.tobytes())
         #: The numbers of the records that are motions.
         self._motions = _motions(job, 0)
-        #: How many records were forgotten; how many of those were motions.
+        #: Number of forgotten records; number of motions among them.
         self._first = self._first_motion = 0
 
     @property
@@ -45,7 +45,7 @@ class WireRecords:
         return self._waypoints[-1] + 1
 
     def begun_records(self, motions: int) -> int:
-        """Return how many records have begun once ``motions`` motions have begun."""
+        """Return the number of begun records once ``motions`` motions have begun."""
         if motions <= self._first_motion:
             return self._first
         return self._motions[self._index(motions)] + 1
@@ -54,8 +54,8 @@ class WireRecords:
         """
         Return the points to which the newest begun motion and an earlier motion lead.
 
-        :param motions: how many motions have begun; for 0 the result is None.
-        :param lag_motions: by how many motions the controller's target may lag: the earlier motion
+        :param motions: number of begun motions; for 0 the result is None.
+        :param lag_motions: largest lag of the controller's target, in motions: the earlier motion
             comes ``1 + lag_motions`` before the newest. If there is none, its point is -1.
         """
         if motions <= self._first_motion:
@@ -72,7 +72,7 @@ class WireRecords:
         return self._first + bisect_left(self._waypoints, waypoint)
 
     def motions_before(self, record: int) -> int:
-        """Return how many motions come before a record."""
+        """Return the number of motions before a record."""
         return self._first_motion + bisect_left(self._motions, record) if record else 0
 
     def end_time(self, records: int) -> float:
@@ -84,7 +84,7 @@ class WireRecords:
         return self._request_times[records - 1 - self._first] if records > 0 else 0.0
 
     def count_until(self, time: float) -> int:
-        """Return how many records come up to and including the one that runs at a time [s]."""
+        """Return the number of records up to and including the one that runs at a time [s]."""
         return min(self.total, self._first + bisect_left(self._end_times, time) + 1)
 
     # ---- open goals ---------------------------------------------------------------------------
