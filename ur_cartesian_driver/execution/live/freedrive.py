@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, ZERO6
 from ur_cartesian_driver.motion.state.servo_report import ServoFeedback
 from ur_cartesian_driver.protocol.program.registers import ServoMode
 
-#: How long the robot program may take to enter freedrive [s].
+#: Longest time for the robot program to enter freedrive [s].
 FREEDRIVE_TIMEOUT = 1.0
 
 
@@ -30,7 +30,7 @@ class FreedriveFeeder(ServoFeeder, Phrasing):
 
     @property
     def has_progress(self) -> bool:
-        """Whether the arm can be guided, which the first progress report tells the owner."""
+        """Whether the arm can be guided; the first progress report tells the owner so."""
         return self.stream.is_active
 
     def interpret(self, event: Event, state: GoalState) -> Meaning | None:

@@ -39,7 +39,7 @@ class LiveSettings:
     """
 
     limits: LiveLimits = field(default_factory=LiveLimits)
-    #: How old a target may be to be followed [s].
+    #: Largest age of a target that is followed [s].
     max_age: float = 0.2
     #: The session is over when no target has arrived for this long [s].
     timeout: float = 2.0
@@ -57,7 +57,7 @@ class LiveTargets(Steerable, Ageing, Reporting):
     def __init__(self, generator: OnlineTrajectoryGenerator, settings: LiveSettings) -> None:
         """Begin with no target."""
         self.generator, self.settings = generator, settings
-        #: How often the arm was stopped because the newest target was too old.
+        #: Number of stops because the newest target was too old.
         self.pauses = 0
         self.freshness, self._warnings = Freshness(settings.max_age), RareWarnings()
         self._last_came = inf

@@ -46,9 +46,9 @@ from ur_cartesian_driver.motion.plan.approach import approach_speed, ARRIVAL_TOL
 #: A stopped arm goes on only if it can move at least this far [m], [rad]; otherwise it would
 #: jitter at a bound.
 _MIN_RESTART_MOTION = (0.002, 0.01)
-#: Approaching a bound by less than this is taken for rounding [rad], [m].
+#: A smaller approach to a bound counts as rounding [rad], [m].
 _ROUNDING = 1e-9
-#: How far joints stay away from the ends of their ranges [rad].
+#: Distance that joints keep from the ends of their ranges [rad].
 LIMIT_MARGIN = 0.01
 _SINGULARITIES = (
     ('wrist', 'rad', 'wrist_2_joint nearly straight'),
@@ -120,7 +120,7 @@ class OnlineTrajectoryGenerator:
         #: The pose to which the tool goes; None = it brakes or rests.
         self.target: Pose | None = None
         self._bounds_check = _BoundsCheck(arm, T_flange_tcp, limits)
-        # The joint positions, found in the last cycle, at which the tool would come to rest [rad].
+        # Joint positions at which the tool would come to rest, found in the last cycle [rad].
         self._q_stop = q
         #: Length of the last cycle [s].
         self._dt = 0.0

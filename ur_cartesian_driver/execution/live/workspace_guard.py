@@ -5,7 +5,7 @@ Keep an arm that follows live targets away from planes, from bodies of the cell 
 
 A check takes longer than a control cycle, so it is left out while no part of the arm can reach a
 bound. A part moves at most by the sum of the joints' turns, times the largest distance of any part
-from an axis. So each check also gives how far the joints may turn before the next one.
+from an axis. So each check also yields the turn of the joints that is allowed before the next one.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, ZERO6
 from ur_cartesian_driver.motion.geometry.workspace import Plane
 
-#: Pairs of bodies in the cell are measured exactly where they may be closer than this [m] to what
-#: they have to keep; elsewhere a bound is enough, which costs a tenth.
+#: Pairs of bodies in the cell are measured exactly if their distance may exceed their clearance by
+#: less than this [m]; otherwise a lower bound is enough, at a tenth of the cost.
 _NEAR = 0.02
 #: More than the thickness of any link [m].
 _THICKNESS = 0.3
-#: Approaching a bound by less than this is taken for rounding [m].
+#: A smaller approach to a bound counts as rounding [m].
 _ROUNDING = 1e-9
 
 
@@ -78,7 +78,7 @@ class WorkspaceGuard:
             + _THICKNESS
         )
         if self._cell is not None:
-            reach = float(self._cell.reaches[1:].max())  # of what the arm carries
+            reach = float(self._cell.reaches[1:].max())  # of bodies that the arm carries
             self._max_lever_arm = max(self._max_lever_arm, reach)
         #: The joint positions of the last check [rad], and the smallest slack found there [m].
         self._last_check: tuple[Joints, float] = ZERO6, 0.0

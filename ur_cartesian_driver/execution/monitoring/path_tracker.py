@@ -37,7 +37,7 @@ from ur_cartesian_driver.motion.plan.plan import ReferencePath
 
 #: Weight of a radian in the distance that decides which position is the nearest [m/rad].
 METRES_PER_RADIAN = 0.1
-#: How much farther the target may have come than its speed explains [m].
+#: Allowance for a target that has come farther than its speed explains [m].
 SEARCH_MARGIN = 0.005
 #: The search reaches at least this far ahead in planned time [s]: where set-points turn back, a
 #: lagging servo turns back early.
@@ -45,8 +45,8 @@ SEARCH_TIME = 0.1
 #: A position farther on than the speed explains is chosen only if it is nearer to the target by
 #: this distance [m]: where a path turns back, both branches are equally near.
 CLEARLY_NEARER = 0.0005
-#: How far the tool may be ahead of or behind its target: this time at the target's speed [s], plus
-#: this distance [m]. Position controllers of arms lag by some cycles.
+#: Bounds on the lag or lead of the tool: this time at the target's speed [s], plus this distance
+#: [m]. Position controllers of arms lag by some cycles.
 LAG_TIME = 0.02
 LAG_DISTANCE = 0.0005
 #: When the plan waits, the target is at most this far from the planned place [m]: the wire rounds
@@ -54,11 +54,11 @@ LAG_DISTANCE = 0.0005
 SAME_PLACE = 2e-5
 #: Beyond this fraction of an edge the path has the direction of the next edge.
 AT_END = 0.999
-#: How much of the path behind the target is kept, because the tool may lag [s].
+#: Planned time of the path kept behind the target, because the tool may lag [s].
 HISTORY_TIME = 1.0
 #: Up to this many edges are searched one by one; more edges are searched with arrays.
 MAX_SCALAR_EDGES = 8
-#: How many edges are cached as plain floats.
+#: Largest number of edges cached as plain floats.
 MAX_CACHED_EDGES = 256
 
 #: A pose in the coordinates of :class:`PathTracker`.
@@ -276,7 +276,7 @@ class PathTracker:
 
     def desired(self, actual: Pose, twist: Vector6) -> Pose:
         """
-        Return the planned pose nearest to the tool, of those around the target's position.
+        Return the planned pose nearest to the tool, within a plausible lag of the target.
 
         :param actual: pose of the TCP in base.
         :param twist: twist of the target, whose speed bounds the lag.
@@ -296,14 +296,14 @@ class PathTracker:
         if row == 0 and not fraction:
             return self.pose()
         end = row + 1 if fraction else row
-        # By the sign of the last quaternion: those of a tool that has turned far differ in sign.
+        # The sign is matched to the last row: along a large turn, quaternions change their sign.
         point = self._coordinates(pose, end - 1)
         found, _ = self._nearest(point, 0, end, 0.0, fraction or 1.0)
         return self.pose(found)
 
     def deviation(self, target: Pose) -> tuple[float, float]:
         """
-        Return how far the controller's target is from the plan, [m] and [rad].
+        Return the distance [m] and angle [rad] of the controller's target from the plan.
 
         In a blend, whose shape only the robot knows, the blend tolerance is subtracted.
         """

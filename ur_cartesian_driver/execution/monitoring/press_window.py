@@ -25,7 +25,7 @@ from ur_cartesian_driver.motion.geometry.pose import (
 from ur_cartesian_driver.motion.geometry.vectors import add, subtract, Vector3, vector3, Vector6
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
-#: How much the tracker's time may differ from the time of a point where the arm stands still [s].
+#: Tolerance for the tracker's time at a point where the arm stands still [s].
 POINT_TIME_TOLERANCE = 0.01
 _YIELDS = (('m', 'along', 'max_yield'), ('rad', 'about', 'max_yield_angle'))
 

@@ -11,22 +11,22 @@ import numpy as np
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 
-#: How long the target may stand still in the middle of a goal while nothing holds it [s].
+#: Longest standstill of the target in the middle of a goal while nothing holds it [s].
 STANDSTILL_TIMEOUT = 2.0
-#: How much longer than planned the target may stand still when the plan itself waits [s].
+#: Margin on the standstill of the target when the plan itself waits [s].
 STANDSTILL_MARGIN = 1.0
 #: Two path rows are the same pose, at which the plan waits, if no number differs by this [m], [1].
 SAME_POSE = 1e-9
 
 
 class Standstill:
-    """Measures how long the target stands still."""
+    """Measures the standstill of the target."""
 
     def __init__(self, path: ReferencePath, output_delay: float) -> None:
         """Find the longest planned standstill of the target."""
         #: Whether the target has stood still for longer than the plan explains.
         self.is_long = False
-        #: How long the target has stood still, in real time [s]; the same in scaled time [s]; the
+        #: Present standstill of the target, in real time [s]; the same in scaled time [s]; the
         #: longest standstill that the plan explains, in scaled time [s], 0 = it explains none.
         self._time = self._scaled_time = self._timeout = 0.0
         self.extend(path, output_delay)
@@ -35,7 +35,7 @@ class Standstill:
         """
         Allow for the planned waits of a path, which may be an appended one.
 
-        :param output_delay: how long after the end of the motion the last output is switched [s].
+        :param output_delay: delay of the last output after the end of the motion [s].
         """
         # Faster than all(axis=1) for the few columns of a pose.
         still = reduce(np.logical_and, (np.abs(np.diff(path.poses, axis=0)) < SAME_POSE).T)
@@ -60,7 +60,7 @@ class Standstill:
         Compare a packet with the previous one.
 
         :param passed: time between the packets, by the controller's clock [s].
-        :param feed: what a feed override leaves of the planned speed, 0 to 1.
+        :param feed: the feed, as a fraction of the planned speed, 0 to 1.
         """
         if (
             before is not None
@@ -70,7 +70,7 @@ class Standstill:
             and state.runtime_state is RuntimeState.PLAYING
         ):
             self._time += passed
-            # At rest the speed scaling is 0: slider and feed say how fast a planned wait passes.
+            # At rest the speed scaling is 0: slider and feed give the rate of a planned wait.
             self._scaled_time += passed * state.target_speed_fraction * feed
             self.is_long = self._time >= STANDSTILL_TIMEOUT and self._scaled_time >= self._timeout
         else:
@@ -80,7 +80,7 @@ class Standstill:
         """
         Return a clause if the target stands still for no reason, else None.
 
-        :param longest_wait: how long the robot program may wait at this point, in real time [s].
+        :param longest_wait: longest wait of the robot program at this point, in real time [s].
         """
         if self._time < longest_wait + STANDSTILL_MARGIN:
             return None

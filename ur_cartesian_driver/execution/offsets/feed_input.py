@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
-#: How far a level may be beyond its ends, as a fraction of its range, before it is invalid: the
-#: noise of a sensor at an end is no fault, a broken wire at 0 mA of 4 to 20 mA is.
+#: A level is valid up to this fraction of its range beyond either end: the noise of a sensor at
+#: an end is no fault, but a broken wire is (0 mA of 4 to 20 mA).
 MARGIN = 0.03
 
 

@@ -4,8 +4,8 @@
 The signal that overrides the feed of a goal: the newest value, its age, and a report.
 
 The signal may come at any time, jump, stop or be nonsense. A valid value, 0 to 1, is cut to the
-bounds of the goal. Without a valid value the lower bound applies, because nobody knows what the
-process would bear. Whichever side runs the motion changes the feed at the goal's rate.
+bounds of the goal. Without a valid value the lower bound applies, because a higher feed might harm
+the process. Whichever side runs the motion changes the feed at the goal's rate.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 
 class FeedRequests(Overridable, Ageing, Reporting):
-    """Accepts the values of the signal, and knows the feed that the motion should have."""
+    """Accepts the values of the signal, and derives the feed that the motion should have."""
 
     def __init__(self, bounds: FeedOverride, feed_input: FeedInput | None = None) -> None:
         """
         Begin with no value, at the lower bound.
 
-        :param bounds: the bounds of the goal; no number is 0.
+        :param bounds: the bounds of the goal, with all defaults filled in.
         :param feed_input: the input that gives the values; None = clients give them.
         """
         self.bounds, self._input = bounds, feed_input
@@ -45,7 +45,7 @@ class FeedRequests(Overridable, Ageing, Reporting):
         self._lowest, self._delay = bounds.maximum, 0.0
 
     def set_feed(self, fraction: float, age: float, now: float) -> None:
-        """Accept a value of the signal; an invalid one ends the valid ones before it."""
+        """Accept a value of the signal; an invalid one also voids the valid one before it."""
         if not 0.0 <= fraction <= 1.0:  # also refuses NaN
             self._invalid += 1
             self._lose()
@@ -84,7 +84,7 @@ class FeedRequests(Overridable, Ageing, Reporting):
         Return the present feed, and note it for the report.
 
         :param value: the feed that the motion has, 0 to 1.
-        :param delay: by how much the motion is later because of its feed [s].
+        :param delay: delay of the motion by its feed [s].
         """
         self._lowest, self._delay = min(self._lowest, value), delay
         return FeedState(value, delay, self._is_valid)

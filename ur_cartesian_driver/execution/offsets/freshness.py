@@ -14,7 +14,7 @@ WARNING_PERIOD = 2.0
 
 class Freshness:
     """
-    Selects which values to use when they come at any time and in any order.
+    Selects the values to use; they may come at any time and in any order.
 
     All times are of one steady clock.
 
@@ -24,7 +24,7 @@ class Freshness:
     def __init__(self, max_age: float) -> None:
         """Begin with no value."""
         self.max_age = max_age
-        #: How many values were accepted; how many were dropped, out of order or too old.
+        #: Number of accepted values; number of values dropped, out of order or too old.
         self.accepted = self.dropped = 0
         self._stamp = -inf
 

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The path offsets that a client sends: which one applies now, whether it is stale, a report.
+The path offsets of a client: the one that applies now, its age, and a report.
 
 An offset may come at any time, jump, be too old or too large. The newest one is used, cut to the
 limits of the goal. Where the path is not open to offsets, zero is used instead. When the newest

@@ -4,7 +4,7 @@
 The feeder of a goal to which points are appended while it runs (keep_open).
 
 The trajectory of the goal is a stream (possible since URCL 2.14): the robot program reads points
-until it is told how many there are. Three rules hold whatever is appended:
+until it is told their number. Three rules hold whatever is appended:
 
 * The program never waits for a point while the arm moves: it would fail, or stop the arm abruptly.
   So every append is planned with an *ending* that brings the arm to rest (the last motion, without
@@ -32,8 +32,8 @@ from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
-#: How long a motion that consists only of its ending waits for more points before it begins [s]:
-#: the robot program waits half a second for its first point.
+#: Longest wait for more points, before a motion begins that has only an ending [s]: the robot
+#: program waits half a second for its first point.
 FIRST_POINTS_TIMEOUT = 0.25
 
 
@@ -46,20 +46,20 @@ class AppendFeeder(PointFeeder, Appendable):
         """
         Begin with the records that are known so far; nothing is sent yet.
 
-        :param horizon: how far ahead of the arm its motion is sent to the program [s].
+        :param horizon: motion time that is sent to the program ahead of the arm [s].
         :param margin: the stream is closed this long before the robot program would ask for a
             missing point [s].
-        :param timeout: how long the goal waits at rest for more points [s]; 0 = without limit.
+        :param timeout: longest wait at rest for more points [s]; 0 = no limit.
         """
         super().__init__(monitor)
         self._horizon, self._margin, self.append_timeout = horizon, margin, timeout
         self._appended = AppendedRecords(monitor)
         self.parts = (self._appended,)
-        #: How many records of the goal were sent before the present stream.
+        #: Number of records of the goal that were sent before the present stream.
         self._stream_first_record = 0
         #: Whether the length of the present stream was sent.
         self._is_stream_end_sent = False
-        #: When the present stream was begun, by the robot's clock [s].
+        #: Start of the present stream, by the robot's clock [s].
         self._stream_start_time = 0.0
 
     # ---- points that come ---------------------------------------------------------------------
@@ -75,7 +75,7 @@ class AppendFeeder(PointFeeder, Appendable):
         return [answer, *self._release()]
 
     def supply(self, state: GoalState) -> Meaning:
-        """Return the signal that is due about the supply of points (such as STARVING), or none."""
+        """Return the due signal about the supply of points (such as STARVING), or none."""
         return self._appended.supply(
             state,
             runs_out=self._is_running_out(),

@@ -34,8 +34,8 @@ from ur_cartesian_driver.motion.plan.offset_band import (
 )
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
-#: By how much our first sequence number exceeds the last one that the robot has read. Between the
-#: two are the numbers that a lost client may have written and the robot has not read.
+#: Difference between our first sequence number and the last one that the robot has read. A lost
+#: client may have written numbers between the two, which the robot has not read yet.
 SEQUENCE_GAP = 1000
 #: If the last number that the robot has read is not below this, ours begin at 1: long before the
 #: register overflows.
@@ -71,7 +71,7 @@ class OffsetPointFeeder(PointFeeder, Prepared, Displaced):
 
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
         """Return START with the first points, CANCEL, or the command that releases the inputs."""
-        # Numbers that are written and not read would be taken for those of the next goal.
+        # Numbers that were written but not read would count for the next goal.
         self._moves = self._is_read = state is GoalState.MOVING
         commands = super().enter(state, packet)
         if state in (GoalState.RESTORING, GoalState.ENDED) and not self._is_closed:

@@ -52,7 +52,7 @@ class PointFeeder(Feeder):
         return [start, *self._release()]
 
     def _sent_points(self) -> int:
-        """Return how many points of the trajectory were sent."""
+        """Return the number of points of the trajectory that were sent."""
         return self._window.sent
 
     def feed(self, event: Event, now: float) -> list[GoalCommand]:

@@ -21,10 +21,10 @@ MIN_CHANGE = 0.005
 
 class ProgramFeed(FeedRequests, Prepared):
     """
-    Tells the robot program the feed to go to; the program goes there in each of its cycles.
+    Sends the robot program its target feed; the program approaches it cycle by cycle.
 
-    So neither the network nor this computer can make the feed jump, and what the program reports
-    is what the arm does.
+    So neither the network nor this computer can make the feed jump, and the feed that the program
+    reports is the real one.
     """
 
     def __init__(self, bounds: FeedOverride, feed_input: FeedInput | None = None) -> None:
@@ -39,7 +39,7 @@ class ProgramFeed(FeedRequests, Prepared):
         return self._send()
 
     def age(self, now: float) -> list[GoalCommand]:
-        """Return the warning that is due, and the command with a new feed."""
+        """Return the due warning, and the command with a new feed."""
         return super().age(now) + self._send()
 
     def _send(self) -> list[GoalCommand]:

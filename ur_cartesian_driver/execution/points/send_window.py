@@ -22,15 +22,15 @@ class SendWindow:
 
     size: int = 500
     sent: int = 0
-    #: How many records the robot has begun, as far as is known.
+    #: Number of records that the robot has begun, as far as known.
     begun: int = 0
 
     def release(self, begun: int, limit: int) -> list[GoalCommand]:
         """
         Return the command that sends the records that fit into the window, or none.
 
-        :param begun: how many records the robot has begun.
-        :param limit: how many records may be sent in total, even if more fit into the window.
+        :param begun: number of records that the robot has begun.
+        :param limit: largest number of records to send in total, even if more fit into the window.
         """
         self.begun = max(self.begun, begun)
         return self.send(min(limit, self.begun + self.size))

@@ -39,7 +39,7 @@ class AppendServoFeeder(ServoFeeder, Appendable):
         """
         Begin with the spline of the first points.
 
-        :param timeout: how long the goal waits at rest for more points [s]; 0 = without limit.
+        :param timeout: longest wait at rest for more points [s]; 0 = no limit.
         """
         assert monitor.job.spline is not None
         self._source = SplineSetpoints(monitor.job.spline)
@@ -69,7 +69,7 @@ class AppendServoFeeder(ServoFeeder, Appendable):
         return [answer]
 
     def supply(self, state: GoalState) -> Meaning:
-        """Return the signal that is due about the supply of points (such as STARVING), or none."""
+        """Return the due signal about the supply of points (such as STARVING), or none."""
         self._notice_ending()
         return self._appended.supply(
             state, runs_out=self._stop_time < inf, has_more=self._next_spline is not None

@@ -8,8 +8,7 @@ bounded speed and acceleration along each axis of the frame of the path, never b
 the goal, and back to its path in time for the end of the motion. All of this runs in the time of
 the motion: when the motion is held, so is the offset.
 
-The joint positions are those of the path, changed so that the tool is displaced but turns as
-planned.
+The joint positions of the path are changed so that the tool is displaced but turns as planned.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 #: Length of the steps, in the time of the motion, in which the offset moves [s].
 STEP = MIN_STEP
-#: How many set-points are remembered, to find the one that the arm has reached: more than are in
+#: Number of set-points remembered, to find the one that the arm has reached: more than are in
 #: flight.
 HISTORY = 192
 _ROUNDING = 1e-9
@@ -106,7 +105,7 @@ class OffsetSetpoints(Displaced):
 
         :param setpoints: source of the set-points on the path, in the time of the motion.
         :param band: the offset band of the path.
-        :param moving_frame: how the frame of the path moves; None = it stands in the base.
+        :param moving_frame: motion of the path's frame; None = the frame is fixed in the base.
         """
         self._setpoints, self._band, self._arm = setpoints, band, arm
         self._moving_frame = moving_frame
@@ -116,7 +115,7 @@ class OffsetSetpoints(Displaced):
         self._time = self._used = 0.0
         self._joints = setpoints.next(0.0)
         self._before = ZERO3
-        #: How far the joints of the newest set-point are from those on the path [rad].
+        #: Displacement of the newest set-point from the joints on the path [rad].
         self._change: Vector6 = ZERO6
         # The newest set-points: joints, shift in the frame of the goal, offset along the path.
         self._history: Floats = np.zeros((HISTORY, 12))
@@ -176,7 +175,8 @@ class OffsetSetpoints(Displaced):
         """
         Return the offset that the controller's target has now.
 
-        This is the offset of the set-point nearest to the target, of those not passed before.
+        This is the offset of the set-point nearest to the target, among the set-points not passed
+        before.
         """
         if not self._count:
             return NO_OFFSET

@@ -28,9 +28,9 @@ MAX_RATE = 1.5
 CORRECTION_TIME = 0.05
 #: Bound on the change of the rate [1/s].
 MAX_RATE_CHANGE = 50.0
-#: How many control steps a set-point may cover: more than one when the clock catches up.
+#: Largest number of control steps that a set-point covers: above 1 for the clock to catch up.
 MAX_STEPS = 2
-#: How many control steps the clock makes up for after late packets, at most.
+#: Largest number of control steps that the clock makes up for after late packets.
 MAX_PENDING_STEPS = 10
 _ROUNDING = 1e-6
 
@@ -67,7 +67,7 @@ class ServoClock:
 
     def take_steps(self, in_flight: float) -> int:
         """
-        Return how many control steps a set-point sent now covers; 0 = none is due.
+        Return the number of control steps that a set-point sent now covers; 0 = none is due.
 
         :param in_flight: as in :meth:`advance`.
         """

@@ -14,10 +14,10 @@ goal (:mod:`~ur_cartesian_driver.execution.goal.goal_transitions`) then mean:
 * in CANCELLING the mode IDLE is written instead of a CANCEL; the program answers by leaving the
   servo.
 
-A goal that does more along its path than move is also sent as points
+A goal with events along its path is also sent as points
 (:mod:`~ur_cartesian_driver.execution.points.point_feeder`): the robot program switches outputs,
-waits and calls functions as along any spline, but the set-points lead the arm. While it does
-something at a point, the set-points are held there, until it has begun the next motion.
+waits and calls functions as along any spline, but the set-points lead the arm. While the program
+acts at a point, the set-points are held there, until the program has begun the next motion.
 
 At the end of every goal, successful or not, the robot program is told to brake and stop reading,
 and the inputs are released.
@@ -64,7 +64,7 @@ from ur_cartesian_driver.motion.state.servo_report import UNKNOWN6
 #: A robot program that has read one of our sequence numbers within this time [s] is not considered
 #: hung, even if the arm stands still.
 ANSWER_TIMEOUT = 1.0
-#: How long the robot program may take to answer CANCEL while it reads set-points [s].
+#: Longest time for the robot program to answer CANCEL while it reads set-points [s].
 CANCEL_TIMEOUT = 1.0
 #: ``servoj`` smooths its set-points, so the controller's target lags them: by about the lookahead
 #: time of ``servoj``, or, with a low gain, by up to this many lookahead times.
@@ -95,7 +95,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         self._has_filled = self._has_left = False
         #: Time of the first packet after a CANCEL that has to be answered [s]; None = none yet.
         self._cancelled_at: float | None = None
-        #: Sends what the robot program does along the path; None = nothing.
+        #: Sends the events along the path to the robot program; None = there are no events.
         self._points = PointFeeder(monitor) if monitor.job.has_events else None
         self._holds = deque(monitor.job.holds)
         self._held_time = 0.0
@@ -108,7 +108,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         return [OpenServo()]
 
     def explain_not_ready(self, packet: RobotState | None) -> str:
-        """Return why the arm cannot follow set-points yet, or ''."""
+        """Return the reason why the arm cannot follow set-points yet, or ''."""
         if self.stream.phase is ServoPhase.OPENING:
             return NO_INPUTS
         if self.stream.phase is not ServoPhase.READY:
@@ -148,8 +148,8 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
                 return self._leave()
             case GoalState.CANCELLING | GoalState.PROGRAM_LOST:
                 # A program that is started after this must not find set-points in the inputs.
-                # A program that still discards points has not read yet that it is to leave: it
-                # would read the set-points of the next goal, and leave then.
+                # A program that still discards points has not read the request to leave: it would
+                # read the set-points of the next goal, and leave then.
                 self.stream.may_leave = self._points is None or state is not GoalState.CANCELLING
                 commands = self._points.enter(state, packet) if self._points is not None else []
                 return commands + self._stop()
@@ -169,7 +169,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         return [] if row is None else [WriteInputs(values=row)]
 
     def feed(self, event: Event, now: float) -> list[GoalCommand]:
-        """Answer a packet of the servo's registers with a write, and others with points."""
+        """Answer a packet of the servo's registers with a write, any other event with points."""
         if not isinstance(event, ServoReceived):
             self._end_hold()
             return [] if self._points is None else self._points.feed(event, now)
@@ -243,14 +243,14 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         return begun, begun - self._pieces_begun(time - self._max_servo_lag)
 
     def _behind(self, begun: int) -> int:
-        """Return by how many motions the controller's target may lag behind ``begun``."""
+        """Return the largest lag of the controller's target behind ``begun``, in motions."""
         records = self.monitor.records
         begin = records.end_time(records.begun_records(begun) - 1)
         first = records.count_until(begin - self._max_servo_lag)
         return max(0, begun - records.motions_before(first))
 
     def _pieces_begun(self, time: float) -> int:
-        """Return how many pieces of the spline begin before a time [s]; 0 = none yet."""
+        """Return the number of pieces of the spline that begin before a time [s]; 0 = none yet."""
         return self.monitor.records.count_until(time) if time > 0.0 else 0
 
     def is_read(self, now: float) -> bool:

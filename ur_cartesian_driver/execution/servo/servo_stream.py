@@ -54,9 +54,9 @@ from ur_cartesian_driver.protocol.program.registers import ExternalError, ServoM
 MIN_WRITE_PERIOD = 0.5
 #: Fraction of ``target_lag`` that is in flight when the arm starts.
 START_FILL = 0.75
-#: How fast the rate of the motion recovers after the buffer was empty [1/s].
+#: Increase of the motion's rate after the buffer was empty [1/s].
 RESTART_ACCELERATION = 2.0
-#: How fast the rate of the motion falls while the arm is off its path [1/s].
+#: Decrease of the motion's rate while the arm is off its path [1/s].
 STALL_DECELERATION = 4.0
 #: If the last sequence number that the robot has read is not below this, ours begin at 1: long
 #: before the register overflows.
@@ -65,7 +65,7 @@ MAX_SEQUENCE = 2**30
 MAX_CLOCK_GAP = 1.0
 #: Shortest and longest control step of existing robots [s].
 MIN_STEP, MAX_STEP = 0.002, 0.008
-#: How many packets it takes to measure the robot's control step.
+#: Number of packets from which the robot's control step is measured.
 STEP_SAMPLES = 4
 
 
@@ -150,9 +150,9 @@ class ServoSettings:
     target_lag: float = 0.04
     #: Longest motion time in flight [s].
     max_lag: float = 0.2
-    #: How many set-points the robot's buffer holds.
+    #: Number of set-points that the robot's buffer holds.
     buffer_depth: int = 250
-    #: How far each joint may be from its set-point before the robot program stops the arm [rad].
+    #: Distance of a joint from its set-point at which the robot program stops the arm [rad].
     max_divergence: float = 0.3
     #: The time by which ``servoj`` itself lags its set-points [s].
     lookahead_time: float = 0.03
@@ -220,13 +220,13 @@ class ServoStream:
         self.next_hold = inf
         #: Total delay of the motion by such holds, beyond rests of the source [s].
         self.held_time = 0.0
-        #: Time of the motion [s]: that of the source without the rests that were left out.
+        #: Time of the motion [s]: time of the source without the rests that were left out.
         self._moved_time = 0.0
-        #: Whether LEAVING ends when the program has left; if not, writes go on until it may.
+        #: Whether LEAVING may end when the program has left; until then the writes go on.
         self.may_leave = True
-        #: What a feed override leaves of the motion's rate, 0 to 1.
+        #: The feed, as a fraction of the motion's rate, 0 to 1.
         self.feed = 1.0
-        #: The value to which :attr:`feed` goes, and how fast [1/s].
+        #: The value that :attr:`feed` approaches, and the rate of its change [1/s].
         self.feed_target, self.feed_rate = 1.0, 0.0
         #: Total delay of the motion by the feed override [s].
         self.feed_delay = 0.0
@@ -293,7 +293,7 @@ class ServoStream:
         """
         Go on after a hold.
 
-        :param rest: how long the source would rest here [s]; this time has passed in the hold.
+        :param rest: time for which the source would rest here [s]; it has passed in the hold.
         :param next_hold: the time of the source at the next hold [s]; inf = none.
         """
         assert isinstance(self._source, RestingSource)

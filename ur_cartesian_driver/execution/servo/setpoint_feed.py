@@ -30,7 +30,7 @@ class SetpointFeed(FeedRequests):
         stream.feed_rate = bounds.rate
 
     def age(self, now: float) -> list[GoalCommand]:
-        """Return the warning that is due; the stream goes to the newest feed."""
+        """Return the due warning; the stream approaches the newest feed from now on."""
         warnings = super().age(now)
         self._stream.feed_target = self.target
         return warnings

@@ -11,8 +11,8 @@ import numpy as np
 from ur_cartesian_driver.motion.geometry.vectors import Vector6, vector6
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 
-#: How many set-points of a spline are computed at a time: in an array each takes a fiftieth of
-#: the time that it takes alone.
+#: Number of set-points of a spline that are computed at a time: in an array each takes a fiftieth
+#: of the time that it takes alone.
 BATCH = 128
 _TIME_TOLERANCE = 1e-12
 
