@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The status of a driver, and the sentences that say what to do before a goal can run."""
+"""The status of a driver, and the sentences about the next step before a goal can run."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConnectionStatus:
-    """Progress of the connection, and what to do before a goal can run."""
+    """Progress of the connection, and the next step before a goal can run."""
 
     state: ConnectionState = ConnectionState.DISCONNECTED
-    #: What to do next before a goal can run, or why the robot cannot be used, as a sentence; empty
-    #: when a goal can run.
+    #: The next step before a goal can run, or the reason why the robot cannot be used, as a
+    #: sentence; empty when a goal can run.
     message: str = ''
     #: The last error: its time, what happened, and the events that led to it.
     last_error: str = ''
@@ -95,7 +95,7 @@ def timestamped(text: str, before: str = '') -> str:
     return f'{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC: {text}'
 
 
-#: Modes out of which the arm can be switched on, or its brakes released.
+#: Modes from which the arm can be switched on, or its brakes released.
 UNPOWERED_MODES = frozenset({RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE})
 
 
@@ -110,7 +110,7 @@ def is_paused(robot: RobotState) -> bool:
 
 
 def has_ended(robot: RobotState) -> bool:
-    """Return whether no program runs, as the robot reports, even if its sockets are open."""
+    """Return whether the robot reports that no program runs, even if its sockets are open."""
     return robot.runtime_state in (RuntimeState.STOPPING, RuntimeState.STOPPED)
 
 
@@ -126,7 +126,7 @@ def required_action(
     foreign_program: bool = False,
 ) -> str:
     """
-    Return what to do next before a goal can run, as a sentence; empty when one can run.
+    Return the next step before a goal can run, as a sentence; empty when one can run.
 
     :param robot: newest state of the robot; None = none yet.
     :param stale: a sentence if the states of the robot are too old; empty = they are fresh.

@@ -53,7 +53,7 @@ class EventLog:
         """
         Begin with no entries.
 
-        :param timeout: how long the robot program waits for a keepalive [s].
+        :param timeout: longest wait of the robot program for a keepalive [s].
         """
         self._clock, self._keepalives, self._timeout = clock, keepalives, timeout
         self._entries: deque[EventLogEntry] = deque(maxlen=MAX_ENTRIES)
@@ -61,7 +61,7 @@ class EventLog:
         self._last_state: RobotState | None = None
         #: Time of the last report [s].
         self._last_report = inf
-        #: What the last call of :meth:`keepalive_gap` returned [s].
+        #: The last result of :meth:`keepalive_gap` [s].
         self._last_gap = 0.0
 
     def note(self, text: str, *, is_robot_error: bool = False) -> None:
@@ -97,7 +97,7 @@ class EventLog:
         return self._last_gap
 
     def keepalive_age(self) -> float:
-        """Return how long ago the last keepalive was sent [s]."""
+        """Return the time since the last keepalive [s]."""
         return self._clock() - self._keepalives.last_keepalive
 
     def event_chain(self) -> tuple[str, ...]:

@@ -61,7 +61,7 @@ from ur_cartesian_driver.robot.rtde.signal_stream import SignalStream
 from ur_cartesian_driver.robot.rtde.state_stream import StateStream
 from ur_cartesian_driver.robot.transport import Backoff
 
-#: How long the link waits, after it has lost the program, for other connections to report why [s].
+#: Wait after the loss of the program, for other connections to report the cause [s].
 CAUSE_TIMEOUT = 0.1
 
 
@@ -290,8 +290,8 @@ class RobotLink:
         before, self.robot = self.robot, robot
         self._callbacks.state(robot)
         changes = () if before is None else mode_changes(before, robot)
-        # The goal has the packet first, because it may have to cancel at once; a change of a mode
-        # changes the status first.
+        # The goal gets the packet first, because it may have to cancel at once. If a mode has
+        # changed, the status changes first.
         status_may_change = before is None or bool(changes)
         if not status_may_change:
             self._callbacks.event(StateReceived(state=robot))
@@ -400,7 +400,7 @@ class RobotLink:
         :param status_text: the reason with the name of the interface, for the status.
         """
         self.event_log.note(status_text)
-        self._cancel_explanation()  # the loss of the robot explains that of the program
+        self._cancel_explanation()  # the loss of the robot explains the loss of the program
         last_error = (
             timestamped(status_text, self.status.last_error)
             if self.robot is None

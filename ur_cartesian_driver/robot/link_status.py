@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The status of a link: its state, what to do next before a goal can run, and the last error."""
+"""The status of a link: its state, the next step before a goal can run, and the last error."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ class LinkStatus:
         """
         Begin disconnected.
 
-        :param required_action: returns what to do next in a state before a goal can run, as a
-            sentence; this is the "next step" below.
+        :param required_action: returns the next step in a state before a goal can run, as a
+            sentence.
         """
         self._required_action, self._on_status, self._on_log = required_action, on_status, on_log
         self._attempts = AttemptLog(self._log_info, self._log_info)
@@ -69,7 +69,7 @@ class LinkStatus:
         self._on_log(logging.ERROR, text)
 
     def _log_change(self, before: ConnectionStatus, now: ConnectionStatus) -> None:
-        """Log the next step, for those who do not see the status."""
+        """Log the next step, for users who do not see the status."""
         if now.state not in ATTEMPTING and before.state in ATTEMPTING:
             self._attempts.succeeded()
         if now.message and now.message != before.message:

@@ -30,7 +30,7 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
 from ur_cartesian_driver.protocol.framing import to_single_line
 from ur_cartesian_driver.robot.transport import AttemptLog, Backoff, dial, TcpConnection
 
-#: How long the robot may take to report its configuration [s].
+#: Longest wait for the robot's configuration [s].
 REPORT_TIMEOUT = 5.0
 #: Silence after which a connection is given up [s]: on a dead one, a command to stop the program
 #: would be lost. The robot reports its state ten times a second.
@@ -149,7 +149,7 @@ class PrimaryClient:
         """
         Serve one connection and return the reason of its end.
 
-        :raises OSError: nothing answers, or what answers is not a robot.
+        :raises OSError: nothing answers, or the other side is not a robot.
         """
         closed: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         self._decoder = primary.PrimaryDecoder()

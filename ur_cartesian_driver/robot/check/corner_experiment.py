@@ -1,10 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The corner of the experiments ``corner_*``: what moves, and what its recording shows.
+The corner of the experiments ``corner_*``: its motion, and its comparison with a recording.
 
-Wrist 3 turns, then wrist 2, with a rounded corner between them, in pieces of 20 ms. They come over
-a socket, and the functions of the robot program follow them, as in a goal with rounded corners.
+Wrist 3 turns, then wrist 2, with a rounded corner between them, in pieces of 20 ms. The pieces
+come over a socket, and the functions of the robot program follow them, as in a goal with rounded
+corners.
 """
 
 from __future__ import annotations
@@ -24,15 +25,15 @@ from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
 
 #: Speed of the wrist that turns [rad/s].
 SPEED = 0.2
-#: Times of the ramps, of the cruises between, and of the corner [s]; duration of a piece [s].
+#: Durations of a ramp, a cruise, the corner, and a piece [s].
 RAMP, CRUISE, CORNER, PIECE = 0.2, 0.2, 0.1, 0.02
-#: Pieces in all; the pause is asked for in this one, and later ones are sent after the pause.
+#: Number of pieces; piece in which the pause is requested; number of pieces sent before the pause.
 PIECES, PAUSE_IN, SENT_BEFORE_PAUSE = 45, 21, 32
 #: Angle by which each wrist turns [rad].
 TURN = SPEED * (0.5 * RAMP + CRUISE + 0.5 * CORNER)
-#: RTDE output register that tells how far the program is in its piece [s].
+#: RTDE output register with the time of the program in its piece [s].
 SPLINE_TIME = 47
-#: They stand for the address of this computer in the script.
+#: Placeholders in the script for the address of this computer.
 HOST, PORT = '@HOST@', '@PORT@'
 
 
@@ -77,9 +78,9 @@ def corner_messages(start: Vector6) -> tuple[bytes, bytes]:
 
 @cache
 def corner_script() -> str:
-    """Return the body of the program; the text of HOST and PORT is still to be replaced."""
+    """Return the body of the program, with the placeholders HOST and PORT."""
     settings = ProgramSettings(
-        # Software that is as old as this knows all functions that are named then.
+        # A program for software this old names no function that the robot may lack.
         host='none', reverse_port=1, trajectory_port=1, script_command_port=1, version=(3, 14, 3)
     )  # fmt: skip
     text = render(settings)
@@ -121,9 +122,9 @@ end"""
 
 def distances_from_corner(q: Floats) -> Floats:
     """
-    Return how far joints (n, 6) are from the path of the corner [rad].
+    Return the distances (n,) of joint positions from the path of the corner [rad].
 
-    :param q: joint positions [rad]; the first row is where the arm rested.
+    :param q: joint positions (n, 6) [rad]; at rest before the corner in the first row.
     """
     path = JointSpline.of(vector6(q[0].tolist()), corner_pieces(q[0].tolist()))
     places = path.rows(np.arange(0.0, PIECES * PIECE + 5e-4, 1e-3))[0]

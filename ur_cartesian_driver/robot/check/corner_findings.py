@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The analyses of the experiments ``corner_*``: what rounded corners assume of the robot."""
+"""The analyses of the experiments ``corner_*``, which test assumptions of rounded corners."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from ur_cartesian_driver.robot.check.corner_experiment import distances_from_cor
 from ur_cartesian_driver.robot.check.finding import Finding, note, ok
 from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 
-#: How far the joints may be from the path of a corner, and in a pause [rad]. On the simulated
-#: controller they keep within 0.01 mrad, with calls that come a step late within 0.1.
+#: Largest distance of the joints from the path of a corner; the same with a pause [rad]. The
+#: simulated controller keeps within 0.01 mrad, or within 0.1 mrad if calls come a step late.
 FOLLOWED, FOLLOWED_IN_PAUSE = 1e-4, 1.4e-3
 _NOT_FOLLOWED = 'The program followed no pieces: its log tells why.'
 
@@ -105,7 +105,7 @@ def _following(samples: MotionSamples) -> Flags:
 
 
 def _since_start(samples: MotionSamples, own: Flags) -> Floats:
-    """Return the target joints (m, 6) of rows, after those at which the arm rested."""
+    """Return the target joints (m, 6): first at rest, then in the rows of a mask."""
     return np.vstack([samples.target_q[:1], samples.target_q[own]])
 
 

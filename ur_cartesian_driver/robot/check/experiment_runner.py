@@ -49,7 +49,7 @@ RECORDED = (
     'speed_scaling', 'target_speed_fraction', 'runtime_state', 'safety_mode',
     _PIECES_BEGUN, _SPLINE_TIME,
 )  # fmt: skip
-#: How long a program is paused [s].
+#: Duration of the pause of a program [s].
 PAUSE = 0.5
 #: Time recorded before and after the motion [s].
 MARGIN = 0.3

@@ -28,7 +28,7 @@ TIMED_DISTANCE, TIMED_TIME = 0.02, 2.0
 STOP_DISTANCE = 0.06
 #: Largest time by which the start of a program may prolong its first motion [s].
 MAX_START_COST = 0.1
-#: Fraction at which the speed slider is during the experiment ``slider``.
+#: Fraction of the speed slider during the experiment ``slider``.
 SLIDER = 0.5
 #: Experiment ``path_offset``: length of the offset, and of the line that follows [m]; speed of
 #: both motions [m/s]; pause after each motion [s].
@@ -46,7 +46,7 @@ class Experiment:
     A motion that settles a question about the controller.
 
     :param check: name in the report and in doc/robot_program.md.
-    :param motion: sentence about what moves, how far and how fast, for a person who has to agree.
+    :param motion: sentence for a person who has to agree: what moves, how far and how fast.
     :param script: URScript body of the program that moves the arm.
     :param analyses: derive the findings from the samples of the motion.
     :param slider: fraction of the speed slider during the motion; None = unchanged.

@@ -26,8 +26,8 @@ class MotionSamples:
     :param stop_sent: time of the stop command by the controller's clock [s]; NaN = none was sent.
     :param target_distance: distance of the target TCP from its first position (n,) [m].
     :param actual_distance: distance of the measured TCP from its first position (n,) [m].
-    :param spline_time: time in its piece that the program of a corner reports (n,) [s].
-    :param pieces_begun: number of pieces that this program has begun (n,).
+    :param spline_time: time of the program in its piece of a corner (n,) [s].
+    :param pieces_begun: number of pieces that the program has begun (n,).
     :param runtime_state: (n,) see :class:`~...motion.state.rtde_state.RuntimeState`.
     """
 

@@ -42,8 +42,7 @@ MOTION_VERSION_PROGRAM = (
 LOCAL_CONTROL = 'C210'
 #: RTDE outputs of the pose that is compared with the calibrated kinematics.
 _POSE_FIELDS = ('actual_q', 'actual_TCP_pose', 'tcp_offset')
-#: How long the robot may take to report its configuration, then its kinematics, and to run
-#: RIGHTS_PROGRAM [s].
+#: Longest waits for the configuration, for the kinematics after it, and for RIGHTS_PROGRAM [s].
 CONFIGURATION_TIMEOUT, GEOMETRY_TIMEOUT, RIGHTS_TIMEOUT = 6.0, 2.0, 3.0
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Runs programs that move the arm, and records what the robot reports meanwhile."""
+"""Runs programs that move the arm, and records the robot's reports meanwhile."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ LOSS_TIME = 0.25
 
 
 class Surprise(Exception):
-    """Something happened that nobody asked for; the text is a clause."""
+    """An unexpected event; the text is a clause."""
 
 
 async def motion_refusal(address: RobotAddress) -> str:
@@ -51,10 +51,10 @@ async def motion_refusal(address: RobotAddress) -> str:
 
 class ProgramRun:
     """
-    The connections by which programs run one after the other; used once.
+    The connections for running programs, one after the other; used once.
 
     All methods that wait raise OSError if RTDE is lost, and :class:`Surprise` if the robot stops,
-    the primary interface is lost, or the watch of the caller finds something.
+    the primary interface is lost, or the watch of the caller finds a fault.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class ProgramRun:
 
         :param names: RTDE outputs to record; ``target_q``, ``runtime_state`` and ``safety_mode``
             are among them.
-        :param watch: returns what is wrong with a row, as a clause; '' = nothing.
+        :param watch: returns the fault of a row, as a clause; '' = none.
         """
         self._address, self._watch = address, watch
         self.recorder = RtdeRecorder(names, address.host, address.rtde_port)
@@ -165,7 +165,7 @@ class ProgramRun:
         """
         Watch each row until one meets a condition.
 
-        :param otherwise: what to say if none did within a time [s], as a clause.
+        :param otherwise: clause for the error if no row did within ``time`` [s].
         """
         if not await self.wait_for(is_reached, time):
             raise Surprise(f'{otherwise} within {time:g} s')

@@ -40,7 +40,8 @@ INPUT_GROUPS: Mapping[str, tuple[str, ...]] = {
     'outputs': ('standard_digital_output_mask', 'standard_digital_output'),
     **REGISTER_GROUPS,
 }
-#: How long this check tries to get the inputs of a closed connection [s]; a goal tries for 0.2 s.
+#: Time for which this check tries to get the inputs of a closed connection [s]; a goal tries for
+#: 0.2 s.
 RELEASE_TIMEOUT = 2.0
 #: Longest pause between two packets that leaves margin to the timeout of the robot program [s].
 MAX_GAP = 0.1

@@ -19,7 +19,7 @@ from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 
 
 def name_in(kind: type[IntEnum], number: int) -> str:
-    """Return the name of a number that a robot reports, also of one that no list has."""
+    """Return the name of a number that a robot reports; unlisted numbers have one, too."""
     try:
         return kind(number).name
     except ValueError:
@@ -53,7 +53,7 @@ class RtdeRecorder:
         """
         Begin recording, and return the software version of the controller.
 
-        :raises OSError: nothing answers, or what answers is not a robot.
+        :raises OSError: nothing answers, or the other side is not a robot.
         """
         return await self.connection.open(*self._address)
 

@@ -21,7 +21,7 @@ from ur_cartesian_driver.robot.connection_status import (
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 
-#: How long the arm may take to be switched on [s].
+#: Longest time for switching the arm on [s].
 POWER_UP_TIMEOUT = 30.0
 
 

@@ -3,7 +3,7 @@
 """
 The robot program's watch for contact of the tool, which stops every motion at contact.
 
-START_TOOL_CONTACT begins the watch, and has one answer: contact, or ended before a contact, after
+START_TOOL_CONTACT begins the watch, and has one answer: contact, or an end without contact after
 END_TOOL_CONTACT. A paused program reads END_TOOL_CONTACT only when it resumes, so the answer may
 come long after anyone needs it.
 """
@@ -18,7 +18,7 @@ from ur_cartesian_driver.protocol.program import script_command
 from ur_cartesian_driver.protocol.program.script_command import ToolContactResult
 from ur_cartesian_driver.robot.program.program_sockets import ProgramSockets
 
-#: How long the program may take to answer END_TOOL_CONTACT [s].
+#: Longest wait for the answer to END_TOOL_CONTACT [s].
 END_TIMEOUT = 1.0
 
 
@@ -33,7 +33,7 @@ class ContactWatch:
             contact.
         """
         self._sockets, self._changed = sockets, changed
-        #: The answer of the program, or why it will not come; None = no watch.
+        #: The answer of the program, or the reason why it will not come; None = no watch.
         self._answer: asyncio.Future[ToolContactResult | str] | None = None
         self._ends = asyncio.Event()
 

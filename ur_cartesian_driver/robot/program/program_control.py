@@ -89,7 +89,7 @@ class ProgramControl:
         self._sockets.send_servo(on)
 
     def _note(self, done: str) -> None:
-        """Note a message to the robot program, if a program is connected that gets it."""
+        """Note a message to the robot program, if one is connected."""
         if self._sockets.connected:
             self._event_log.note(f'the driver {done}')
 
@@ -97,8 +97,8 @@ class ProgramControl:
         """
         Send a command to the primary interface; return False if there is no connection.
 
-        :param is_wanted: asked before the command is sent again, because the first connection was
-            read-only: returns whether the command is still wanted.
+        :param is_wanted: returns whether the command is still wanted; asked before the command is
+            sent again, because the first connection was read-only.
         """
         return self._primary.send(primary.encode_command(command), is_wanted)
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Whose program runs on the robot, and whether it reads messages."""
+"""Find out whose program runs on the robot, and whether it reads messages."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from ur_cartesian_driver.protocol.program.registers import PROGRAM_VERSION
 from ur_cartesian_driver.robot.connection_status import has_ended, is_paused
 from ur_cartesian_driver.robot.program.program_sockets import ProgramSockets
 
-#: How long a program may hold its sockets after the robot has reported that none runs [s].
+#: Time after which a program loses its sockets, if the robot reports that none runs [s].
 DEAD_PROGRAM_TIMEOUT = 0.5
-#: How long our own program may take after connecting to prove that it is ours [s].
+#: Time in which our own program proves its identity after connecting [s].
 IDENTITY_TIMEOUT = 0.5
-#: What to do where only our own program will do; the end of a sentence.
+#: The remedy if a feature needs our own program; the end of a sentence.
 NEEDS_OWN_PROGRAM = (
     "for which the robot has to run this driver's program, and the running program has not "
     'identified itself as ours; call resend_robot_program (headless_mode), or play a program '
@@ -60,12 +60,12 @@ class ProgramTracker:
         self._forget_identity()
 
     def program_lost(self) -> None:
-        """End the wait for a proof, which a program that is gone does not give."""
+        """End the wait for a proof of identity, because the program is gone."""
         self._identified.set()
 
     def robot_lost(self) -> None:
         """
-        Forget what the robot has reported of its program, because another one can start unseen.
+        Forget the robot's reports about its program, because another one can start unseen.
 
         The count of connections stays: a program that connects meanwhile proves itself by raising
         it.

@@ -3,7 +3,7 @@
 """
 Sets the temporary TCP of a goal, and restores the previous TCP.
 
-The goal decides when each of these happens (:mod:`~ur_cartesian_driver.execution`).
+The goal decides when to set and when to restore (:mod:`~ur_cartesian_driver.execution`).
 """
 
 from __future__ import annotations

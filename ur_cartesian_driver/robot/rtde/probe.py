@@ -14,7 +14,7 @@ async def read_state(host: str, port: int) -> RobotState:
     """
     Return the state of a robot.
 
-    :raises OSError: nothing answers, what answers is not a robot, or the connection ends.
+    :raises OSError: nothing answers, the other side is not a robot, or the connection ends.
     """
     states: list[RobotState] = []
     first = asyncio.Event()

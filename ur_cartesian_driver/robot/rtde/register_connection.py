@@ -41,7 +41,7 @@ SERVO_FIELDS = (
     'runtime_state',
     *SERVO_OUTPUTS,
 )
-#: How long to try to get the inputs [s]; the pause between two attempts [s].
+#: Time for all attempts to get the inputs [s]; pause between two attempts [s].
 OPEN_TIMEOUT, RETRY_PERIOD = 0.2, 0.02
 
 

@@ -52,7 +52,7 @@ class RtdeConnection:
         self._silence, self._on_text = silence, on_text
         self._names: tuple[str, ...] = ()
         self._inputs: Recipe | None = None
-        #: Whether the peer has sent something that RTDE understands.
+        #: Whether the peer has sent valid RTDE data.
         self._has_answered = False
         self._last_packet = self._last_request = 0.0
         #: Shortest time between a request of the handshake and its answer [s].
@@ -77,7 +77,7 @@ class RtdeConnection:
         """
         Connect, agree on the recipes, and return the version of the controller's software.
 
-        :raises OSError: nothing answers, or what answers is not a robot; the text names host and
+        :raises OSError: nothing answers, or the other side is not a robot; the text names host and
             port.
         """
         await dial(self._connection, host, port)

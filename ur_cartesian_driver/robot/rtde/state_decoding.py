@@ -66,7 +66,7 @@ def _monitored(*types: DataType) -> tuple[int, ...]:
     )
 
 
-#: For each output, the value that replaces it if the robot does not have the output.
+#: For each output, the value used if the robot does not have it.
 _ABSENT = {
     rtde.name: row.default.rotation_vector() if row.type is Pose else row.default
     for row, rtde in _ROWS

@@ -34,7 +34,7 @@ from ur_cartesian_driver.protocol.robot_api import API_COMMANDS, CONFLICT, FORBI
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
-#: How long the dashboard may take to greet, and to answer [s].
+#: Longest wait for the greeting, and for an answer [s].
 ANSWER_TIMEOUT = 5.0
 #: The same for reports, which a robot answers when they are written [s]: the bounds of Universal
 #: Robots' client library.
@@ -44,7 +44,7 @@ REPORT_TIMEOUTS: Mapping[str, float] = {
 }
 #: The first software without a dashboard.
 POLYSCOPE_X = 10
-#: What to do if the Robot API lacks a command; commands without an entry: use the pendant.
+#: Alternatives to commands that the Robot API lacks; without an entry: the pendant.
 REPLACEMENTS: Mapping[str, str] = {
     **dict.fromkeys(
         ('power on', 'brake release', 'unlock protective stop'),

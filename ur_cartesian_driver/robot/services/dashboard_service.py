@@ -46,7 +46,7 @@ EFFECT_TIMEOUT = 5.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DashboardPorts:
-    """The robot's ports: of the dashboard; of the Robot API that PolyScope X has instead."""
+    """The robot's ports: of the dashboard, and of the Robot API, its successor on PolyScope X."""
 
     dashboard: int
     robot_api: int

@@ -37,7 +37,7 @@ async def write_outputs(
     """
     Write the values of outputs; return the outputs that have changed, and the failures.
 
-    :param before: filled with the outputs before the first attempt; the same for each attempt.
+    :param before: filled with the outputs before the first attempt; pass it to later attempts.
     """
     by_kind: dict[int, list[SafeOutput]] = {}
     for output in outputs:

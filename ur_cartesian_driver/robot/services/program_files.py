@@ -36,7 +36,7 @@ from ur_cartesian_driver.robot.services.service_calls import (
 
 _LIST = 'Ask for the list of its programs.'
 _LOG = 'Look at the log of the robot.'
-#: What to do about the refusal of any call, by its status.
+#: Remedies for the refusal of any call, by HTTP status.
 REMEDIES: Mapping[int, str] = {
     403: 'It is in local control: switch it to remote control on the pendant.',
     409: 'The program is loaded: load another one first.',

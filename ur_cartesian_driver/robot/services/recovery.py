@@ -43,9 +43,9 @@ from ur_cartesian_driver.robot.services.service_calls import (
 STEP_TIMEOUT = 35.0
 #: The same, for a robot that is not connected when the recovery begins [s].
 DISCONNECTED_TIMEOUT = 2.0
-#: How long the reports of a robot may contradict each other after a change [s].
+#: Time in which the reports of a robot may contradict each other after a change [s].
 SETTLING_TIMEOUT = 0.3
-#: Period of attempts to unlock [s]; how long an unlock that comes too early is repeated [s].
+#: Period of the attempts to unlock [s]; time in which an unlock is too early and is repeated [s].
 UNLOCK_RETRY_PERIOD, UNLOCK_TIMEOUT = 0.5, 6.0
 
 #: Dashboard commands of the steps of a recovery; the last command is the step itself.
@@ -119,7 +119,7 @@ class RecoveryRunner:
             if upcoming.step is RecoveryStep.OPERATOR:
                 return failed(_report(done, upcoming.text))
             if upcoming.step is RecoveryStep.WAIT:
-                # A robot that has not been connected is not waited for as long.
+                # The wait is shorter for a robot that has not been connected.
                 timeout = STEP_TIMEOUT if was_connected else DISCONNECTED_TIMEOUT
                 if loop.time() - last_step_time > timeout:
                     return failed(_report(done, upcoming.text or describe_modes(self._link)))

@@ -30,7 +30,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.services.dashboard_connection import REPORT_TIMEOUTS
 from ur_cartesian_driver.robot.transport import CONNECT_TIMEOUT, error_reason
 
-#: How long the robot may take to answer [s].
+#: Longest wait for an answer [s].
 ANSWER_TIMEOUT = 10.0
 #: The same for commands that the robot answers after a slow effect [s].
 SLOW_ANSWER_TIMEOUTS: Mapping[str, float] = {
@@ -41,7 +41,7 @@ SLOW_ANSWER_TIMEOUTS: Mapping[str, float] = {
 MAX_ANSWER_SIZE = 1 << 22
 #: Largest number of redirects: paths have moved between versions, and old paths redirect to new.
 MAX_REDIRECTS = 3
-#: How long the robot may take to report a program as loaded [s]; the period of the queries [s].
+#: Longest wait until the robot reports a program as loaded [s]; the period of the queries [s].
 LOAD_TIMEOUT, LOAD_POLL_PERIOD = 5.0, 0.2
 #: The first software that reports the loaded program.
 NAMES_LOADED_PROGRAM = (10, 12)
@@ -109,7 +109,7 @@ class RobotApiConnection:
 
     async def _wait_until_loaded(self, program: str) -> None:
         """
-        Wait until the robot reports a program as loaded, as the request is accepted earlier.
+        Wait until the robot reports a program as loaded; it accepts the request earlier.
 
         :raises OSError: the robot does not load the program in time.
         """

@@ -22,7 +22,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValue, RtdeValues
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 from ur_cartesian_driver.robot.services.service_calls import SetOutputCall, SetSpeedSliderCall
 
-#: How long the robot may take to report the effect of a write [s].
+#: Longest wait for the robot to report the effect of a write [s].
 EFFECT_TIMEOUT = 1.0
 
 _DIGITAL: Mapping[OutputKind, tuple[str, int]] = {
@@ -142,8 +142,8 @@ async def write_and_compare(
     """
     Write inputs, and return whether the robot reported the effect.
 
-    :param before: gets the outputs as they were before the write, unless it has them from an
-        earlier attempt, which may have had an effect.
+    :param before: receives the outputs before the write. Values from an earlier attempt stay,
+        because that attempt may have had an effect.
     :raises OSError: there is no connection, or another client holds the inputs.
     """
     reported, done = asyncio.Event(), asyncio.Event()

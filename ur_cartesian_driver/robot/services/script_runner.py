@@ -29,13 +29,13 @@ from ur_cartesian_driver.robot.services.service_calls import (
 )
 from ur_cartesian_driver.urscript import CompileError, parse
 
-#: How long an error of a secondary program may take to be reported [s].
+#: Longest wait for the report of an error in a secondary program [s].
 REPORT_TIME = 0.3
-#: How long the robot may take to begin a primary program, or to end it when it is stopped [s].
+#: Longest waits for a primary program to begin, and to end when it is stopped [s].
 BEGIN_TIMEOUT, STOP_TIMEOUT = 2.0, 3.0
 #: Length [characters] from which a script is parsed in a thread, so that keepalives do not wait.
 MIN_THREAD_LENGTH = 1000
-#: How long the robot may report no program between the end of ours and the start of a script [s].
+#: Longest time without a program between the end of ours and the start of a script [s].
 CHANGE_TIME = 0.3
 
 
@@ -124,7 +124,7 @@ class ScriptRunner:
 
     async def _ends_within(self, longest: float) -> bool:
         """
-        Return whether, within a time [s], the script ends or our program replaces it.
+        Return whether the script ends, or our program replaces it, within a time [s].
 
         Before the script starts, no program runs for a moment, which is not the script's end.
         """

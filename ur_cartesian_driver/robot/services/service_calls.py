@@ -22,7 +22,7 @@ from ur_cartesian_driver.motion.goal.output_names import OUTPUTS
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol.dashboard import DashboardRequest
 
-#: How long a script may take: by default [s]; at most [s].
+#: Timeout of a script: the default [s]; the largest [s].
 SCRIPT_TIMEOUT, MAX_SCRIPT_TIMEOUT = 30.0, 600.0
 #: Length [characters] above which a script must be a mistake.
 MAX_SCRIPT_LENGTH = 200_000
@@ -34,7 +34,7 @@ MAX_TEXT_LENGTH = 1000
 MAX_TOOL_OFFSET, MAX_PAYLOAD_MASS = 5.0, 100.0
 #: An acceleration that no mounting on earth has [m/s^2].
 MAX_GRAVITY = 20.0
-#: How far the length of a quaternion may differ from 1.
+#: Tolerance for the length of a unit quaternion.
 UNIT_TOLERANCE = 1e-3
 
 
@@ -106,7 +106,7 @@ class UploadProgramCall(_CheckedCall):
     Send a program to the robot; PolyScope X only.
 
     :param program: the content of a `.urpx` file, which also names the program.
-    :param replaces: the program takes the place of one that the robot has; else it is a new one.
+    :param replaces: the program replaces one on the robot; else it is a new one.
     """
 
     program: str
@@ -166,7 +166,7 @@ class SetPayloadCall(_CheckedCall):
     :param cog: centre of gravity in the flange frame [m].
     :param inertia: xx, yy, zz, xy, xz, yz about that point, along the axes of the flange
         [kg m^2]; empty = a point mass.
-    :param transition_time: how long the controller takes to go over to this payload [s].
+    :param transition_time: time over which the controller changes to this payload [s].
     """
 
     mass: float
@@ -195,7 +195,7 @@ class SetPayloadCall(_CheckedCall):
 
     @property
     def is_point_mass(self) -> bool:
-        """Whether the payload has no inertia, and is there at once."""
+        """Whether the payload has no inertia, and applies at once."""
         return not any(self.inertia) and self.transition_time == 0.0
 
 
@@ -296,7 +296,7 @@ class RunScriptCall(_CheckedCall):
     """
     Run a script: a secondary program, or in headless mode a primary one.
 
-    :param timeout: how long a primary program may take [s].
+    :param timeout: longest duration of a primary program [s].
     """
 
     script: str
@@ -326,7 +326,7 @@ class RecoverCall(_CheckedCall):
     unlock_protective_stop: bool = False
 
 
-#: The calls that change what a goal was planned for.
+#: The calls that change the assumptions of a planned goal.
 SettingCall: TypeAlias = SetTcpCall | SetPayloadCall | SetGravityCall
 
 

@@ -5,9 +5,9 @@ Carries out the service calls of a driver's owner.
 
 A call uses the dashboard, a single command to the robot program, the primary interface, or RTDE
 inputs. It succeeds once the robot reports the effect, if the robot can report it. A call ends
-within :data:`CALL_TIMEOUT`, a recovery within :data:`RECOVERY_TIMEOUT`, a script within
-:data:`CALL_TIMEOUT` plus its timeout, and so does a report (:data:`REPORT_TIMEOUTS`); a watch for
-contact lasts until it is ended.
+within :data:`CALL_TIMEOUT`, a recovery within :data:`RECOVERY_TIMEOUT`, a script or a report
+within :data:`CALL_TIMEOUT` plus its own timeout (:data:`REPORT_TIMEOUTS`); a watch for contact
+lasts until it is ended.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from ur_cartesian_driver.robot.services.service_calls import (
 CALL_TIMEOUT = 40.0
 #: Longest duration of a recovery, which has several steps [s].
 RECOVERY_TIMEOUT = 120.0
-#: How long the robot may take to report a setting [s].
+#: Longest wait for the robot to report a setting [s].
 SETTING_TIMEOUT = 1.0
 #: Largest error of the reported TCP [m, rad], which is rounded to 32-bit integers on the wire.
 TCP_TOLERANCE = 1e-5
@@ -112,7 +112,7 @@ class ServiceDispatcher:
 
             self._run_script = ScriptRunner(settings, link, self._send_program).run
         self._pending_settings = 0
-        #: Keeps the order: the end of a watch waits for an earlier call that is to begin one.
+        #: Keeps the order: a call that ends a watch waits for an earlier call that begins one.
         self._order_of_watches = asyncio.Lock()
 
     @property
@@ -259,7 +259,7 @@ class ServiceDispatcher:
                         f'Only the robot program can watch for contact. {link.status.message}'
                     )
                 if not is_own:
-                    # Others leave the goal that contact stops without a result.
+                    # Other programs report no result for a goal that contact stops.
                     return failed(f'This is a watch for contact, {NEEDS_OWN_PROGRAM}')
                 outcome = link.contact_watch.begin()
             touched = await outcome
@@ -353,7 +353,7 @@ class ServiceDispatcher:
         Send a setting, and wait until the robot reports it with inputs and outputs.
 
         :param sample: returns one of the reported numbers, NaN if the robot does not report them.
-        :param transition: how long the controller takes to go over to the setting [s].
+        :param transition: time over which the controller changes to the setting [s].
         """
         refusal = self._command(command)
         if refusal is not None:
