@@ -3,8 +3,8 @@
 """
 The bodies of a cell: where each is, what carries it, and what it may touch.
 
-A body is fixed in the robot's base, or carried by a link of the arm or by the tool. The names of
-the frames are those of the robot description for ROS, without a prefix.
+A body is fixed in the robot's base, or carried by a link of the arm or by the tool. Frames are
+named as in the robot description for ROS, without a prefix.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from ur_cartesian_driver.motion.cell.shapes import HalfSpace, Mesh, Shape
 from ur_cartesian_driver.motion.errors import shortened, suggestion
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 
-#: Distance that the arm keeps from a body for which the cell gives none [m].
+#: Distance that the arm keeps from a body, unless the cell gives another [m].
 DEFAULT_CLEARANCE = 0.005
 #: The largest clearance [m].
 MAX_CLEARANCE = 1.0
-#: No coordinate of a place is larger [m]: it is probably given in millimetres.
+#: Largest coordinate of a place [m]; a larger one is probably given in millimetres.
 MAX_COORDINATE = 100.0
 #: Longest name of a body.
 _MAX_NAME = 100
 _UNIT_TOLERANCE = 1e-6
 
-#: The frames that carry bodies, with the number of their link, 0 = the base. They are those of
-#: the robot description; ``tool0_controller`` is the active TCP.
+#: The frames that carry bodies, named as in the robot description, each with the number of its
+#: link, 0 = the base; ``tool0_controller`` is the active TCP.
 FRAMES: Mapping[str, int] = MappingProxyType(
     {
         'base': 0,
@@ -45,8 +45,8 @@ FRAMES: Mapping[str, int] = MappingProxyType(
         'tool0_controller': 6,
     }
 )
-#: Names of what is no body of the cell, but may be allowed to touch one: the arm's own links, and
-#: the cylinder of the parameter ``tool_radius``.
+#: Parts of the arm that may be allowed to touch a body: its links, and the cylinder of the
+#: parameter ``tool_radius``.
 LINK_NAMES: tuple[str, ...] = (
     'base_link',
     'shoulder_link',
@@ -80,8 +80,8 @@ class CellBody:
     """
     A body of the cell.
 
-    :raises ValueError: name or frame is none, there is no shape, clearance or place are out of
-        bounds, or a half-space is carried by the arm.
+    :raises ValueError: the name is invalid, the frame is unknown, there is no shape, the clearance
+        or the place is out of bounds, or the arm carries a half-space.
     """
 
     name: str
@@ -89,7 +89,7 @@ class CellBody:
     #: The frame that carries the body, one of :data:`FRAMES`.
     frame: str = 'base'
     T_frame_body: Pose = IDENTITY
-    #: Distance to keep from the body [m]; None = that of the cell.
+    #: Distance to keep from the body [m]; None = the clearance of the cell.
     clearance: float | None = None
 
     def __post_init__(self) -> None:
@@ -146,7 +146,7 @@ def check_place(pose: Pose) -> None:
     """
     Refuse a pose that no body can have.
 
-    :raises ValueError: a coordinate is out of bounds, or the quaternion has not the length 1; the
+    :raises ValueError: a coordinate is out of bounds, or the quaternion is not of length 1; the
         text is a clause.
     """
     for axis, value in zip('xyz', pose.position, strict=True):
@@ -165,16 +165,16 @@ class Cell:
     """
     All bodies of a cell. Immutable.
 
-    :raises ValueError: two bodies have one name, a pair names what the cell does not have, or the
-        clearance is out of bounds.
+    :raises ValueError: two bodies share a name, a pair contains an unknown name, or the clearance
+        is out of bounds.
     """
 
     bodies: tuple[CellBody, ...] = ()
-    #: Pairs of names that may touch, of bodies and of :data:`LINK_NAMES`.
+    #: Pairs that may touch: names of bodies, or of links (:data:`LINK_NAMES`).
     may_touch: frozenset[frozenset[str]] = frozenset()
-    #: Distance that the arm keeps from bodies that give none [m].
+    #: Clearance of the bodies that give none [m].
     clearance: float = DEFAULT_CLEARANCE
-    #: What the files left open: sentences.
+    #: Remarks on the files, one sentence each.
     remarks: tuple[str, ...] = field(default=(), compare=False)
     #: The names of the bodies.
     names: frozenset[str] = field(init=False, repr=False, compare=False)
@@ -223,7 +223,7 @@ class Cell:
         return self.clearance if body.clearance is None else body.clearance
 
     def with_bodies(self, bodies: Iterable[CellBody]) -> Cell:
-        """Return the cell with bodies added; those of the same name are replaced."""
+        """Return the cell with these bodies, which replace bodies of the same name."""
         added = {body.name: body for body in bodies}
         kept = tuple(added.pop(body.name, body) for body in self.bodies)
         return replace(self, bodies=(*kept, *added.values()))

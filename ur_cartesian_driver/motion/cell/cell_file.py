@@ -22,8 +22,9 @@ Read and write ``cell.yaml``: the bodies around the arm, on its links and in its
     - {file: cell.urdf, clearance: 0.01, leave_out: [lamp]}
 
 Positions are in metres; orientations are ``rpy`` [rad], ``rotation_vector`` [rad] or
-``orientation``, a quaternion x y z w. A frame may also be another body of the file, beside which
-the body then stands. Names of files begin at the folder of the cell. Every error names the line.
+``orientation``, a quaternion x y z w. A frame may also be another body of the file; the body is
+then placed relative to it. File names are relative to the folder of the cell. Every error names
+the line.
 """
 
 from __future__ import annotations
@@ -60,17 +61,17 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector3, vector3
 from ur_cartesian_driver.motion.yaml_nodes import kind_of, NodeReader, text_of_file
 
 if TYPE_CHECKING:
-    import yaml  # else with the first file
+    import yaml  # at run time, imported with the first file
 
 T = TypeVar('T')
 
 #: The version of the format, with which a file begins.
 FORMAT = 1
-#: The most shapes of a file: with aliases a short text may have very many.
+#: Most shapes of a file; with YAML aliases, a short text can contain very many.
 _MAX_SHAPES = 10_000
-#: Largest difference of the length of a quaternion from 1; a smaller one is no rounding error.
+#: Largest rounding error in the length of a quaternion, and the largest that is not corrected.
 _UNIT_TOLERANCE, _EXACT_UNIT = 1e-3, 1e-12
-#: No angle is larger [rad]: it is probably given in degrees.
+#: Largest angle [rad]; a larger one is probably given in degrees.
 _MAX_ANGLE = 4.0 * pi
 
 _HEAD = ('cell', 'clearance', 'bodies', 'may_touch', 'urdf')
@@ -83,7 +84,7 @@ _URDF = ('file', 'clearance', 'leave_out', *_PLACE)
 
 
 class CellFileError(ValueError):
-    """A file is no cell; the text names the file, the line and the fault."""
+    """A file is not a valid cell; the text names the file, the line and the fault."""
 
 
 def read_cell(path: str | Path) -> Cell:
@@ -91,7 +92,7 @@ def read_cell(path: str | Path) -> Cell:
     Return the cell in a file.
 
     :raises OSError: the file cannot be read.
-    :raises CellFileError: the file is no cell, or a file that it names cannot be used.
+    :raises CellFileError: the file is not a valid cell, or a file that it names cannot be used.
     """
     path = Path(path)
     text = text_of_file(path, 'cell', CellFileError)
@@ -103,8 +104,8 @@ def cell_from_text(text: str, name: str, folder: str | Path) -> Cell:
     Return the cell in the text of a file.
 
     :param name: the name of the file, for error texts.
-    :param folder: where the names of other files begin.
-    :raises CellFileError: the text is no cell, or a file that it names cannot be used.
+    :param folder: the folder to which the names of other files are relative.
+    :raises CellFileError: the text is not a valid cell, or a file that it names cannot be used.
     """
     return _CellReader(name, Path(folder)).cell(text)
 
@@ -113,9 +114,9 @@ def cell_text(cell: Cell) -> str:
     """
     Return the text of a file; :func:`cell_from_text` returns the same cell.
 
-    Bodies of a URDF become bodies of the cell.
+    Bodies of a URDF are written as bodies of the cell.
 
-    :raises ValueError: a mesh is of no file.
+    :raises ValueError: a mesh does not come from a file.
     """
     import yaml
 
@@ -178,7 +179,7 @@ def _floats(values: Iterable[float]) -> list[float]:
 
 @dataclass(frozen=True, slots=True)
 class _Draft:
-    """A body as the file has it: its frame may be another body."""
+    """A body as written in the file: its frame may be another body."""
 
     name: str
     node: yaml.Node
@@ -309,7 +310,7 @@ class _CellReader(NodeReader):
     def _add(
         self, draft: _Draft, drafts: Mapping[str, _Draft], found: dict[str, CellBody]
     ) -> None:
-        """Add a body, and before it those on which it stands."""
+        """Add a body and, before it, the bodies to which its place is relative."""
         chain: dict[str, _Draft] = {}
         while draft.name not in found:
             if draft.name in chain:
@@ -392,7 +393,7 @@ class _CellReader(NodeReader):
     # -- values --------------------------------------------------------------------------------
 
     def _made(self, node: yaml.Node, where: str, make: Callable[[], T]) -> T:
-        """Return what is made, or refuse the node by the error."""
+        """Return the result of ``make``, or refuse the node with the text of its error."""
         where = f'{where}: ' if where else ''
         try:
             return make()
@@ -461,7 +462,7 @@ class _CellReader(NodeReader):
         return vector3(self._numbers(node, what, 3, axes))
 
     def _numbers(self, node: yaml.Node, what: str, count: int, axes: str = '') -> list[float]:
-        """Return the numbers of a list, or by name as in goal files if there are axes."""
+        """Return the numbers of a list; if axes are given, also by name as in goal files."""
         if axes and kind_of(node) == 'mapping':
             nodes = list(self._all_entries(node, f'the {what}', tuple(axes)).values())
         else:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What is odd about a cell, though it can be used."""
+"""Remarks on a cell that can be used but looks odd."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from ur_cartesian_driver.motion.cell.cell import Cell
 from ur_cartesian_driver.motion.cell.shapes import Mesh
 
-#: Meshes that are larger or smaller than this have probably the wrong scale [m].
+#: Meshes larger or smaller than these probably have the wrong scale [m].
 _LARGE, _SMALL = 5.0, 0.002
 
 
 def cell_remarks(cell: Cell) -> tuple[str, ...]:
-    """Return sentences on what is odd, first those of the files."""
+    """Return sentences on odd features of a cell, after the remarks of its files."""
     remarks = dict.fromkeys(cell.remarks)
     for body in cell.bodies:
         for placed in body.shapes:

@@ -3,12 +3,12 @@
 """
 Read the triangles of an STL or OBJ file.
 
-The files are read here, not by a library. The readers at hand (assimp in ``coal``, and trimesh)
-belong to optional packages, though a cell has to be read, shown and sent without them; and both
-take a file that is cut off for a smaller part, which the arm would then run into.
+The files are read here, not by a library. The available readers (assimp in ``coal``, and trimesh)
+belong to optional packages, but a cell must be read, shown and sent without them. Both also accept
+a truncated file as a smaller part, and the arm would run into the rest.
 
-A polygon of an OBJ file becomes a fan of triangles, which covers it; if it is not convex, the fan
-reaches beyond it.
+A polygon of an OBJ file becomes a fan of triangles, which covers the polygon; if the polygon is
+not convex, the fan reaches beyond it.
 """
 
 from __future__ import annotations
@@ -31,25 +31,25 @@ from ur_cartesian_driver.motion.yaml_nodes import printable
 #: A line of a file: its number, and its words.
 _Line: TypeAlias = tuple[int, list[bytes]]
 
-#: No file is longer [bytes], and no mesh has more triangles: they would take too long.
+#: Longest file [bytes] and most triangles of a mesh: more would take too long.
 _MAX_LENGTH = 100_000_000
 _MAX_TRIANGLES = 1_000_000
-#: A triangle that is less high than this is a line, which its neighbours have too [m].
+#: A triangle of a smaller height is dropped: it is a line, which its neighbours contain [m].
 _MIN_HEIGHT = 1e-9
 
 _HEADER = 84
 _FACET = np.dtype([('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('attribute', '<u2')])
-#: The words of a facet; None = a coordinate, '' = one of the normal, which nobody needs.
+#: The words of a facet; None = a coordinate, '' = a component of the normal, which is not needed.
 _FACET_WORDS = (
     *(b'facet', b'normal', b'', b'', b''),
     *(b'outer', b'loop', *3 * (b'vertex', None, None, None)),
     *(b'endloop', b'endfacet'),
 )
-#: The first words of its lines.
+#: The first words of the lines of a facet.
 _FACET_LINES = (b'facet', b'outer', b'vertex', b'vertex', b'vertex', b'endloop', b'endfacet')
 _SOLID_LINE = re.compile(rb'^[ \t]*(?:end)?solid\b.*$', re.MULTILINE)
-#: Statements of OBJ that have nothing to do with the surface. Free-form surfaces are not among
-#: them: without these the part would be incomplete.
+#: Statements of OBJ to skip, because they do not change the surface. Free-form surfaces are not
+#: skipped: without them the part would be incomplete.
 _OTHER_OBJ_WORDS = frozenset(
     b'vn vt vp p l g o s mg usemtl mtllib usemap maplib shadow_obj trace_obj bevel c_interp '
     b'd_interp'.split()
@@ -74,16 +74,16 @@ _OTHER_FORMATS = {
 
 
 class MeshFileError(ValueError):
-    """A file is no mesh that can be used; the text is a sentence without its full stop."""
+    """A file is not a usable mesh; the text is a sentence without its full stop."""
 
 
 def read_mesh(path: str | Path, scale: Vector3 = (1.0, 1.0, 1.0)) -> Mesh:
     """
     Return the mesh in a file.
 
-    :param scale: the factors of its coordinates along x, y and z, which make them metres.
+    :param scale: factors that convert its coordinates along x, y and z to metres.
     :raises OSError: the file cannot be read.
-    :raises MeshFileError: the file is no mesh, is damaged, or the mesh is too large.
+    :raises MeshFileError: the file is not a mesh or is damaged, or the mesh is too large.
     """
     path = Path(path)
     for factor in scale:
@@ -110,7 +110,7 @@ def read_mesh(path: str | Path, scale: Vector3 = (1.0, 1.0, 1.0)) -> Mesh:
 
 
 def _are_proper(vertices: Floats, triangles: Indices) -> Flags:
-    """Return which triangles are more than a line, or are not finite, which Mesh refuses."""
+    """Return a mask of triangles that are not lines; Mesh refuses the ones that are not finite."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     with np.errstate(over='ignore', invalid='ignore'):
         double_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
@@ -126,7 +126,7 @@ class _MeshReader:
         self._name = name
 
     def mesh(self, path: Path) -> tuple[Floats, Indices]:
-        """Return vertices (n, 3) as the file has them, and triangles (m, 3)."""
+        """Return vertices (n, 3) in the unit of the file, and triangles (m, 3)."""
         suffix = path.suffix.lower()
         if suffix not in ('.stl', '.obj'):
             what = f'is {_OTHER_FORMATS[suffix]}' if suffix in _OTHER_FORMATS else 'is neither'
@@ -177,9 +177,9 @@ class _MeshReader:
             )
 
     def _text_facets(self, data: bytes) -> Floats:
-        """Return the corners (3 n, 3) of a file in text."""
+        """Return the corners (3 n, 3) in a text file."""
         data = data.lower().replace(b'\r\n', b'\n').replace(b'\r', b'\n').rstrip()
-        words = _SOLID_LINE.sub(b'', data).split()  # lists of words by line take thrice the time
+        words = _SOLID_LINE.sub(b'', data).split()  # splitting each line takes three times as long
         width = len(_FACET_WORDS)
         n, rest = divmod(len(words), width)
         if rest or not data[data.rfind(b'\n') + 1 :].lstrip().startswith(b'endsolid'):
@@ -200,7 +200,7 @@ class _MeshReader:
         return corners
 
     def _refuse_facet(self, data: bytes) -> NoReturn:
-        """Refuse the first line of a file in text that is none of a facet."""
+        """Refuse a text file at its first line that does not fit a facet."""
         lines = [line for line in _lines(data) if line[1][0] not in (b'solid', b'endsolid')]
         for k, (number, words) in enumerate(lines):
             if words[0] != (expected := _FACET_LINES[k % len(_FACET_LINES)]):
@@ -238,7 +238,7 @@ class _MeshReader:
         return self._coordinates(vertices), np.array(triangles, dtype=np.intp)
 
     def _face(self, words: Sequence[bytes], count: int, line: int) -> list[int]:
-        """Return the vertices of a face, from 0; it comes after so many vertices."""
+        """Return the vertices of a face, from 0; ``count`` vertices precede the face."""
         try:
             indices = [int(word.split(b'/', 1)[0]) for word in words]
         except ValueError:
@@ -257,7 +257,7 @@ class _MeshReader:
     # -- both ----------------------------------------------------------------------------------
 
     def _coordinates(self, lines: list[_Line]) -> Floats:
-        """Return the three numbers after the first words of lines, (n, 3)."""
+        """Return the three numbers after the first word of each line, (n, 3)."""
         try:
             flat = [float(text) for _, words in lines for text in words[1:4]]
         except ValueError:
@@ -294,7 +294,7 @@ def _are_coordinates(words: Sequence[bytes]) -> bool:
 
 
 def _merged(corners: Floats | Singles) -> tuple[Floats, Indices]:
-    """Return each corner (n, 3) once, and the triangles of every three corners."""
+    """Return the distinct corners (n, 3), and the triangles (m, 3) as indices of corners."""
     order = np.lexsort(corners.T)
     sorted_corners = corners[order]
     is_new = np.ones(len(corners), dtype=bool)

@@ -18,9 +18,9 @@ import numpy as np
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
-#: No shape is larger than this [m]: one that is has probably been given in millimetres.
+#: Largest size of a shape [m]; a larger one is probably given in millimetres.
 MAX_SIZE = 50.0
-#: Corners of a mesh that are nearer than this are one [m].
+#: Corners of a mesh that are closer than this count as one [m].
 _SAME_PLACE = 1e-6
 
 
@@ -100,7 +100,7 @@ class Sphere:
 
 @dataclass(frozen=True, slots=True)
 class HalfSpace:
-    """All that is below z = 0: a table, a floor, a wall."""
+    """Everything below z = 0: a table, a floor, a wall."""
 
     @property
     def bounds(self) -> Floats:
@@ -111,10 +111,10 @@ class HalfSpace:
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
     """
-    The triangles of a surface; it may be open, and of several parts.
+    The triangles of a surface, which may be open and in several parts.
 
-    A closed surface is solid only where it is: what lies inside, far from any triangle, does not
-    touch it.
+    Only the triangles are solid, even of a closed surface: a body inside, far from any triangle,
+    does not touch it.
 
     :raises ValueError: there is no triangle, a number is not finite, a triangle names a vertex
         that does not exist, or the mesh is too large.
@@ -126,7 +126,7 @@ class Mesh:
     triangles: Indices = field(repr=False)
     #: The file, '' = none.
     source: str = ''
-    #: The factors of the coordinates in the file along x, y and z.
+    #: Factors that convert the coordinates in the file, along x, y and z, to metres.
     scale: Vector3 = (1.0, 1.0, 1.0)
 
     def __post_init__(self) -> None:
@@ -157,8 +157,8 @@ class Mesh:
 
     @property
     def is_closed(self) -> bool:
-        """Whether no triangle has an edge of its own: the surface encloses a solid."""
-        # Programs write the corner of two triangles with different last digits.
+        """Whether triangles share every edge in pairs, so that the surface encloses a solid."""
+        # Programs may write a shared corner with other last digits for each triangle.
         places = np.round(self.vertices / _SAME_PLACE)
         numbers = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
         begin = numbers[self.triangles]

@@ -3,9 +3,10 @@
 """
 The collision bodies of a URDF, by the names of their links.
 
-The arm itself may be in the file, with any prefix. Its own links are left out, because the driver
-knows them; what its links carry is carried by them in the cell too; and everything else stands
-where the file has it beside the arm. In a file without an arm, the root is placed in ``base``.
+The file may contain the arm itself, with any prefix. The arm's own links are left out, because the
+driver knows them. Links that the arm carries are carried by the same link in the cell; all other
+links keep their place relative to the arm. In a file without an arm, the root is placed in
+``base``.
 """
 
 from __future__ import annotations
@@ -33,11 +34,11 @@ from ur_cartesian_driver.motion.goal.known_frames import T_BASE_BASE_LINK
 from ur_cartesian_driver.motion.yaml_nodes import printable
 from ur_cartesian_driver.resources import installed_share
 
-#: No file is longer [bytes], or has more links.
+#: Longest file [bytes], and most links in it.
 _MAX_LENGTH, _MAX_LINKS = 10_000_000, 5000
-#: An arm is known by these links, whatever is put in front of their names.
+#: The links that identify an arm, with any prefix.
 _MOVED_LINKS = tuple(name for name, number in FRAMES.items() if name.endswith('_link') and number)
-#: All names of links of an arm, with the frames of the cell in which they are.
+#: The frame in the cell for each link of an arm.
 _ARM_FRAMES = {**{name: name for name in FRAMES}, 'base_link_inertia': 'base'}
 _MOVING = ('revolute', 'continuous', 'prismatic', 'planar', 'floating')
 #: The attribute that holds the line of an element.
@@ -45,12 +46,12 @@ _LINE = ' line'
 
 
 class UrdfError(ValueError):
-    """A file is no URDF with bodies; the text is a sentence without its full stop."""
+    """A file is not a usable URDF; the text is a sentence without its full stop."""
 
 
 @dataclass(frozen=True, slots=True)
 class UrdfBodies:
-    """The bodies of a URDF, and sentences on what it leaves open."""
+    """The bodies of a URDF, and remarks on the file, one sentence each."""
 
     bodies: tuple[CellBody, ...]
     remarks: tuple[str, ...] = ()
@@ -88,10 +89,10 @@ def urdf_bodies(
     Return the bodies of a URDF, one for each link with collision elements.
 
     :param name: the name of the file, for error texts.
-    :param folder: where relative names of meshes begin.
+    :param folder: the folder to which the names of meshes are relative.
     :param T_base_root: the place of the root of a file without the arm; None = the identity.
-    :param clearance: that of all bodies [m]; None = that of the cell.
-    :param leave_out: the links that are no bodies.
+    :param clearance: the clearance of all bodies [m]; None = the clearance of the cell.
+    :param leave_out: the links that do not become bodies.
     :raises UrdfError: the file cannot be used.
     """
     return _UrdfReader(name, folder).bodies(data, T_base_root, clearance, leave_out)
@@ -264,7 +265,7 @@ class _UrdfReader:
         return places
 
     def _arm(self, links: Collection[str], leave_out: Collection[str]) -> dict[str, str]:
-        """Return the frame of the cell for each link of the arm; none if there is no arm."""
+        """Return the frame in the cell for each link of the arm; empty if there is no arm."""
         first, *others = _MOVED_LINKS
         prefixes = [
             prefix
@@ -288,7 +289,7 @@ class _UrdfReader:
     def _root(
         self, places: Mapping[str, Pose], arm: Mapping[str, str], T_base_root: Pose | None
     ) -> Pose:
-        """Return ``T_base_root``, which the place of the arm in the file decides."""
+        """Return ``T_base_root``, from the place of the arm if the file contains one."""
         if not arm:
             return T_base_root or IDENTITY
         bases = {frame: link for link, frame in arm.items() if not FRAMES[frame]}
