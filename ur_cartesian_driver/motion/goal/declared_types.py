@@ -5,7 +5,7 @@ Conversion of values to exactly the types that a dataclass declares.
 
 Users of the Python API pass numpy's numbers for floats, and lists or arrays for tuples. The driver
 needs exactly the declared types, because it packs values into messages, compares them and sends
-them to another process. So it converts users' values once, where they come in.
+them to another process. So it converts users' values once, on entry.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def with_declared_types(value: T, kind: type[T], name: str) -> T:
     """
     Return a value converted to exactly the type ``kind``; fields of dataclasses are converted too.
 
-    An int that is no member of its ``IntEnum`` is kept, for later rules to refuse.
+    An int that is not a member of its ``IntEnum`` is kept, for later rules to refuse.
 
     :param name: the name of the value, with which an error text begins.
     :returns: the same object if nothing had to be converted.

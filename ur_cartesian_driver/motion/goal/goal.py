@@ -120,8 +120,8 @@ class InputKind(IntEnum):
 class PressFrame(IntEnum):
     """The frame along whose axes the tool gives way in a :class:`Press`."""
 
-    #: The frame of the TCP, which turns with the tool along the path; on a part in the hand the
-    #: frame of the fixed tool.
+    #: The frame of the TCP, which turns with the tool along the path; for a held part, the frame
+    #: of the fixed tool.
     TOOL = 0
     #: The frame of the goal.
     GOAL = 1
@@ -147,7 +147,7 @@ DEFAULT_YIELDS = (0.02, 0.2)
 
 
 class StaleOffset(IntEnum):
-    """What happens to a path offset that no newer one replaces in time."""
+    """The driver's reaction when no newer path offset arrives in time."""
 
     #: The offset stays.
     HOLD = 0
@@ -327,10 +327,10 @@ class IOCommand:
     domain: Annotated[AnalogDomain, DOMAIN] = AnalogDomain.CURRENT
     #: Way along the path from the waypoint to the place [m]; negative = before the waypoint.
     distance: Annotated[float, DISTANCE] = 0.0
-    #: The same as a fraction of a segment's length: of the one that ends at the waypoint if
-    #: negative, of the one that begins there if positive.
+    #: The same as a fraction of a segment's length: if negative, of the segment that ends at the
+    #: waypoint; if positive, of the segment that begins there.
     fraction: Annotated[float, Range(-1.0, 1.0)] = 0.0
-    #: Name of a lead: the command comes earlier by its dead time, see ``lead_file``; '' = none.
+    #: Name of a lead, by whose dead time the command comes earlier, see ``lead_file``; '' = none.
     lead: str = ''
     #: The name of the lead whose dead time ``offset`` contains; '' = none.
     lead_name: Annotated[str, Mark.NOT_SENT] = field(default='', compare=False)
@@ -377,12 +377,12 @@ class PayloadChange:
     #: About the centre of gravity, along the axes of the flange [kg m^2]: xx, yy, zz, xy, xz, yz;
     #: empty = a point mass.
     inertia: tuple[float, ...] = ()
-    #: How long the controller takes to go over to this payload [s].
+    #: Time that the controller takes to change to this payload [s].
     transition_time: Annotated[float, Range(0.0, MAX_TRANSITION_TIME, 's')] = 0.0
 
 
 class PartAction(IntEnum):
-    """What happens to a body of the cell, numbered as in ``PartChange.action``."""
+    """The change of a body of the cell, numbered as in ``PartChange.action``."""
 
     #: From the point on, the body moves with the flange, from where it was.
     ATTACH = 0
@@ -558,8 +558,8 @@ class Goal:
     T_flange_controlled: Annotated[Pose | None, Mark.NOT_SENT] = None
     #: The frame of the goal in the robot's base.
     T_base_frame: Annotated[Pose, Mark.NOT_SENT] = IDENTITY
-    #: How the frame moves, if the flange carries it on a part; poses are then in this frame, and
-    #: ``T_base_frame`` is the identity. None = the frame stands in the base.
+    #: The motion of the frame, if it is on a part that the flange carries; poses are then in this
+    #: frame, and ``T_base_frame`` is the identity. None = the frame is fixed in the base.
     moving_frame: Annotated[MovingFrame | None, Mark.NOT_SENT] = None
     #: Age of the goal's stamp on receipt [s]; None = no stamp.
     age: Annotated[float | None, Mark.NOT_SENT] = None
@@ -595,11 +595,11 @@ class Goal:
     #: Largest distance of the path from lines and arcs at their corners [m], unless a segment has
     #: its own; 0 = corners are not rounded.
     corner_deviation: Annotated[float, CORNER_DEVIATION] = 0.0
-    #: Largest turn of the tool from its programmed orientation there [rad]; 0 = the default.
+    #: Largest turn of the tool from its programmed orientation at corners [rad]; 0 = the default.
     corner_angle: Annotated[float, CORNER_ANGLE] = 0.0
     feed_override: FeedOverride = FeedOverride()
     pulses: tuple[PulseTrain, ...] = ()
     part_changes: tuple[PartChange, ...] = ()
-    #: Whether the arm may go to the first point by a way that the driver finds, if that point is
-    #: far away or the way there is blocked.
+    #: Whether the driver may plan a travel to the first point, if that point is far away or the
+    #: direct way is blocked.
     allow_travel: bool = False

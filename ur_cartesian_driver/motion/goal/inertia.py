@@ -1,14 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The inertia of a payload, as ``set_target_payload`` of the script manual takes it."""
+"""The inertia of a payload, as in ``set_target_payload`` of the script manual."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-#: The controller takes no larger moments and products of inertia [kg m^2].
+#: Largest moment or product of inertia that the controller accepts [kg m^2].
 MAX_INERTIA = 133.0
-#: Longest time in which the controller goes over to a payload [s]; a longer one must be a mistake.
+#: Longest time in which the controller changes to a payload [s]; a longer one must be a mistake.
 MAX_TRANSITION_TIME = 30.0
 
 COMPONENTS = ('xx', 'yy', 'zz', 'xy', 'xz', 'yz')
@@ -17,9 +17,9 @@ _MOMENTS = 3
 
 def inertia_problem(inertia: Sequence[float]) -> str:
     """
-    Return what is wrong with an inertia [kg m^2], as a clause; '' = nothing.
+    Return the fault of an inertia [kg m^2], as a clause; '' = none.
 
-    :param inertia: none, or moments and products of inertia in the order of :data:`COMPONENTS`.
+    :param inertia: empty, or moments and products of inertia in the order of :data:`COMPONENTS`.
     """
     if len(inertia) not in (0, len(COMPONENTS)):
         return f'has {len(inertia)} numbers, not {len(COMPONENTS)} ({", ".join(COMPONENTS)})'

@@ -11,8 +11,8 @@ the axes of REP-103 (x forward): it is tool0 rotated by the inverse of rpy (pi/2
 ``tool0_controller`` is the robot's active TCP. A goal in one of these three frames is relative to
 the pose of the arm at the time of planning.
 
-A frame that the arm carries, together with a controlled frame that stands in the cell, is a held
-part before a fixed tool (:mod:`~.moving_frame`): then the frame moves with the arm.
+If the arm carries the frame of the goal, and the controlled frame is fixed in the cell, the arm
+holds a part at a fixed tool; the frame then moves with the arm (:mod:`~.moving_frame`).
 
 The parameter ``static_frames`` adds frames fixed to any of these. All other frames are looked up
 in tf2, if it is installed.
@@ -186,12 +186,13 @@ class Frames:
         self, frame_id: str, controlled_frame: str, snapshot: ArmSnapshot | None = None
     ) -> MovingFrame | None:
         """
-        Return how the frame of a goal moves: on a part that the arm holds, along a fixed tool.
+        Return the motion of a goal's frame on a part that the arm holds at a fixed tool.
 
-        None = it does not: the controlled frame is not known to stand in the base, or it is the
-        base itself, where no tool is.
+        None = the frame does not move: the controlled frame is not known to be fixed in the base,
+        or is one of the robot's own frames, where no fixed tool can be.
 
-        :raises InvalidGoal: the tool stands in the base, but so does the frame, or it is unknown.
+        :raises InvalidGoal: the controlled frame is fixed in the base, but the frame of the goal
+            is fixed there too, or is unknown.
         :raises RobotNotReady: the frame is fixed to the TCP, which is not known.
         """
         if controlled_frame not in self._T_base or controlled_frame in self._own_names:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Leads: how much earlier than wanted an output has to switch, because its valve acts late."""
+"""Leads: the times by which outputs have to switch early, because their valves act late."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ def with_lead_times(
     Return output commands without names of leads, each earlier by the dead time of its lead.
 
     :param file: the parameter ``lead_file``, for refusals.
-    :raises InvalidGoal: a name is unknown, its lead belongs to another output, the command has a
-        time after its place too, or all leads together are too long.
+    :raises InvalidGoal: a name is unknown, its lead belongs to another output, the command also
+        has a positive offset, or offset and dead time together are too long.
     """
     by_name = {lead.name: lead for lead in leads}
     return tuple(

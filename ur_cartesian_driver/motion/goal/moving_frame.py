@@ -1,14 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Goals whose frame moves: the arm holds a part, and leads it along a tool that stands in the cell.
+Goals whose frame moves: the arm holds a part, and leads it along a tool that is fixed in the cell.
 
-The path of every goal is the pose of a tool in the frame of the goal. Usually the frame stands in
-the base, and the flange carries the tool. With a :class:`MovingFrame` it is the other way round:
-the flange carries the frame, and the tool stands in the base. The path, its speed, corners and
-tolerances are relative to the frame all the same; only the way from a pose on the path to a pose
-of the flange, and back, is another one. Whatever else carries a frame later (a turntable, a rail)
-has to answer the same two questions.
+The path of every goal is the pose of a tool in the frame of the goal. Usually the frame is fixed
+in the base, and the flange carries the tool. With a :class:`MovingFrame` it is the other way
+round: the flange carries the frame, and the tool is fixed in the base. The path, its speed,
+corners and tolerances are still relative to the frame. Only the conversions from a pose on the
+path to a pose of the flange, and back, differ; any other carrier of a frame (a turntable, a rail)
+would need the same two conversions.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MovingFrame:
-    """The frame of a goal on a part that the flange holds, and a tool that stands in the base."""
+    """The frame of a goal on a part that the flange holds, and a tool that is fixed in base."""
 
     T_flange_frame: Pose
     T_base_tool: Pose
@@ -37,15 +37,15 @@ class MovingFrame:
         return self.frame(T_base_flange).inverse() @ self.T_base_tool
 
     def frame_under(self, T_frame_tool: Pose) -> Pose:
-        """Return the frame in base where the tool is at a pose in the frame."""
+        """Return the frame in base from the pose of the tool in the frame."""
         return self.T_base_tool @ T_frame_tool.inverse()
 
     def flange(self, T_frame_tool: Pose) -> Pose:
-        """Return the pose of the flange in base that leads the tool to a pose in the frame."""
+        """Return the pose of the flange in base from the pose of the tool in the frame."""
         return self.frame_under(T_frame_tool) @ self.T_flange_frame.inverse()
 
     def flange_shift(self, T_base_flange: Pose, shift: Vector3) -> Vector3:
-        """Return the shift of the flange in base [m] that shifts the tool in the frame."""
+        """Return the shift of the flange in base [m] for a shift of the tool in the frame [m]."""
         return scale(rotate(self.frame(T_base_flange).quaternion, shift), -1.0)
 
     def seen(self, state: RobotState) -> RobotState:
@@ -80,10 +80,10 @@ class MovingFrame:
     def _motion(
         self, T_base_tcp: Pose, T_flange_tcp: Pose, twist: Vector6, acceleration: Vector6 | None
     ) -> tuple[Pose, Vector6, Vector6 | None]:
-        """Return pose, twist and acceleration of the tool in the frame, from those of the TCP."""
+        """Return pose, twist and acceleration of the tool in the frame, from the TCP's in base."""
         T_base_frame = self.frame(T_base_tcp @ T_flange_tcp.inverse())
         offset = subtract(self.T_base_tool.position, T_base_tcp.position)
-        # The frame turns away under the tool: its own motion there, reversed.
+        # The tool moves in the frame as the frame moves at the tool, reversed.
         there = twist_at(twist, offset)
         turned = conjugate(T_base_frame.quaternion)
         relative = None
@@ -95,9 +95,9 @@ class MovingFrame:
 
 def _as_seen(acceleration: Vector6, twist: Vector6) -> Vector6:
     """
-    Return the acceleration of the body at a standing point without that of its changing place.
+    Return the acceleration of a body at a fixed point with the Coriolis term of the point removed.
 
-    The point moves in the body, with -v, where the body turns with w: a - 2 w x v.
+    The point moves with -v in the body, which turns with w: a - 2 w x v.
     """
     a, v, w = acceleration[:3], twist[:3], twist[3:]
     return (*subtract(a, scale(cross(w, v), 2.0)), *acceleration[3:])

@@ -32,7 +32,7 @@ from ur_cartesian_driver.motion.goal.field_annotations import Mark, Range
 
 T = TypeVar('T')
 
-#: The type of a field that the driver fills in; such a field is no parameter.
+#: The type of a field that the driver fills in; such a field is not a parameter.
 Detected: TypeAlias = Annotated[T, Mark.NOT_SENT]
 
 

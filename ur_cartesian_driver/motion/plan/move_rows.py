@@ -140,7 +140,7 @@ class SplineRows(Rows[Spline]):
 
 
 def classes(primitives: Sequence[Primitive]) -> list[type[Primitive]]:
-    """Return the class of each primitive; no objects are made of rows."""
+    """Return the class of each primitive, without creating objects from rows."""
     if isinstance(primitives, SplineRows):
         return [Spline] * len(primitives)
     if not isinstance(primitives, MoveRows):

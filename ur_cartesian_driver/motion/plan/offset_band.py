@@ -58,7 +58,7 @@ class OffsetBand:
     acceleration: float
     #: The age at which an offset is stale [s].
     timeout: float
-    #: What happens to a stale offset.
+    #: The reaction to a stale offset.
     on_stale: StaleOffset
     #: Time between two rows of ``axes`` and ``is_open`` [s].
     step: float

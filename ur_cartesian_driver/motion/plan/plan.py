@@ -81,7 +81,7 @@ class ReferencePath:
         return ReferencePath(**{k: column[row:].copy() for k, column in self._columns().items()})
 
     def __add__(self, other: ReferencePath) -> ReferencePath:
-        """Return this path and one that begins where this one ends."""
+        """Return this path, followed by one that begins at its end."""
         columns = {
             name: np.concatenate([column, getattr(other, name)[1:]])
             for name, column in self._columns().items()
@@ -112,7 +112,7 @@ class BlendEntry(NamedTuple):
     half: float
 
 
-#: Segments and slow stretches with a line in a short report; lines that are made at once.
+#: Most segments and slow stretches with a line in a short report; lines made at a time.
 MAX_REPORT_LINES, _LINES_AT_ONCE = 10_000, 1000
 _NO_BLEND = BlendEntry(0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -229,7 +229,7 @@ class PlannedRows(Rows[PlannedSegment]):
 
     @property
     def are_spline(self) -> bool:
-        """Whether the arm moves along splines, not by motions of the controller's own."""
+        """Whether the arm moves along splines, not by the controller's own motions."""
         moves = (each for each in self.primitives if not isinstance(each, Stop))
         return isinstance(next(moves, None), Spline)
 
@@ -268,7 +268,7 @@ class PlannedRows(Rows[PlannedSegment]):
         The name of the class of the motion to each point, by the index of the point.
 
         A point that is passed within a motion has the class of that motion; the point at the end
-        of a travel that of the last motion.
+        of a travel has the class of the travel's last motion.
         """
         found: dict[int, str] = {}
         passed = 0
@@ -324,8 +324,8 @@ class Plan:
     offset_band: OffsetBand | None = None
     #: The tolerances of a joint goal; None if the goal is Cartesian.
     joint_tolerances: JointTolerances | None = None
-    #: The goal as it was asked for, if the plan begins with a travel from where the arm stood; if
-    #: it stands elsewhere when the motion starts, this goal is planned again.
+    #: The requested goal, if the plan begins with a travel; it is planned again if the arm has
+    #: been moved before the motion starts.
     travelled_goal: Goal | None = None
     #: Lines of the report about ignored, slowed or changed requests, or about the whole goal.
     remarks: tuple[str, ...] = field(default=())

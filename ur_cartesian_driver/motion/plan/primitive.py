@@ -202,9 +202,9 @@ class PulseLaw:
     :param slot: index of the output's pulse counter in the robot program.
     :param distance: way of the tool from pulse to pulse [m].
     :param phase: way from the place of the next output to the first pulse [m].
-    :param width: how long a pulse is [s].
-    :param goes_on: whether the train continues on appended points; what is left at the end of the
-        trajectory is then dropped.
+    :param width: duration of a pulse [s].
+    :param goes_on: whether the train continues on appended points; pulses that remain at the end
+        of the trajectory are then dropped.
     """
 
     slot: int
@@ -266,8 +266,8 @@ class ChangePayload:
 
     :param mass: [kg].
     :param center_of_gravity: in the flange [m].
-    :param inertia: about that point, along the axes of the flange [kg m^2].
-    :param transition_time: how long the controller takes to go over to it [s].
+    :param inertia: about the centre of gravity, along the axes of the flange [kg m^2].
+    :param transition_time: time that the controller takes to change to the payload [s].
     """
 
     mass: float
@@ -282,7 +282,7 @@ class CallFunction:
     The robot program calls a function of its prelude.
 
     :param number: the number that ``program.prelude`` gives the function.
-    :param arguments: six numbers; those that the function does not use are zeros.
+    :param arguments: six numbers; unused ones are zeros.
     :param text: the call as it is written, for messages; not sent.
     :param timeout: longest time until the function returns [s]; not sent, because the driver
         watches the time.
