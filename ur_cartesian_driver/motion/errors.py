@@ -93,7 +93,7 @@ class DriverError(Exception):
 
 
 class GoalRefused(DriverError):
-    """A goal was refused before anything moved, or its rest because the cell changed."""
+    """A goal was refused before anything moved, or the rest of it because the cell changed."""
 
     def reworded(self, sentence: str) -> GoalRefused:
         """Return the same refusal with another sentence."""
@@ -185,11 +185,11 @@ class CollisionPredicted(GoalRefused):
     """The arm would hit itself, a workspace plane or a body of the cell."""
 
     code = ErrorCode.COLLISION
-    #: The joint positions at the place [rad]; None if they are not known.
+    #: The joint positions at the collision [rad]; None if they are not known.
     q: tuple[float, float, float, float, float, float] | None = None
     #: The names of the two bodies, of the cell or of the arm's links; empty if not known.
     bodies: tuple[str, ...] = ()
-    #: The :class:`~.cell.Cell` at the place, in which parts may have been moved; None = not known.
+    #: The :class:`~.cell.Cell` at the collision, with the parts moved so far; None = not known.
     cell: object = None
 
     def reworded(self, sentence: str) -> GoalRefused:

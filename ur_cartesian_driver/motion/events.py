@@ -66,7 +66,7 @@ class PreemptRequested:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CollisionFound:
-    """What is left of the path would touch, because the cell changed; the reason is a clause."""
+    """The rest of the path would collide, because the cell changed; the reason is a clause."""
 
     reason: str
 
@@ -85,7 +85,7 @@ class LinkLost:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContactWatchChanged:
-    """The robot program watches for contact beside the goal, or does so no more."""
+    """The robot program has begun or ended its watch for contact beside the goal."""
 
     is_active: bool
 
@@ -178,7 +178,7 @@ class Progress:
     awaiting_points: bool = False
     #: Displacement of the tool by path offsets: along, across, normal [m].
     path_offset: Vector3 = ZERO3
-    #: What a feed override leaves of the planned speed, 0 to 1; whether a valid signal says so.
+    #: Fraction of the planned speed under a feed override, 0 to 1; whether its signal is valid.
     feed_override: float = 1.0
     feed_is_valid: bool = True
 
@@ -189,12 +189,12 @@ class Pulse:
 
     output: OutputKind
     pin: int
-    #: Counts the pulses of this output since the goal began, from 0.
+    #: Number of the pulse among the pulses of this output in the goal, from 0.
     number: int
     #: The controller's clock in the cycle in which the output switched on [s].
     timestamp: float
-    #: Measured pose of the TCP in that cycle, in the robot's base; None = its packet was lost, and
-    #: ``timestamp`` is later.
+    #: Measured pose of the TCP in that cycle, in the robot's base; None = the packet of the cycle
+    #: was lost, and ``timestamp`` is later.
     pose: Pose | None
 
 
@@ -236,7 +236,7 @@ class Outcome:
         the table of codes and classes is :data:`~ur_cartesian_driver.motion.errors.ERRORS`.
 
         :raises GoalRefused: the goal was refused before anything moved; or, as CollisionPredicted,
-            the cell changed and what was left of the path would have touched.
+            the cell changed and the rest of the path would have collided.
         :raises ExecutionEnded: the goal ended before its last point. Like GoalRefused, the error
             carries the text and the ``report`` of this outcome.
         """

@@ -3,8 +3,8 @@
 """
 Read the nodes of a YAML file, so that each error names the file and the line.
 
-Values are read from nodes instead of what YAML makes of them: a version stays as it is written, a
-field that is given twice is seen, and ``1e-3`` is a number.
+Values are read from nodes, without YAML's own conversion: a version stays as it is written, a
+repeated field is noticed, and ``1e-3`` is a number.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from typing import NoReturn, TYPE_CHECKING
 from ur_cartesian_driver.motion.errors import shortened
 
 if TYPE_CHECKING:
-    import yaml  # else with the first file: a simulator without one needs only numpy
+    import yaml  # at run time, with the first file: a simulator without one needs only numpy
 
-#: No file is longer [characters]; a recording that was given instead probably is.
+#: Longest file [characters]; a longer one is probably a recording that was given by mistake.
 _MAX_LENGTH = 1_000_000
 
 
@@ -28,7 +28,7 @@ class NodeReader:
     Reads one file.
 
     :param name: the name of the file, for error texts.
-    :param what: what the file should be, such as ``twin``.
+    :param what: the kind of the file, such as ``twin``.
     :param error: the error that is raised; its text is one sentence.
     """
 
@@ -49,7 +49,7 @@ class NodeReader:
             line = f', line {mark.line + 1}' if mark else ''
             what = getattr(error, 'problem', None) or 'it has a character that YAML does not allow'
             raise self._error(f'{self.name}{line}: this is not YAML: {what}.') from None
-        except (ValueError, OverflowError):  # of \UFFFFFFFF, and of a version with many digits
+        except (ValueError, OverflowError):  # from \UFFFFFFFF, or a version with many digits
             raise self._error(f'{self.name}: this is not YAML: a number is too large.') from None
         except RecursionError:
             raise self._error(
@@ -65,9 +65,9 @@ class NodeReader:
         """
         Return the values of a mapping by name; each name occurs once.
 
-        :param where: what has these fields, for error texts.
-        :param known: the names that there are; empty = any.
-        :param kind: what a name is; '' = a field.
+        :param where: the owner of the fields, for error texts.
+        :param known: the allowed names; empty = any.
+        :param kind: the kind of thing that the names stand for; '' = a field.
         """
         if kind_of(node) != 'mapping':
             self.refuse(node, f'{where} must have fields, NAME: VALUE')
@@ -90,7 +90,7 @@ class NodeReader:
             yield key, value
 
     def items(self, node: yaml.Node, fault: str, length: int | None = None) -> list[yaml.Node]:
-        """Return the nodes of a list, of so many if a length is given; else refuse it so."""
+        """Return the nodes of a list, of the given length if any; else refuse it by ``fault``."""
         if kind_of(node) != 'sequence' or length not in (None, len(node.value)):
             self.refuse(node, fault)
         return list(node.value)
@@ -117,7 +117,7 @@ class NodeReader:
 
 def text_of_file(path: Path, what: str, error: type[ValueError]) -> str:
     """
-    Return the text of a file; of one that is too long only a part.
+    Return the text of a file, cut off if it is too long.
 
     :raises OSError: the file cannot be read.
     """
@@ -129,7 +129,7 @@ def text_of_file(path: Path, what: str, error: type[ValueError]) -> str:
 
 
 def printable(text: str) -> str:
-    """Return a text on one line, so that an error can quote what is in a file."""
+    """Return a text on one line, so that an error can quote the contents of a file."""
     return ''.join(each if each.isprintable() else '\ufffd' for each in text)
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Frames from touched points: the rigid motion that fits best, and how far each point is off."""
+"""Frames from touched points: the best-fitting rigid motion, and the error of each point."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import normalize, Pose, rotate
 from ur_cartesian_driver.motion.geometry.vectors import subtract, vector3
 
-#: Points whose spread across a line is less than this fraction of that along it are on a line.
+#: Points are on a line if their spread across it is less than this fraction of their length.
 _ON_A_LINE = 1e-3
 
 
 def fit_frame(known: Floats, measured: Floats) -> tuple[Pose, Floats]:
     """
-    Return the pose of the frame of known points in that of the measured ones, and the residuals.
+    Return the pose of the known points' frame in the measured points' frame, and the residuals.
 
-    The sum of the squared distances is least (Horn, Closed-form solution of absolute orientation
-    using unit quaternions, 1987).
+    The pose minimizes the sum of the squared distances (Horn, Closed-form solution of absolute
+    orientation using unit quaternions, 1987).
 
     :param known: (n, 3) points in the frame that is sought [m].
     :param measured: (n, 3) the same points as measured [m].
-    :returns: the pose, and the distance (n,) of each measured point from the known one there [m].
+    :returns: the pose, and the distance (n,) of each measured point from its known one [m].
     :raises ValueError: fewer than three points, or all of them on a line.
     """
     centre, other = known.mean(axis=0), measured.mean(axis=0)

@@ -70,7 +70,7 @@ def values(coefficients: Floats, t: Floats) -> Floats:
     :param coefficients: (m, 6, k).
     :param t: (m,) or (c, m): one time, or c times, since each piece began [s].
     """
-    # In one piece of memory: steps from row to row would take as long as several products.
+    # Contiguous in memory: strided access would take as long as several products.
     powers = np.ascontiguousarray(coefficients.swapaxes(0, 1))
     t = np.repeat(t[..., None], powers.shape[2], axis=-1)
     x: Floats = powers[5] * t + powers[4]

@@ -228,7 +228,7 @@ def quaternion_from_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> Qua
 
 
 def roll_pitch_yaw_from_quaternion(q: Quaternion) -> Vector3:
-    """Return the angles about the fixed axes x, y, z [rad], as a URDF has them."""
+    """Return the angles about the fixed axes x, y, z [rad], as in a URDF."""
     r11, _, _, r21, r22, r23, r31, r32, r33 = rotation_from_quaternion(q)
     across = hypot(r11, r21)
     pitch = atan2(-r31, across)

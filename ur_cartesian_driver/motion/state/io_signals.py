@@ -62,8 +62,8 @@ class Signals:
     payload: float = nan
     #: Centre of gravity of the payload in the flange [m]; NaN = not reported.
     payload_cog: Vector3 = (nan, nan, nan)
-    #: Inertia of the payload about that point, along the axes of the flange [kg m^2]: xx, yy, zz,
-    #: xy, xz, yz; NaN = not reported.
+    #: Inertia of the payload about its centre of gravity, along the axes of the flange [kg m^2]:
+    #: xx, yy, zz, xy, xz, yz; NaN = not reported.
     payload_inertia: Vector6 = (nan,) * 6
     #: Acceleration that opposes gravity, in base axes [m/s^2]; NaN = not reported.
     gravity: Vector3 = (nan, nan, nan)

@@ -56,7 +56,7 @@ class SafetyMode(IntEnum):
     SAFETY_API_SAFEGUARD_STOP = 22
 
 
-#: Those in which the safety system lets the arm move.
+#: The modes in which the safety system lets the arm move.
 MOVABLE_SAFETY_MODES = (SafetyMode.NORMAL, SafetyMode.REDUCED)
 
 
@@ -173,8 +173,8 @@ class RobotState:
     motion_version: Annotated[int, Rtde('output_int_register_36', optional=True)] = 0
     #: Counts of the pulses that our robot program has given; see the module ``registers``.
     pulse_counts: Annotated[int, Rtde('output_int_register_37', optional=True)] = 0
-    #: Feed override of the robot program's splines, 0 to 1; by how much it has delayed them since
-    #: our robot program connected [s].
+    #: Feed override of the robot program's splines, 0 to 1, and the delay of the splines by it
+    #: since our robot program connected [s].
     feed_override: Annotated[
         float, Rtde('output_double_register_31', optional=True, monitored=False)
     ] = 1.0
