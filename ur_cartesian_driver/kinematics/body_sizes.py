@@ -4,12 +4,12 @@
 Places and sizes of the collision bodies, for each model.
 
 Sources. UR3, UR5 and UR10: the meshes in the package example-robot-data. UR3e and UR5e (also for
-the UR7e): those in airo-models, whose collision meshes are convex hulls and thicker than the arm.
+the UR7e): the collision meshes in airo-models, convex hulls that are thicker than the arm.
 UR10e to UR16e, UR20 and UR30: the shapes in the packages ir-support and ir-support-extra-robots,
 which are made for teaching; the base of their UR16e, which is larger than in the data sheet, and
 the place of its wrist 3 are not used. No package has shapes of UR15, UR18 and UR8 Long, so their
-bodies are assumed: those of a UR20, scaled by the footprints in the data sheets (204 and 245 mm),
-with 10 mm more on each side; the places where links meet are from the ROS 2 description
+bodies are assumed: the bodies of a UR20, scaled by the footprints in the data sheets (204 and
+245 mm), with 10 mm more on each side; the places where links meet are from the ROS 2 description
 package of Universal Robots. Tests check that the bodies contain the meshes of the first two
 packages.
 

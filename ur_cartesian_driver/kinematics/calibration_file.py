@@ -1,17 +1,17 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The kinematics of one arm as the YAML that the package ``ur_description`` takes.
+The kinematics of one arm as the YAML that the package ``ur_description`` reads.
 
-The file has the pose of each joint in the link before it, with all joints at 0, as a URDF has it:
+The file has the pose of each joint in the link before it, with all joints at 0, as in a URDF:
 x y z, and roll pitch yaw of R = Rz(yaw) Ry(pitch) Rx(roll). Each joint turns about its z axis.
 
 The DH frames of a calibrated arm make poor link frames. Its axes of shoulder lift, elbow
 and wrist 1 are so nearly parallel that their common normals may lie hundreds of metres away. But
 Rz(q) commutes with shifts along z and with turns about z, so a frame may lie anywhere on its axis,
 turned by any constant angle, and the chain stays the same for all q. Upper arm and forearm are
-placed as ``ur_calibration`` of the UR ROS 2 driver documents it (its "Calibration correction
-algorithm"), so both tools write the same places.
+placed as documented for ``ur_calibration`` of the UR ROS 2 driver (its "Calibration correction
+algorithm"), so both tools write the same poses.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.geometry.pose import (
     rotate,
 )
 
-#: The joints of a file, by the link that each moves; and the numbers of each.
+#: The joints of a file, by the link that each moves, and the numbers of each joint.
 CALIBRATION_LINKS = ('shoulder', 'upper_arm', 'forearm', 'wrist_1', 'wrist_2', 'wrist_3')
 CALIBRATION_FIELDS = ('x', 'y', 'z', 'roll', 'pitch', 'yaw')
 
@@ -65,7 +65,7 @@ def joint_poses(geometry: DhTable) -> tuple[Pose, ...]:
     """
     Return the pose of each joint in the link before it, while all joints are at 0.
 
-    :raises ValueError: the flange of the table is off the last axis, where no file can have it.
+    :raises ValueError: the flange of the table is off the last axis, which no file can express.
     """
     if max(abs(geometry.a[5]), abs(geometry.alpha[5])) > _ROUNDING:
         raise ValueError(
@@ -76,8 +76,8 @@ def joint_poses(geometry: DhTable) -> tuple[Pose, ...]:
     # The upper arm is at the shoulder, the forearm where its axis crosses the upper arm's plane.
     frames[_UPPER_ARM] @= Pose((0.0, 0.0, -geometry.d[_UPPER_ARM]))
     for k in (_UPPER_ARM, _FOREARM):
-        # Where the next axis crosses the plane x y of this frame. x points away from there, as the
-        # lengths a2 and a3 are negative.
+        # The point where the next axis crosses the plane x y of this frame. x points away from it,
+        # as the lengths a2 and a3 are negative.
         T = frames[k].inverse() @ frames[k + 1]
         along = -T.position[2] / rotate(T.quaternion, (0.0, 0.0, 1.0))[2]
         x, y, _ = T.apply((0.0, 0.0, along))

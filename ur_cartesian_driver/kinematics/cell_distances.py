@@ -3,13 +3,13 @@
 """
 Distances between the arm, what it carries, and the bodies of its cell.
 
-Each link of the arm is measured twice: first by the convex bodies that contain it
-(:mod:`~.collision_bodies`), and where these are too close, by its meshes, for models that have
-them. A mesh of the cell is measured by its bounding box first. Before either, spheres that cover
-the one body are compared with the other: that is cheap enough for all pairs at once.
+Each link of the arm is measured in two steps: by the convex bodies that contain it
+(:mod:`~.collision_bodies`) and, where these are too close, by its meshes, if the model has them. A
+mesh of the cell is first measured by its bounding box. Before both steps, the spheres that cover
+one body are compared with the other body, which is cheap enough for all pairs at once.
 
-Pairs: what moves, against what is fixed or carried by another link. The arm against itself is the
-part of :mod:`~.collision_meshes`.
+A pair consists of a body that moves, and a body that is fixed or carried by another link.
+Distances of the arm to itself are in :mod:`~.collision_meshes`.
 """
 
 from __future__ import annotations
@@ -48,15 +48,15 @@ from ur_cartesian_driver.motion.cell.shapes import Cylinder, HalfSpace, Mesh
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose import Pose
 
-# Corners of the polygon around each rim of a swept cylinder, which contains the rim.
+# Number of corners of the polygon that contains a rim of a swept cylinder.
 _RIM = 16
-# A mesh is convex if no vertex is farther than this beyond a triangle [m].
+# A mesh is convex if no vertex is farther than this outside the plane of a triangle [m].
 _FLAT = 2e-5
-# Rows that are bounded at a time, in memory that the processor has at hand.
+# Rows that are bounded at a time, so few that their arrays stay in the CPU cache.
 _ROWS = 256
-# So that a bound minus a tolerance is not below the bound [m].
+# Added to a bound, so that rounding does not bring a distance that is cut off below it [m].
 _ROUNDING = 1e-9
-#: Of how many carriers there are frames: the base and six links.
+#: Number of carriers: the base and six links.
 CARRIERS = 7
 
 
@@ -66,33 +66,33 @@ class _Body:
 
     name: str
     carrier: int
-    #: Convex solids and half-spaces that contain it.
+    #: Convex solids and half-spaces that contain the body.
     coarse: tuple[Solid, ...]
-    #: What it really is; the same if nothing better is known.
+    #: The true shape of the body; the same as ``coarse`` if no better one is known.
     exact: tuple[Solid, ...]
-    #: Distance to keep from it [m]; 0 for the arm, whose clearance is that of the other body.
+    #: Distance to keep from the body [m]; 0 for the arm, so that the other body decides.
     clearance: float = 0.0
     #: By how much the exact solids may be too small [m].
     tolerance: float = 0.0
 
 
 class _Opponents(NamedTuple):
-    """Pairs of the same first bodies with bodies on the same carrier."""
+    """Pairs of some first bodies with each of several second bodies on the same carrier."""
 
     #: The pair of each first body with each second one, (firsts, seconds).
     columns: Indices
     #: The carrier of the second bodies, and the depths of points in them.
     carrier: int
     depths: Depths
-    #: The spheres that cover the first bodies, one body after the other: their numbers and radii
-    #: (k,) [m], and where those of each body begin.
+    #: The spheres that cover the first bodies, one body after the other: their indices and radii
+    #: (k,) [m], and the place at which each body begins.
     points: Indices
     radii: Floats
     begins: Indices
 
 
 def missing_coal(cell: Cell) -> str:
-    """Return a clause that says why a cell cannot be measured; '' if it can."""
+    """Return the reason why a cell cannot be measured, as a clause; '' if it can."""
     meshes = [body.name for body in cell.bodies if body.has_mesh]
     if not meshes or has_coal():
         return ''
@@ -115,7 +115,7 @@ class CellDistances:
     The distances of one arm, its tool and all bodies of a cell.
 
     :param T_flange_tcp: the active TCP, for bodies in ``tool0_controller``.
-    :param cell: without meshes if :func:`missing_coal` says so.
+    :param cell: must have no meshes if :func:`missing_coal` returns a reason.
     :param tool_radius: radius of a cylinder from the flange to the tool's tip [m]; 0 = none.
     :param T_flange_tip: the tool's tip; None = the active TCP.
     """
@@ -132,9 +132,9 @@ class CellDistances:
         self._frames = LinkFrames(arm)
         arm_bodies = _arm_bodies(arm, self._frames, T_flange_tip or T_flange_tcp, tool_radius)
         self._bodies = [*arm_bodies, *_cell_bodies(cell, self._frames, T_flange_tcp)]
-        #: The numbers of the bodies of each pair, (pairs, 2); the first of them moves.
+        #: The numbers of the bodies of each pair, (pairs, 2); the first body moves.
         self._numbers = _pair_numbers(self._bodies, len(arm_bodies), cell)
-        #: The pairs that are measured; columns of distances have their order.
+        #: The measured pairs, in the order of the columns of distances.
         self.pairs = [
             Pair(
                 self._bodies[a].name,
@@ -151,16 +151,16 @@ class CellDistances:
         self._carriers_of_centres = np.repeat([body.carrier for body in self._bodies], counts)
         self._opponents = _opponents(self._bodies, self._numbers, covers)
         boxes = [_carrier_box(self._bodies, carrier) for carrier in range(CARRIERS)]
-        #: Middles and half sides of the boxes around all that moves with a carrier, (carriers, 3).
+        #: Middles and half sides of the boxes around all bodies on a carrier, (carriers, 3) [m].
         self._middles, self._halves = (np.array(each) for each in zip(*boxes, strict=True))
-        #: How far from the base anything on each carrier can be, at most, (carriers,) [m].
+        #: Largest distance of anything on each carrier from the base, (carriers,) [m].
         self.reaches = _reaches(arm, boxes)
         #: For each pair, the carriers of both bodies, (pairs, 2).
         self.carriers = np.array(
             [[self._bodies[a].carrier, self._bodies[b].carrier] for a, b in self._numbers],
             dtype=np.intp,
         ).reshape(-1, 2)
-        #: Whether the bodies of each pair are on links that are joined by a joint, (pairs,).
+        #: Whether a joint connects the links that carry the bodies of each pair, (pairs,).
         self.are_neighbours = (self.carriers > 0).all(axis=1) & (
             np.abs(np.diff(self.carriers, axis=1)[:, 0]) == 1
         )
@@ -171,10 +171,10 @@ class CellDistances:
 
     def box_points(self, poses: Floats) -> Floats:
         """
-        Return middle and half axes of the boxes around all that moves with each carrier.
+        Return middle and half axes of the boxes around all bodies on each carrier.
 
-        Points of the box are sums of the middle and of parts -1..1 of the three half axes, so
-        none moves farther than these four vectors together.
+        A point of the box is the middle plus the three half axes, with factors from -1 to 1 on
+        each. So no point moves farther than these four vectors together.
 
         :param poses: (n, carriers, 7).
         :returns: (n, carriers, 4, 3) [m].
@@ -187,9 +187,9 @@ class CellDistances:
 
     def lower_bounds(self, poses: Floats) -> Floats:
         """
-        Return bounds (n, pairs) [m] that no distance is below; cheap, and often far below.
+        Return lower bounds (n, pairs) of the distances [m]; cheap, and often far too low.
 
-        Bodies that overlap may do so more deeply than their bound, which is below 0 then.
+        Bodies that overlap have a bound below 0, but may overlap more deeply than the bound.
         """
         result = np.empty((len(poses), len(self.pairs)))
         for begin in range(0, len(poses), _ROWS):
@@ -219,9 +219,10 @@ class CellDistances:
         Return the distances of one pair.
 
         :param poses: (n, carriers, 7).
-        :param enough: distances from here on [m] may be replaced by smaller ones that are not
-            below this, which is faster.
-        :param most: no distance need be larger, which is faster, too (n,) [m]; None = ``enough``.
+        :param enough: larger distances may be replaced by smaller ones that are not below this
+            one [m], which is faster.
+        :param most: larger distances may be cut off here, which is faster, too, (n,) [m]; None =
+            ``enough``.
         :returns: (n,) [m]; at most 0 where the bodies touch.
         """
         a, b = (self._bodies[number] for number in self._numbers[column])
@@ -258,12 +259,12 @@ class CellDistances:
         Return the smallest distance of all pairs at each configuration.
 
         :param q: (n, 6) [rad].
-        :returns: (n,) [m], and the pair (n,) that has it, a number in :attr:`pairs`.
+        :returns: the distances (n,) [m], and their pairs (n,) as indices into :attr:`pairs`.
         """
         poses = self.poses(q)
         lower = self.lower_bounds(poses)
         best, columns = np.full(len(q), np.inf), np.zeros(len(q), dtype=np.intp)
-        # The pair that may be the closest in most rows first: it rules out most others.
+        # The pairs with the lowest bounds first: they rule out most others.
         for column in np.argsort(lower.min(axis=0)).tolist():
             rows = np.flatnonzero(lower[:, column] < best)
             if not len(rows):
@@ -376,14 +377,14 @@ def _hull_solid(radius: float, axes: Floats, T_link_base: Pose) -> Solid:
 
 
 def _link_solid(shape: LinkShape) -> Solid:
-    """Return a mesh, or a cylinder, of a link; a convex mesh as its hull, which is faster."""
+    """Return the mesh or cylinder of a link; a convex mesh becomes a hull, which is faster."""
     if shape.mesh is None:
         return Solid(Cylinder(shape.radius, shape.length), shape.T_link_shape)
     return Solid(_read_link_mesh(str(shape.mesh)), shape.T_link_shape)
 
 
 def _is_convex(mesh: Mesh) -> bool:
-    """Return whether no vertex of a mesh is beyond the plane of a triangle."""
+    """Return whether no vertex of a mesh is outside the plane of a triangle."""
     corners = mesh.vertices[mesh.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
@@ -412,7 +413,7 @@ def _cell_bodies(cell: Cell, frames: LinkFrames, T_flange_tcp: Pose) -> Iterator
 
 
 def _pair_numbers(bodies: Sequence[_Body], arm_count: int, cell: Cell) -> Indices:
-    """Return the pairs of numbers of bodies that are measured, (pairs, 2)."""
+    """Return the numbers of the two bodies of each measured pair, (pairs, 2)."""
     pairs = []
     for b in range(arm_count, len(bodies)):
         for a in range(b):
@@ -421,7 +422,7 @@ def _pair_numbers(bodies: Sequence[_Body], arm_count: int, cell: Cell) -> Indice
                 continue
             if frozenset((first.name, second.name)) in cell.may_touch:
                 continue
-            # What moves comes first; half-spaces do not move.
+            # The body that moves comes first; half-spaces do not move.
             pairs.append((a, b) if first.carrier else (b, a))
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the bodies of a cell are on the links of an arm."""
+"""The poses of a cell's bodies on the links of an arm."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def T_carrier_body(body: CellBody, frames: LinkFrames, T_flange_tcp: Pose) -> tu
     """
     Return the link that carries a body, and the pose of the body in the frame of that link.
 
-    :param frames: of the arm, nominal or calibrated.
+    :param frames: the link frames of the arm, nominal or calibrated.
     :param T_flange_tcp: the TCP, for bodies in ``tool0_controller``.
     :returns: the number of the link, a row of :meth:`LinkFrames.poses`; 0 = the robot's base.
     """

@@ -6,7 +6,7 @@ Forward kinematics and Jacobian of one arm, nominal or calibrated.
 Callers need one pose (each control cycle, each step of an iteration) or ten thousand (a sampled
 path). The same formulas take floats or arrays, so the two cases cannot differ. They use no
 matrices: an operation on floats takes a few hundredths of a microsecond, one on small arrays a
-hundred times that.
+hundred times as long.
 """
 
 from __future__ import annotations
@@ -193,7 +193,7 @@ class Arm:
 
 
 def table_frames(geometry: DhTable) -> list[Pose]:
-    """Return ``T_base_frame`` behind theta and d of each DH row, with all joints at 0."""
+    """Return ``T_base_frame`` after theta and d of each DH row, with all joints at 0."""
     T, frames = IDENTITY, []
     for link in _links(geometry):
         half = 0.5 * link.theta

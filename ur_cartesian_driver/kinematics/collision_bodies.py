@@ -89,7 +89,7 @@ _BLOCK = 2048
 _PAIR_ROWS = 12288
 # Of this many consecutive rows, the middle one bounds the distances of the others.
 _STRIDE = 16
-# Calibration makes no arm longer than its model by more than this [m].
+# A calibrated arm is at most this much longer than its model [m].
 _REACH_SLACK = 0.02
 # Segments are taken for parallel if the squared sine of the angle between them is below this: the
 # error is 1e-6 of a length.
@@ -202,8 +202,8 @@ class CollisionBodies:
         Return a lower bound of the distance of each pair of links in :attr:`pairs`.
 
         :param q: (n, 6) [rad].
-        :param enough: distances from here on [m], except the smallest of all, may be replaced by
-            coarser lower bounds, but never by less than this or that smallest distance. This is
+        :param enough: larger distances [m], except the smallest of all, may be replaced by coarser
+            lower bounds, which are below neither ``enough`` nor the smallest distance. This is
             faster if consecutive rows are close to each other.
         :returns: (n, pairs) separation of their cylinders [m]; negative where these may overlap.
         """
@@ -338,7 +338,7 @@ class CollisionBodies:
         """
         Yield link, radius [m] and axes (k, 2, 3) [m] of cylinders, with all joints at 0.
 
-        The convex hull of one or two cylinders is a body: two are the ends of a swept cylinder.
+        A body is the convex hull of one cylinder, or of the two at the ends of a swept cylinder.
         """
         ends = self.cylinder_ends(np.zeros((1, 6)))[0]
         halves = self._insets * self._skeletons(self._lines(np.zeros((1, 6))))[2][:, :, 0].T
@@ -378,7 +378,7 @@ class CollisionBodies:
 
 
 class _Cylinders(NamedTuple):
-    """Bodies by their skeletons: start, vector and axis (3, n), and what reaches beyond, (n,)."""
+    """Bodies by their skeletons: start, vector, axis (3, n), and the extent beyond them, (n,)."""
 
     start: Floats
     vector: Floats

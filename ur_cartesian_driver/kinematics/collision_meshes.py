@@ -5,7 +5,7 @@ Exact distances between the links of an arm, from the manufacturer's meshes.
 
 :mod:`~.link_shapes` knows the models that have meshes, and their files; pinocchio computes the
 distances. Packages and meshes are optional; without them the cylinders of
-:mod:`~.collision_bodies` decide. The connector at the base is always the cylinder of that module,
+:mod:`~.collision_bodies` decide. The connector at the base is always a cylinder from there,
 because the meshes of the e-Series have no connector.
 """
 
@@ -36,7 +36,7 @@ from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 
 @lru_cache
 def missing_meshes(name: str) -> str:
-    """Return a clause that says why the links of a model cannot be measured; '' if they can."""
+    """Return the reason why the links of a model cannot be measured, a clause; '' if they can."""
     try:
         link_meshes(name, 'collision')
     except (ValueError, FileNotFoundError) as error:

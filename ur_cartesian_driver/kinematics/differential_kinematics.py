@@ -29,7 +29,7 @@ _TRAVEL_AND_TURN = slice(0, 3), slice(3, 6)
 
 @dataclass(frozen=True, slots=True)
 class StandingPoint:
-    """A point that stands in the base, in place of a TCP: the motion of the flange there."""
+    """A point fixed in the base, in place of a TCP; rates are the flange's, at this point."""
 
     position: Vector3
 
@@ -42,7 +42,7 @@ class _Jacobians(NamedTuple):
     tcp: Floats
 
 
-#: The TCP in the flange, or a standing point: where twists and accelerations are meant.
+#: The point to which twists and accelerations refer: the TCP in the flange, or a fixed point.
 ReferencePoint: TypeAlias = Pose | StandingPoint
 
 
@@ -62,7 +62,7 @@ def joint_rates(
         at = _jacobians(arm, T_flange_tcp, q[rows])
         # Avoid a division by zero for an arm at rest in a singularity.
         regular = at.jacobian + _MIN_SINGULAR_VALUE * np.eye(6)
-        # To solve twice takes two thirds of the time that one inverse takes.
+        # Two solutions take two thirds of the time of one inverse.
         qd[rows] = _solved(regular, twist[rows])
         qdd[rows] = _solved(regular, acceleration[rows] - _bias_acceleration(at, qd[rows]))
     return qd, qdd

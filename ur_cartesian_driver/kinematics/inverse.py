@@ -156,7 +156,7 @@ def nearest_to_posture(
 
 def explain_unreachable(arm: Arm, T_base_flange: Pose) -> str:
     """
-    Return a clause that says why no solution lies within the limits; empty if one does.
+    Return the reason why no solution lies within the limits, as a clause; empty if one does.
 
     For a calibrated arm, the clause has the lengths of its ideal arm.
     """

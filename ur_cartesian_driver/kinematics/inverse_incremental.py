@@ -58,9 +58,9 @@ def singularity_distances(arm: Arm, q: Joints) -> Vector3:
     """
     Return the distances of wrist [rad], elbow [rad] and shoulder [m] from their singularities.
 
-    For the wrist this is the angle of wrist 2 from the nearest multiple of pi; for the elbow, that
-    of the elbow joint; for the shoulder, the distance of the wrist centre from the plane of axes 1
-    and 2. None is negative.
+    For wrist and elbow, this is the angle of wrist 2 or of the elbow joint from the nearest
+    multiple of pi; for the shoulder, it is the distance of the wrist centre from the plane of axes
+    1 and 2. None is negative.
     """
     ideal = ideal_arm_of(arm)
     _, t2, t3, t4, t5, _ = (a + b for a, b in zip(q, ideal.offsets, strict=True))

@@ -5,7 +5,7 @@ Inverse kinematics of a sampled path, or of any batch of poses.
 
 The preflight of a goal has tens of thousands of poses; one by one they would take seconds. Here
 numpy solves them together. Nearly all rows need no search, because they stay on the branch of the
-previous row. A row is certain to do so if its step is shorter than half the distance to the other
+previous row. A row is certain to stay if its step is shorter than half the distance to the other
 branches. The few rows that are not certain (near singularities, at joint limits, after a jump) go
 to :mod:`~.inverse`, so that both modules return the same solutions.
 
@@ -34,8 +34,8 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import pose_from_row
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 
-# Rows per block: more would leave the CPU cache. With fewer rows the calls
-# of numpy would cost more than their arithmetic; a calibrated arm begins with one row in _STRIDE.
+# Rows per block: more would leave the CPU cache. With fewer rows, calling numpy would cost more
+# than its arithmetic; a calibrated arm begins with one row in _STRIDE.
 _BLOCK = 8192
 # The same for Newton's method, which needs a hundred numbers for each row.
 _NEWTON_BLOCK = 4096
@@ -44,8 +44,8 @@ _MIN_BLOCK = 16
 
 # Newton's method ends when the squared error (metres and radians) is below this.
 _EXACT = 1e-21
-# It ends without a look at the error, too, after a step in which all joints together turn by less
-# than this [rad]: the error is at most half the square of the turn, times the distance of the
+# It also ends, without computing the error, after a step in which all joints together turn by less
+# than this [rad]: the error is then at most half the square of the turn, times the distance of the
 # flange from a joint, or 3e-11.
 _LAST_STEP = 5e-6
 # The same for rows that need not be exact, because their shifts are interpolated.
@@ -59,7 +59,7 @@ _STEPS = 3
 _STRIDE = 8
 # A real solution farther than this [rad] from the ideal solution may be on another branch.
 _MAX_CALIBRATION_SHIFT = 0.05
-# Two branches of the real arm may be closer to each other than those of its ideal arm by this much
+# Two branches of the real arm may be closer to each other than on its ideal arm, by this much
 # [rad]. So if ideal branches are this close, it is uncertain which real branch is the nearest.
 _AMBIGUOUS_SEPARATION = 4.0 * _MAX_CALIBRATION_SHIFT
 _LIMIT_ROUNDING = 1e-9
@@ -248,11 +248,11 @@ def _refine(
         exact[active] = faces & (squares < _EXACT)
         if step == _STEPS or exact.all():
             break
-        columns = jacobian_at(frames, frames.position).T  # by joint, in one piece of memory
+        columns = jacobian_at(frames, frames.position).T  # by joint, contiguous
         change = _newton(columns, errors, squares)
         change[exact[active]] = 0.0
         q[active] += change
-        # The error to first order: in a singularity a small step may be no help.
+        # The remaining error to first order: in a singularity, a small step may not reduce it.
         left = errors - np.einsum('ikn,ni->kn', columns, change)
         is_solved = np.einsum('in,in->n', left, left) < 0.01 * _EXACT
         exact[active] |= faces & is_solved & (np.abs(change).sum(axis=1) < last_step)

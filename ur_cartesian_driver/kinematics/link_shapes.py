@@ -41,7 +41,7 @@ from ur_cartesian_driver.motion.geometry.pose import (
 from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, multiply_rows
 from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
-#: `visual` has tens of thousands of triangles a link, `collision` about a thousand. The collision
+#: `visual` has tens of thousands of triangles per link, `collision` about 1000. The collision
 #: meshes of the e-Series are convex hulls of the links. The UR5e's long links consist of parts;
 #: a cylinder fills the gaps between the parts of its forearm.
 Detail: TypeAlias = Literal['visual', 'collision']
@@ -102,7 +102,7 @@ class _MeshSource:
     fillings: Mapping[Link, tuple[float, float, float]]
     #: Mesh origins of upper arm, forearm, wrists 1 to 3, along z of their link frames [m].
     offsets: tuple[float, float, float, float, float]
-    #: Largest amount by which two links are nearer by their visual than collision meshes [m].
+    #: Largest amount by which the visual meshes of two links are nearer than collision meshes [m].
     tolerance: float
 
     def files(self, link: Link, detail: Detail) -> list[Path]:

@@ -18,9 +18,9 @@ the base of the manufacturer (ROS calls it ``base``; ``base_link`` is turned by 
 tool flange (``tool0``). A real arm differs from its model by a few millimetres; it reports its own
 table, in which all 24 numbers may differ.
 
-Sources: the lengths are those that Universal Robots publishes in its article on DH parameters and
-in the configuration files of its ROS 2 description package; speeds and torques are from the
-latter. UR7e and UR12e have the mechanics of UR5e and UR10e.
+Sources: Universal Robots publishes the lengths in its article on DH parameters and in the
+configuration files of its ROS 2 description package; speeds and torques are from the latter. UR7e
+and UR12e have the mechanics of UR5e and UR10e.
 """
 
 from __future__ import annotations

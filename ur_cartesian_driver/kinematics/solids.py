@@ -25,14 +25,15 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import vector3
 
-# Directions that are tried without coal: the bound is then within a millimetre for most pairs.
+# Number of directions to try without coal: the bound is then within a millimetre for most pairs.
 _ROUNDS = 60
 _TINY = 1e-300
-# Solids that touch overlap by this at least [m]: a clearance of 0 means that they do not.
+# Solids that touch count as overlapping by this at least [m], as a clearance of 0 forbids contact.
 _TOUCH = 1e-9
-# With a smaller bound coal would not look at what may touch [m].
+# Smallest bound for coal, which would miss contacts with a smaller one [m].
 _MIN_BOUND = 0.001
-# A long solid is covered by spheres until each is this many times as long as wide.
+# A long solid is divided until each part is at most this many times as long as wide, or there are
+# so many parts; a sphere covers each part.
 _STRETCH, _MAX_SPHERES = 1.5, 8
 
 
@@ -52,7 +53,7 @@ SolidShape: TypeAlias = Shape | Hull
 
 
 class CarrierFrames(NamedTuple):
-    """Rotation matrices (n, 3, 3) and origins (n, 3) [m] of a carrier; one row = it stands."""
+    """Rotation matrices (n, 3, 3) and origins (n, 3) [m] of a carrier; one row = it is fixed."""
 
     rotation: Floats
     origin: Floats
@@ -127,7 +128,7 @@ class Solid:
         return centres @ self._rotation.T + self._position, np.full(count, radius)
 
     def supports(self, directions: Floats, frames: CarrierFrames) -> Floats:
-        """Return the farthest points (n, 3) along unit vectors (n, 3), given its own frames."""
+        """Return the farthest points (n, 3) along unit vectors (n, 3), for frames of the shape."""
         along = np.einsum('nji,nj->ni', frames.rotation, directions)
         shape = self.shape
         if isinstance(shape, Box):
@@ -146,7 +147,7 @@ class Solid:
 
     @cached_property
     def _hull_points(self) -> Floats:
-        """The points of which the convex hull of a hull or mesh consists, (k, 3)."""
+        """The points that span the convex hull of a hull or mesh, (k, 3)."""
         if isinstance(self.shape, Hull):
             return self.shape.points
         assert isinstance(self.shape, Mesh)
@@ -180,7 +181,7 @@ class Depths:
         shapes = [solid.shape for solid in solids]
         self._begins = np.cumsum([0, *(len(body) for body in bodies[:-1])])
         self._rotation = np.concatenate([solid._rotation for solid in solids], axis=1)
-        #: The middle of each solid in its own frame, as far as the frame is turned.
+        #: From the carrier's origin to the middle of each solid, along the solid's axes.
         self._middles = np.array([solid._position @ solid._rotation for solid in solids])
         self._planes = _indices(shapes, HalfSpace)
         self._spheres = _indices(shapes, Sphere)
@@ -203,7 +204,7 @@ class Depths:
 
         :param points: (n, k, 3) in the frame of the carrier [m].
         :returns: (n, k, bodies) [m]; exact for boxes, cylinders, spheres and half-spaces, else
-            that of the bounding box.
+            from the bounding box.
         """
         shape = (*points.shape[:2], len(self._middles))
         inside = (points @ self._rotation).reshape(*shape, 3) - self._middles
@@ -235,7 +236,7 @@ def _norms(vectors: Floats) -> Floats:
 
 
 def _signed(beyond: Floats) -> Floats:
-    """Return signed distances from how far points are beyond each pair of parallel sides."""
+    """Return signed distances, given how far points are beyond each pair of parallel sides."""
     distances = _norms(np.maximum(beyond, 0.0))
     distances += np.minimum(beyond.max(axis=-1), 0.0)
     return distances
@@ -251,10 +252,10 @@ def distances(
     """
     Return the distances of two solids.
 
-    :param frames_a: n frames of the carrier, or one if it stands; the same for ``b``.
+    :param frames_a: n frames of the carrier, or one if it is fixed; the same for ``b``.
     :param most: larger distances may be replaced by this one (n,) [m]; far from a mesh, that is a
         thousand times as fast.
-    :returns: (n,) [m]; negative where solids overlap or meshes touch, but the depth is that of
+    :returns: (n,) [m]; negative where solids overlap or meshes touch, but the true depth for
         convex solids only. Without coal, a lower bound.
     """
     own_a, own_b = a.frames(frames_a), b.frames(frames_b)
@@ -290,7 +291,7 @@ def _measured(
         result.clear()
         result.min_distance = bound
         found.append(measure(a, T_a, b, T_b, request, result))
-    # Of two meshes that pass through each other it is 0.
+    # For two meshes that pass through each other, coal returns 0.
     return np.where(np.array(found) > 0.0, found, np.minimum(found, -_TOUCH))
 
 
@@ -368,7 +369,7 @@ def _vectors(points: Floats) -> Any:
 
 @lru_cache(maxsize=64)
 def _tree(mesh: Mesh) -> Any:
-    """Return the tree of the triangles of a mesh; those without an area are left out."""
+    """Return the tree of the triangles of a mesh, without triangles that have no area."""
     corners = mesh.vertices[mesh.triangles]
     areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     used = mesh.triangles[np.abs(areas).max(axis=1) > 0.0]
