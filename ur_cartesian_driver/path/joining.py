@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Join paths by ways through the air, in the order given or in the best one."""
+"""Join paths by travels through the air, in the given order or in the best one."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ Order = Literal['given', 'best']
 
 def join(seams: Sequence[Path], by: AirTravel, *, order: Order = 'given') -> Path:
     """
-    Return paths one after the other, with a way through the air to each of them.
+    Return paths one after the other, with a travel through the air to each of them.
 
-    The joined path begins where the arm stands. Speeds of a travel are those that hold at the end
-    of the path before it; to the first path, those of its own end.
+    The joined path begins at the pose of the arm. A travel has the speeds at the end of the path
+    before it; the travel to the first path has the speeds at the end of that path.
 
-    :param by: the arm, where it is when the joined path begins, and how it travels.
-    :param order: ``given``; or ``best``: the order and the directions of open paths with the least
-        travel, as far as the joints turn. A path with events (outputs, say) keeps
-        its direction, and a closed one is left where it begins.
-    :raises GoalRefused: a path cannot be executed, or no way was found.
+    :param by: the arm, its state when the joined path begins, and the settings of the travels.
+    :param order: ``given``, or ``best``: the order, and the directions of open paths, for which
+        the joints turn least on the travels. A path with events (outputs, say) keeps its
+        direction, and a closed path keeps its start.
+    :raises GoalRefused: a path cannot be executed, or no travel was found.
     :raises InvalidGoal: there is no path, a path has no start, frames or tools differ, or the
-        order is none.
+        order is unknown.
     """
     if not seams:
         raise InvalidGoal('join()', 'has no path', 'give one or more')
@@ -55,7 +55,7 @@ def _where(number: int) -> str:
 
 
 def _beginning(first: Path, by: AirTravel) -> Path:
-    """Return a path without points that begins where the arm stands, with a path's speeds."""
+    """Return a path without points that begins at the arm's pose, with another path's speeds."""
     goal = first._begin(by, _where(0)).goal
     start = Path(by.snapshot.tool(goal), frame=first.frame, tool=first.tool)
     return start._with_feed_of(first)

@@ -126,7 +126,7 @@ class Path(PathWithEvents):
         :param time: largest delay of the end after its planned time [s], negative = any.
         :param stall: how long the motion waits for an arm that is off its path [s], SERVO only;
             0 = such an arm is stopped, and the goal ends.
-        :raises InvalidGoal: a value is no tolerance, or not a finite time.
+        :raises InvalidGoal: a value is not a tolerance, or not a finite time.
         """
         where = 'tolerances()'
         given: dict[str, Any] = {'path_tolerance': path, 'goal_tolerance': goal}
@@ -146,7 +146,7 @@ class Path(PathWithEvents):
         """
         Set goal fields that have no method of their own, by their names in the action.
 
-        :raises InvalidGoal: a field cannot have the value, or is none of the whole path.
+        :raises InvalidGoal: a field cannot have the value, or does not hold for a whole path.
         """
         for name in fields:
             if name not in SETTINGS:
@@ -262,11 +262,11 @@ class Path(PathWithEvents):
 
     def allow_travel(self) -> Path:
         """
-        Let the arm travel to the path if it stands far away, or the direct way is refused.
+        Let the arm travel to the path if the arm is far away, or the direct way is refused.
 
-        The driver finds the way when it plans the path (PRIMITIVES without durations). A start
-        becomes the first point of the path, to which the arm goes on a line where the direct way
-        is free.
+        The driver plans the travel together with the path (PRIMITIVES without durations). A start
+        becomes the first point of the path; if the direct way is free, the arm goes there on a
+        line.
         """
         path = self._with_settings('allow_travel()', allow_travel=True)
         if self._start is None:
@@ -276,7 +276,7 @@ class Path(PathWithEvents):
 
     def safe(self, output: Output, value: float, *, restore: bool = False) -> Path:
         """
-        Name the value that an output takes when the motion does not go on as planned.
+        Set the value that an output takes when the motion does not go on as planned.
 
         :param restore: whether the output gets its previous value back after a pause.
         :raises InvalidGoal: the output cannot have the value, or has a safe value already.
@@ -336,14 +336,14 @@ class Path(PathWithEvents):
 
     def travel_to(self, other: Path, by: AirTravel) -> Path:
         """
-        Return this path, a way through the air, and another path.
+        Return this path, a travel through the air, and another path.
 
-        The tool is retracted along its axis z, the arm goes where it touches nothing, with the
-        joint speed of :meth:`at`, and the tool approaches the start of the other path along its
-        axis z. A path without points is where the arm stands.
+        The tool is retracted along its axis z, the arm moves without contact at the joint speed of
+        :meth:`at`, and the tool approaches the start of the other path along its axis z. If this
+        path has no points, the travel begins at the joints of the arm.
 
-        :param by: the arm, where it is when this path begins, and how it travels.
-        :raises GoalRefused: a path cannot be executed, or no way was found.
+        :param by: the arm, its state when this path begins, and the settings of the travel.
+        :raises GoalRefused: a path cannot be executed, or no travel was found.
         :raises InvalidGoal: the other path has no start, or cannot follow this one.
         """
         place = by.begin
@@ -355,9 +355,9 @@ class Path(PathWithEvents):
         self, other: Path, by: AirTravel, place: ArmStand, where: str
     ) -> tuple[Path, ArmStand]:
         """
-        Return the path of :meth:`travel_to`, and where the arm is at its end.
+        Return the path of :meth:`travel_to`, and the place of the arm at its end.
 
-        :param place: where the arm is at the end of this path.
+        :param place: the place of the arm at the end of this path.
         :param where: the beginning of refusals.
         """
         traveller = Traveller(by, place, other._begin(by, where), where)
@@ -398,7 +398,7 @@ class Path(PathWithEvents):
 
     def _begin(self, by: AirTravel, where: str) -> PathBegin:
         """
-        Return where the path begins for an arm that travels to it.
+        Return the beginning of the path, for an arm that travels to it.
 
         :raises InvalidGoal: the path has no start.
         :raises NotAvailable: the frame of the path moves with the arm.
@@ -433,8 +433,8 @@ class Path(PathWithEvents):
         Return this path moved by a distance [m].
 
         :param of_tool: move each point along the axes of the tool there, not of the frame.
-        :raises InvalidGoal: with ``of_tool``, an arc turns the tool, so that the result is no arc;
-            or the tool turns in a spline at a point whose twist has no angular part.
+        :raises InvalidGoal: with ``of_tool``, an arc turns the tool, so that the result is not an
+            arc; or the tool turns in a spline at a point whose twist has no angular part.
         """
         step = vector('offset()', (dx, dy, dz), MAX_COORDINATE_OF_BASE, 'd')
         if not of_tool:
@@ -461,8 +461,8 @@ class Path(PathWithEvents):
         """
         Return this path with each pose transformed by a pose in the frame: ``T @ pose``.
 
-        :raises InvalidGoal: the position is too far away, or the pose turns a twist of a spline of
-            which only some linear or angular components are given.
+        :raises InvalidGoal: the position is too far away, or the pose turns a twist of a spline
+            that has only some of its linear or angular components.
         """
         T = Pose(
             vector('transformed()', T.position, MAX_COORDINATE), unit_quaternion('T', T.quaternion)
@@ -520,7 +520,7 @@ class Path(PathWithEvents):
         self, place: PathPlace, *, overlap: float = OVERLAP, approach: float = APPROACH
     ) -> Path:
         """
-        Return what remains of the path after its goal stopped at a place (``outcome.stopped``).
+        Return the remainder of the path after its goal stopped at a place (``outcome.stopped``).
 
         For ``overlap`` and ``approach`` [m] see :func:`~.resumption.resume`.
 
@@ -605,7 +605,7 @@ class Path(PathWithEvents):
 
         :param frames: poses of the frames that the path names; None = only the frames that every
             robot has.
-        :param snapshot: where the arm is, for frames that move with it.
+        :param snapshot: the arm, for frames that move with it.
         :raises InvalidGoal: a frame is not known.
         :raises RobotNotReady: a frame moves with the arm, whose pose is not known.
         """
@@ -663,7 +663,7 @@ class Path(PathWithEvents):
         """
         Return the path of a goal in YAML.
 
-        :raises GoalFileError: the text is no goal.
+        :raises GoalFileError: the text is not a goal.
         :raises InvalidGoal: as for :meth:`from_message`.
         """
         return cls.from_message(read_goal_file(text))

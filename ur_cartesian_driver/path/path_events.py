@@ -72,8 +72,8 @@ class PathWithEvents(PathOfMotions):
         :param after: time after the place [s].
         :param before: time before the point [s]; only if the motion to it has a duration.
         :param distance: way along the path from the point to the place [m]; negative = before it.
-        :param fraction: the same as a fraction of a segment: of the one to the point if negative,
-            of the one after it if positive.
+        :param fraction: the same as a fraction of a segment: if negative, of the segment to the
+            point; if positive, of the segment after it.
         :param lead: how much ahead of the place to switch, in real time [s]: the dead time of a
             valve, or the name of the valve in the driver's ``lead_file``.
         :raises InvalidGoal: there is no point, or the value, a time or the place is not possible.
@@ -340,7 +340,7 @@ class PathWithEvents(PathOfMotions):
         """
         Make the arm stop at the last point and wait there for a time [s].
 
-        The durations of motions do not include this time: all that follows is delayed by it.
+        The durations of motions do not include this time: it delays everything that follows.
 
         :raises InvalidGoal: there is no point, or the point has a blend or a twist of its own.
         """
@@ -416,9 +416,9 @@ class PathWithEvents(PathOfMotions):
 
         :param mass: mass of the payload [kg].
         :param center_of_gravity: its position in the flange frame [m].
-        :param inertia: xx, yy, zz, xy, xz, yz about that point, along the axes of the flange
-            [kg m^2]; empty = a point mass.
-        :param transition: how long the controller takes to go over to this payload [s].
+        :param inertia: xx, yy, zz, xy, xz, yz about the centre of gravity, along the axes of the
+            flange [kg m^2]; empty = a point mass.
+        :param transition: time that the controller takes to change to this payload [s].
         :raises InvalidGoal: as for :meth:`dwell`, or a number is out of its range.
         """
         where, point = self._as_stop('payload')
@@ -442,8 +442,8 @@ class PathWithEvents(PathOfMotions):
         """
         Take a body of the cell at the last point, where the arm stops.
 
-        From there on, the checks move the body with the flange, from where it is. Close the
-        gripper with :meth:`set` at the same point.
+        From there on, the body moves with the flange in the checks. Close the gripper with
+        :meth:`set` at the same point.
 
         :param part: name of the body in the driver's cell.
         :param mass: of the payload from there on [kg]; None = the payload stays as it is.
@@ -496,8 +496,8 @@ class PathWithEvents(PathOfMotions):
         Return the path with an event at the last point.
 
         :param point: the last point, changed as the event requires.
-        :param event: the event, numbered as if the last point were point 0. One that needs an end
-            has it at point 1 for the check, and none afterwards.
+        :param event: the event, numbered as if the last point were point 0. An event that needs an
+            end has it at point 1 for the check, and none afterwards.
         """
         event = with_fields(where, event, {})
         check_event(where, event)
@@ -506,7 +506,7 @@ class PathWithEvents(PathOfMotions):
         return self._with_point(-1, replace(point, events=(*point.events, event)))
 
     def _begun(self, is_wanted: Callable[[Any], bool]) -> tuple[int, Any] | None:
-        """Return the latest wanted event that has no end, after the point where it begins."""
+        """Return the latest wanted event without an end, after the index of its point; or None."""
         for i in range(len(self) - 2, -1, -1):
             for event in self._points[i].events:
                 if type(event) in _METHODS and not event.last_waypoint and is_wanted(event):

@@ -148,7 +148,7 @@ def _process_blend(points: Sequence[PathPoint], index: int, start: Pose | None) 
     """
     Return the blend radius of a point for which none is given [m]; 0 if it gets no blend.
 
-    The last point gets none. Another point gets one if the motion to or from it is a PROCESS
+    The last point gets no blend. Any other point gets one if the motion to or from it is a PROCESS
     motion, and if the blend fits.
     """
     if index + 1 == len(points):

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The motions of a path: where each one goes and how fast."""
+"""The motions of a path: their targets and speeds."""
 
 from __future__ import annotations
 
@@ -99,10 +99,10 @@ class PathOfMotions:
         """
         Begin a path.
 
-        :param start: where the arm is when the path begins; None = not known.
+        :param start: the pose of the tool when the path begins; None = not known.
         :param frame: the frame of all poses, like ``header.frame_id`` of a goal.
         :param tool: the controlled frame; empty = the robot's active TCP.
-        :raises InvalidGoal: a name is no text, or the start is no pose or too far away.
+        :raises InvalidGoal: a name is not a text, or the start is not a pose or is too far away.
         """
         for name, value in (('frame', frame), ('tool', tool)):
             if not isinstance(value, str):
@@ -137,7 +137,7 @@ class PathOfMotions:
     def __len__(self) -> int:
         return len(self._points)
 
-    # ---- where it is ---------------------------------------------------------------------------
+    # ---- poses ---------------------------------------------------------------------------------
 
     @property
     def start(self) -> Pose | None:
@@ -159,7 +159,7 @@ class PathOfMotions:
         """Whether the first motion is a joint motion, which can begin wherever the arm is."""
         return bool(self._points) and self._points[0].segment.type in _JOINT_TYPES
 
-    # ---- what holds from here on ---------------------------------------------------------------
+    # ---- settings of the motions that follow ---------------------------------------------------
 
     def at(
         self,
@@ -267,8 +267,8 @@ class PathOfMotions:
         """
         Add a straight line.
 
-        :param place: where the line ends: a pose, or a position.
-        :param orientation: orientation at the end of the line; None = that of the pose, or of the
+        :param place: the end of the line: a pose, or a position.
+        :param orientation: orientation at the end of the line; None = as in the pose, or at the
             point before.
         :param blend: replaces the blend of :meth:`at`; likewise ``speed`` and ``acceleration``.
         :param duration: duration of this motion [s]; in a path, either all motions have one, or
@@ -298,7 +298,7 @@ class PathOfMotions:
         """
         Add a joint motion, on which the tool does not move straight; otherwise like :meth:`line`.
 
-        ``speed`` and ``acceleration`` are those of the leading axis [rad/s], [rad/s^2].
+        ``speed`` and ``acceleration`` belong to the leading axis [rad/s], [rad/s^2].
         """
         kind = SegmentType.OPTIMIZED_JOINT if optimized else SegmentType.JOINT
         options = MotionOptions(blend, speed, acceleration, duration, posture, fields)
@@ -448,8 +448,8 @@ class PathOfMotions:
 
         :param turn: a rotation, made by :func:`~.orientations.axis_angle` for example.
         :param of_tool: whether distance and turn are along the axes of the tool, not of the frame.
-        :param motion: ``line``, ``process`` or ``joint``; the other parameters are those of this
-            method.
+        :param motion: ``line``, ``process`` or ``joint``; the other parameters are as for the
+            method of this name.
         :raises InvalidGoal: as for :meth:`line`, or the path has neither a point nor a start.
         """
         if motion not in _BY_NAME:
@@ -480,7 +480,7 @@ class PathOfMotions:
         return f'point {len(self)} ({kind})'
 
     def _pose(self, where: str, place: Place, orientation: Quaternion | None) -> Pose:
-        """Return a pose; ``orientation`` None = that of the place, or else of the point before."""
+        """Return a pose; ``orientation`` None = as in the place, or else at the point before."""
         before = place if isinstance(place, Pose) else self.end
         position = place.position if isinstance(place, Pose) else place
         if orientation is None:

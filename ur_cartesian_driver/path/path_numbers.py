@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Check the numbers that users write, and refuse mistakes with a sentence that explains them."""
+"""Validate user-supplied numbers, and refuse mistakes with a sentence that explains them."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from ur_cartesian_driver.motion.goal.goal import Posture
 NANOSECONDS = 1_000_000_000
 #: Larger numbers in twists and accelerations, and larger joint positions [rad], must be mistakes.
 _MAX_RATE, _MAX_JOINT = 100.0, 25.2
-#: Largest difference between 1 and the squared length of a quaternion that is accepted; of one
-#: that is exact.
+#: Largest difference between 1 and the squared length of a quaternion: for one that is accepted,
+#: and for one that is kept unchanged.
 _UNIT, _EXACT_UNIT = 1e-3, 1e-12
 
 

@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Make a goal from what remains of a goal that was stopped on its way.
+Make a goal from the rest of a goal that was stopped on its way.
 
 The resumed goal approaches a place on the path some way before the stop (the overlap), puts the
-outputs in the state that they have there, and follows the original path to its end. What remains
-of a line is a line, of an arc an arc of the same circle, and of a spline the same curve, on which
-the arm gathers speed within the overlap.
+outputs into their state at this place, and follows the original path to its end. The rest of a
+line is a line, the rest of an arc an arc of the same circle, and the rest of a spline the same
+curve, on which the arm gathers speed within the overlap.
 
 A place on a path is a number: ``k + u`` is at the fraction u of the segment to point k.
 """
@@ -46,8 +46,8 @@ from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
 from ur_cartesian_driver.planning.request.point_events.registry import EVENT_KINDS
 from ur_cartesian_driver.planning.spline.spline_points import tool_points
 
-#: How far before the stop the path is resumed, and how far from the path the approach begins,
-#: backwards along the tool's z axis [m].
+#: Distance before the stop at which the path is resumed, and distance from the path at which the
+#: approach begins, backwards along the tool's z axis [m].
 OVERLAP, APPROACH = 0.005, 0.03
 #: The largest value of either [m]; more must be millimetres by mistake.
 MAX_RESUME_LENGTH = 1.0
@@ -57,7 +57,7 @@ APPROACH_TIME, APPROACH_SPEED = 4.0, 0.03
 _BLEND_MARGIN = 1.05
 #: If less than this remains of a segment [m], it is left out.
 _NOTHING = 1e-5
-#: The least length, and the least height above the chord, of what remains of an arc [m].
+#: The least length, and the least height above the chord, of the rest of an arc [m].
 _MIN_ARC, _MIN_HEIGHT = 4e-3, 3e-5
 #: The least time in which the arm gathers speed on a spline [s], and the number of points in it.
 _RAMP_TIME, _RAMP_POINTS = 0.4, 8
@@ -69,7 +69,7 @@ _JOINT_MOTIONS = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResumedGoal:
-    """What remains of a stopped goal (the original), as a goal of its own."""
+    """The rest of a stopped goal (the original), as a goal of its own."""
 
     goal: Goal
     #: The place on the original path where this goal begins.
@@ -93,11 +93,11 @@ def resume(
     start: Pose | None = None,
 ) -> ResumedGoal:
     """
-    Return what remains of a goal that was stopped at a place, as a goal.
+    Return the rest of a goal that was stopped at a place, as a goal.
 
     :param place: the place of the stop, as the outcome of the goal reports it.
-    :param overlap: how far before that place the path is resumed [m]; farther if a blend is there,
-        but never before the beginning of a joint motion or of the path.
+    :param overlap: distance before that place at which the path is resumed [m]; farther if a blend
+        is there, but never before the beginning of a joint motion or of the path.
     :param approach: distance from which the tool comes down to the path, backwards along the z
         axis of the tool [m]; 0 = straight to the path.
     :param start: pose of the tool when the goal began, in the frame of the goal; needed only for a
@@ -123,7 +123,7 @@ class _Resumption:
         self.spline = _Spline(table, start) if is_spline(table) else None
         self.rounded = is_rounded(table)
         poses = table.waypoints.poses
-        #: The lines and arcs; where segment 0 begins is not known, but it is never cut.
+        #: The lines and arcs; the beginning of segment 0 is not known, but it is never cut.
         self.curves, self.faults = curves_of(
             table.motions, IDENTITY, np.concatenate([poses[:1], poses[:-1]]), poses.copy()
         )
@@ -200,7 +200,7 @@ class _Resumption:
         largest = max(segment.corner_deviation for segment in self.segments)
         return [*segments[:-1], replace(segments[-1], corner_deviation=largest)]
 
-    # -- where to begin --------------------------------------------------------------------------
+    # -- the beginning ---------------------------------------------------------------------------
 
     def _is_new_start(self, k: int) -> bool:
         """Return whether a segment can begin wherever the arm is."""
@@ -247,7 +247,7 @@ class _Resumption:
             k, u = k - 1, 1.0
 
     def _enough_of_an_arc(self, k: int, u: float) -> float:
-        """Return a fraction, reduced on an arc until what remains of it determines a circle."""
+        """Return a fraction, reduced on an arc until the rest of the arc determines a circle."""
         if self.segments[k].type is not SegmentType.CIRCULAR:
             return u
         length, radius = self._length(k), float(self.curves.arcs.radius[k])
@@ -273,7 +273,7 @@ class _Resumption:
         )
 
     def _behind(self, place: float, distance: float) -> float:
-        """Return the place some way [m] behind a place; before it if the way is negative."""
+        """Return the place at a distance [m] after a place; before it if this is negative."""
         step = 1 if distance > 0.0 else -1
         k, left = round(place) - (step < 0), abs(distance)
         while 0 <= k < len(self.points) and (length := self._length(k)) < left:
@@ -291,7 +291,7 @@ class _Resumption:
         return pose_from_row(self.curves.rows(np.array([k]), np.array([u]))[0])
 
     def _cut(self, k: int, u: float) -> Segment:
-        """Return what remains of a segment after a fraction of it."""
+        """Return the rest of a segment after a fraction of it."""
         segment = self.segments[k]
         if segment.type is not SegmentType.CIRCULAR:
             return segment
@@ -324,7 +324,7 @@ class _Resumption:
         return [APPROACH_TIME, APPROACH_TIME + max(0.5, self.approach / APPROACH_SPEED)]
 
     def _times(self, k: int, u: float, approach: int = 0) -> list[float]:
-        """Return the times of all points of a goal of moves, first the approach's."""
+        """Return the times of all points of a goal without a spline, with the approach first."""
         if not self.timed:
             return [0.0] * (len(self.points) - k + approach)
         arrive = [point.time for point in self.points]
@@ -373,7 +373,7 @@ class _Resumption:
 
     def _time_since(self, place: float, field: str, offset: float) -> float:
         """
-        Return the time from a place to the one of the resumption [s]; inf = not known.
+        Return the time from a place to the place of resumption [s]; inf = not known.
 
         :raises InvalidGoal: it is not known, and the offset is positive.
         """
@@ -469,8 +469,7 @@ class _Spline:
         Return the point of the curve at a time [s], for a goal that passes the curve at a rate.
 
         :param at: time of the point in that goal [s].
-        :param rate: time of the curve that passes in each second of that goal; ``gain``: change of
-            the rate [1/s].
+        :param rate: time on the curve per time of that goal; ``gain``: change of the rate [1/s].
         """
         assert self.curve is not None
         rows = self.curve.at(np.array([time]))

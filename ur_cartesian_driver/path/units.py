@@ -23,7 +23,7 @@ def mm(x: float, y: float | None = None, z: float | None = None, /) -> float | V
     """
     Convert a length, or a position x, y, z, from millimetres to metres.
 
-    :raises InvalidGoal: there are two numbers, which are neither.
+    :raises InvalidGoal: there are two numbers, neither a length nor a position.
     """
     if y is None:
         return x / 1000.0

@@ -5,7 +5,7 @@ The order of paths with the least travel between them.
 
 Each path can be run in several ways: in one of two directions, in one of several postures. For a
 given order the best runs follow from dynamic programming; the order is found by the nearest
-neighbour, 2-opt and or-opt, which try all that they try in the same sequence every time.
+neighbour, 2-opt and or-opt, all of them deterministic.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 
-#: A change of the order is made if it is shorter by more than this fraction.
+#: A change of the order is made if it shortens the order by more than this fraction.
 _WORTHWHILE = 1e-9
-#: The number of paths with which an order is tried to begin.
+#: The number of paths that are tried as the first one.
 _BEGINNINGS = 4
 #: The longest run of paths that or-opt moves together.
 _LONGEST_RUN = 3
@@ -38,7 +38,7 @@ def best_order(start: Floats, runs: Sequence[Runs], weights: Floats) -> list[tup
     """
     Return the paths in the best order that was found, each with the number of its run.
 
-    :param start: (6,) where the arm begins [rad].
+    :param start: (6,) joint positions of the arm at the beginning [rad].
     :param weights: (6,) how far each joint moves the arm [m/rad].
     """
     costs = _Costs(start, runs, weights)
@@ -47,7 +47,7 @@ def best_order(start: Floats, runs: Sequence[Runs], weights: Floats) -> list[tup
 
 
 class _Costs:
-    """What it costs to travel from each run of each path to each run of another [m]."""
+    """The costs of travels from each run of each path to each run of another [m]."""
 
     def __init__(self, start: Floats, runs: Sequence[Runs], weights: Floats) -> None:
         self._from_start = [_distances(start[None], each.entries, weights)[0] for each in runs]
@@ -56,7 +56,7 @@ class _Costs:
         ]
 
     def first_orders(self) -> Iterator[list[int]]:
-        """Yield orders that begin with one of the nearest paths, and go on to the nearest next."""
+        """Yield orders that begin with a near path, and continue with the nearest one left."""
         count = len(self._from_start)
         near = sorted(range(count), key=lambda k: float(self._from_start[k].min()))
         for first in near[:_BEGINNINGS]:
@@ -68,7 +68,7 @@ class _Costs:
             yield order
 
     def improved(self, order: list[int]) -> list[int]:
-        """Return the order changed as long as that makes it shorter."""
+        """Return the order, changed as long as a change makes it shorter."""
         best = self.of(order)
         while True:
             for other in _changes(order):
@@ -84,7 +84,7 @@ class _Costs:
         return float(self._totals(order)[-1].min())
 
     def choices(self, order: Sequence[int]) -> list[int]:
-        """Return the runs of the least cost of an order."""
+        """Return the runs with which an order has its least cost."""
         totals = self._totals(order)
         chosen = [int(np.argmin(totals[-1]))]
         for k in range(len(order) - 1, 0, -1):

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Ways through the air between paths: where an arm is at their ends, and how it gets from one to one.
+Travels through the air between paths: the place of the arm at their ends, and its motions between.
 
-A path says where the tool goes, not which arm carries it. So a travel needs the arm, the state in
-which the whole path begins, and the options that planning will have.
+A path describes the motion of the tool, not the arm that carries it. So a travel needs the arm,
+the state in which the whole path begins, and the options for planning.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from ur_cartesian_driver.planning.travel.travel_to_goal import blend_radii, MAX_
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AirTravel(TransferSettings):
     """
-    The arm that travels from path to path, and how it travels.
+    The arm that travels from path to path, and the settings of the travels.
 
     :raises ValueError: a number is out of its range.
     """
@@ -62,22 +62,22 @@ class AirTravel(TransferSettings):
 
     @property
     def snapshot(self) -> ArmSnapshot:
-        """Where the arm is when the whole path begins, for frames that move with it."""
+        """The arm when the whole path begins, for frames that move with it."""
         return ArmSnapshot.of(self.state)
 
     @property
     def begin(self) -> ArmStand:
-        """Where the whole path begins."""
+        """The place of the arm when the whole path begins."""
         return ArmStand(at_set_point(self.state, self.arm).actual_q, self.options.cell)
 
     def end_of(self, goal: Goal, place: ArmStand) -> ArmStand:
         """
-        Return where the arm is at the end of a goal that begins in a place.
+        Return the place of the arm at the end of a goal that begins at a place.
 
         :raises GoalRefused: the goal cannot be executed from there.
         """
         T_flange_tcp = self.state.T_flange_tcp
-        # A travel leads to the goal, however far away that is.
+        # A travel leads to the goal from any distance.
         options = replace(self.options, max_approach_distance=0.0, cell=place.cell)
         state = state_at_rest(self.arm, place.q, T_flange_tcp)
         made = planning.plan(goal, state, self.arm, options)  # loads the planner when needed
@@ -90,7 +90,7 @@ class AirTravel(TransferSettings):
 
 @dataclass(frozen=True, slots=True)
 class ArmStand:
-    """Where an arm is between two paths, in the cell as it then is."""
+    """The place of an arm between two paths, with the cell at that time."""
 
     #: The joint positions [rad].
     q: Joints
@@ -101,17 +101,17 @@ class ArmStand:
 class Leg:
     """A motion of a travel."""
 
-    #: Where it ends, in the frame of the path.
+    #: The pose at the end of the motion, in the frame of the path.
     pose: Pose
-    #: The joint positions there by name, for a joint motion; None = a line.
+    #: The joint positions at the end by name, for a joint motion; None = a line.
     posture: dict[str, float] | None
-    #: The largest blend radius at its end [m].
+    #: The largest blend radius at the end [m].
     blend: float
 
 
 @dataclass(frozen=True, slots=True)
 class PathBegin:
-    """Where a path begins, and the goal that it is."""
+    """The beginning of a path, and the path as a goal."""
 
     goal: Goal
     #: The pose at which the path begins, in its frame.
@@ -125,9 +125,10 @@ class PathBegin:
 
 class Traveller:
     """
-    An arm with the tool of one path, on its way to it.
+    An arm with the tool of a path, on its travel to the path.
 
-    :param place: where it comes from.
+    :param place: the place from which the arm comes.
+    :param there: the beginning of the path.
     :param where: the beginning of refusals, such as ``The travel to path 2``.
     """
 
@@ -140,11 +141,11 @@ class Traveller:
 
     def runs(self) -> dict[Joints, ArmStand]:
         """
-        Return the joint positions in which the path can begin [rad], each with where it ends.
+        Return the joints in which the path can begin [rad], each with the place at its end.
 
-        The turns of the joints are those nearest to where the arm comes from.
+        Each joint has the turn that is nearest to the place from which the arm comes.
 
-        :raises GoalRefused: there are none; the refusal is that of the nearest.
+        :raises GoalRefused: there are none; the refusal is about the nearest ones.
         """
         found: dict[Joints, ArmStand] = {}
         refusal: GoalRefused | None = None
@@ -166,7 +167,7 @@ class Traveller:
         """
         Return the motions to the path, and the joint positions in which it then begins [rad].
 
-        :raises GoalRefused: no way was found.
+        :raises GoalRefused: no travel was found.
         """
         q = self._place.q
         for entry in entries:
