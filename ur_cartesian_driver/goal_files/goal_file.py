@@ -16,9 +16,9 @@ from ur_cartesian_driver.goal_files.garbage import uncollected
 from ur_cartesian_driver.goal_files.goal_schema import FieldError, Message, with_defaults
 
 #: No goal is nested this deeply. At a thousand times this depth a loader crashes, raises an
-#: exception or refuses the text, depending on which loader it is.
+#: exception or refuses the text, depending on the loader.
 _MAX_DEPTH = 100
-#: Matches numbers with which YAML 1.1 means others than people do: 010 is 8, and 1:30 is 90.
+#: Matches numbers that YAML 1.1 reads otherwise than people do: 010 is 8, and 1:30 is 90.
 _ODD_NUMBER = re.compile(r'[-+]?(?:0[0-7_]+|[0-9][0-9_]*(?::[0-5]?[0-9])+(?:\.[0-9_]*)?)')
 _Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)  # the C loader is ten times as fast
 
@@ -66,7 +66,7 @@ def goal_text(fields: Mapping[str, Any]) -> str:
 
 def check_yaml(text: str) -> None:
     """
-    Refuse what a loader of YAML 1.1 reads otherwise than it is meant, or cannot read.
+    Refuse a text that a loader of YAML 1.1 cannot read, or reads otherwise than intended.
 
     :raises FieldError: the text is nested more deeply than any goal, a key occurs twice in its
         mapping, or a number is octal (``010``) or sexagesimal (``1:30``).

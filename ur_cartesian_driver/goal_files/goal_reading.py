@@ -150,7 +150,7 @@ def rows_of_points(
 
     :param points: the list of points in the message; may be empty.
     :param field: the name of that list, for errors.
-    :raises InvalidGoal: points are given in both forms, the length of an array does not suit the
+    :raises InvalidGoal: points are given in both forms, the length of an array does not fit the
         number of points, or a number is not in its enumeration; the error names the field.
     """
     if not is_packed(message.packed):

@@ -78,9 +78,9 @@ def read_leads(path: str | os.PathLike[str]) -> tuple[Lead, ...]:
 
 def write_lead(path: str | os.PathLike[str], lead: Lead) -> None:
     """
-    Add a lead to a file, or replace the one of the same name; make the file if need be.
+    Add a lead to a file, or replace the one of the same name; create the file if needed.
 
-    :raises LeadFileError: the file exists, but is no file of leads; it stays as it is.
+    :raises LeadFileError: the file exists, but is not a file of leads; it is not changed.
     :raises OSError: the file cannot be written.
     """
     file = Path(path)
@@ -106,7 +106,7 @@ def _text(leads: Iterable[Lead]) -> str:
 
 
 def _lead(entry: Any) -> Lead:
-    """Return the lead of an entry; raise ValueError if it is none."""
+    """Return the lead of an entry; raise ValueError if the entry is not a lead."""
     if not isinstance(entry, dict):
         raise ValueError(f'{entry!r:.60} is no lead; give {", ".join(_NEEDED)}')
     for key in entry:
@@ -127,7 +127,7 @@ def _lead(entry: Any) -> Lead:
 
 
 def _name(value: Any) -> str:
-    # YAML takes no and yes for booleans, and nothing for a null.
+    # YAML reads no and yes as booleans, and an empty value as null.
     if isinstance(value, bool) or not isinstance(value, str | int):
         raise ValueError(f'name is {value!r}, which is no text; put it in quotes')
     return str(value)

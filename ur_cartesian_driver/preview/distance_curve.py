@@ -4,7 +4,7 @@
 The closest pair of bodies over time, as a picture in a page.
 
 A tool is always near the link beside it. Pairs that the arm carries have a curve of their own, so
-that they do not hide how near the arm comes to what stands around it.
+that they do not hide the distance of the arm from its surroundings.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _MAX_LISTED = len(_COLOURS)
 
 
 def groups_of_pairs(cell: Cell) -> dict[str, Cell]:
-    """Return cells of which only some pairs are measured: with fixed bodies, and on the arm."""
+    """Return a cell for the pairs with fixed bodies, and one for pairs on the arm, by title."""
     carried = [body.name for body in cell.bodies if body.is_carried]
     own = [(a, b) for a, b in product(carried, (*LINK_NAMES, *carried)) if a != b]
     groups = {
@@ -79,7 +79,7 @@ def _picture(time: Floats, distances: Floats, pairs: list[str], colours: dict[st
     ends = [k for k in range(1, len(pairs)) if pairs[k] != pairs[k - 1]]
     curves = []
     for begin, stop in zip([0, *ends], [*ends, len(pairs)], strict=True):
-        rows = range(begin, min(stop + 1, len(pairs)))  # up to where the next pair begins
+        rows = range(begin, min(stop + 1, len(pairs)))  # up to the start of the next pair
         places = ' '.join(f'{x[k]:.1f},{y[k]:.1f}' for k in rows)
         name = pairs[begin]
         curves.append(

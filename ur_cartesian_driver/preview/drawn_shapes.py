@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The shapes of a cell as they are drawn: planes with an end, meshes with few triangles."""
+"""The shapes of a cell as they are drawn: planes of finite size, meshes with few triangles."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 
 #: Side of the square that stands for a half-space [m].
 SQUARE_SIDE = 1.6
-#: Largest number of triangles of all meshes of a cell together, and the least of each mesh.
+#: Largest number of triangles of all meshes of a cell together, and the least bound for one mesh.
 MAX_TRIANGLES, _MIN_TRIANGLES = 20_000, 100
-#: By how much the raster of the vertices grows until a mesh has few enough triangles.
+#: Factor by which the raster of the vertices grows until a mesh has few enough triangles.
 _COARSER = 1.3
 
 
@@ -28,10 +28,10 @@ def triangles_per_mesh(cell: Cell) -> int:
 
 def coarse_mesh(mesh: Mesh, most: int) -> tuple[Floats, Indices]:
     """
-    Return vertices (n, 3) [m] and triangles (m, 3) of a mesh: its own, or fewer but like them.
+    Return vertices (n, 3) [m] and triangles (m, 3) of a mesh: its own, or fewer similar ones.
 
-    Vertices that share a cube of a raster become one, in their middle. Where that leaves nothing,
-    as of a cloud of small triangles, some of the triangles are returned.
+    Vertices that share a cube of a raster become one, at their mean. If that leaves nothing, as
+    with a cloud of small triangles, some of the triangles are returned.
 
     :param most: the largest number of triangles.
     """
@@ -49,7 +49,7 @@ def coarse_mesh(mesh: Mesh, most: int) -> tuple[Floats, Indices]:
 
 def _on_raster(mesh: Mesh, cubes: Indices, count: int) -> tuple[Floats, Indices]:
     """
-    Return vertices and triangles with the vertices of each cube put together.
+    Return vertices and triangles, with the vertices of each cube merged.
 
     :param cubes: (n, 3) the cube of each vertex; ``count`` = one more than their largest number.
     """

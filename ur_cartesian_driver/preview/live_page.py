@@ -30,7 +30,7 @@ class LivePage:
     def __init__(
         self, server: Server, arm: Arm, state: RobotState, plan: Plan | None, cell: Cell
     ) -> None:
-        """Draw the arm where it is, its cell, and the plan if there is one."""
+        """Draw the arm, its cell, and the plan if there is one."""
         self._arm, self._plan = arm, plan
         self._scene = scene_of_plan(server, arm, state.T_flange_tcp, plan, cell)
         self._tcp = state.T_flange_tcp
@@ -56,7 +56,7 @@ class LivePage:
         self._text.content = _text(state, self._plan)
 
     def say_lost(self, reason: str) -> None:
-        """Say that the connection is lost; the arm is still drawn where it was last."""
+        """Report that the connection is lost; the arm is still drawn at its last place."""
         self._text.content = f'**Not connected**: {reason}. The arm is drawn where it last was.'
 
 
@@ -75,7 +75,7 @@ def live_page(
 
     :param state: the robot's present state.
     :param plan: the motion that the robot is expected to make.
-    :param options: their planes and the bodies of their cell are drawn.
+    :param options: the options whose planes and bodies of the cell are drawn.
     :param host: the address to listen on: anyone who can reach it sees the robot.
     :param port: the first port to try; if it is in use, the next free one is taken.
     :raises ImportError: viser is not installed; the text says how to get it.

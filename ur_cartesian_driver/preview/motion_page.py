@@ -59,7 +59,7 @@ MOTIONS: dict[str, tuple[str, Colour]] = {
     'OptimoveJ': ('optimized joint motion', (200, 60, 140)),
     'Spline': ('spline', (60, 80, 200)),
 }
-#: The options of those who have neither planes nor bodies.
+#: Options without planes or bodies.
 NO_BODIES = PlanningOptions()
 #: Colour of blends.
 BLEND: Colour = (240, 200, 60)
@@ -106,7 +106,7 @@ def motion_page(plan: Plan, arm: Arm, options: PlanningOptions = NO_BODIES) -> s
     Return the page of a plan.
 
     :param arm: the arm for which the plan was made.
-    :param options: their planes and the bodies of their cell are drawn.
+    :param options: the options whose planes and bodies of the cell are drawn.
     :raises ImportError: viser is not installed; the text says how to get it.
     """
     preview = sample(plan, arm, plan.T_flange_active, _period(plan.duration))
@@ -125,7 +125,7 @@ def motion_page(plan: Plan, arm: Arm, options: PlanningOptions = NO_BODIES) -> s
 
 
 def _cells(plan: Plan, preview: Preview, arm: Arm, cell: Cell) -> dict[int, Cell]:
-    """Return the cell from each row of the samples on at which the tool takes or leaves a part."""
+    """Return each state of the cell by the first row of the samples in which it holds."""
     cells = {0: cell}
     if not cell:  # the options of the plan are not known: nothing of its cell is drawn
         return cells
@@ -193,21 +193,21 @@ def refusal_page(
     """
     Return the page of a goal that was refused: its points, and the place of the refusal in red.
 
-    If the arm would touch something there, the arm is drawn at that place, and what touches in
-    red, too.
+    If the arm would touch something there, it is drawn at that place, and the bodies that touch
+    are drawn in red, too.
 
     :param q: the joint positions of the arm [rad].
-    :param options: their planes and the bodies of their cell are drawn.
+    :param options: the options whose planes and bodies of the cell are drawn.
     :raises ImportError: viser is not installed; the text says how to get it.
     """
-    # The orientation may be what is wrong; points given by joints have no place.
     touching: tuple[str, ...] = ()
     cell, q_start = options.cell, q
     if isinstance(refusal, CollisionPredicted) and refusal.q is not None:
         q, touching = refusal.q, refusal.bodies
         cell = refusal.cell if isinstance(refusal.cell, Cell) else cell
-    # A path on a held part is where the part is drawn; any other begins where the arm stood.
+    # A path on a held part is drawn on the part; any other path begins at the start of the arm.
     seen_from = q_start if goal.moving_frame is None else q
+    # Only positions, as an orientation may be the fault; points given by joints have none.
     path = np.array(_places(goal, arm.forward(seen_from), tcp))
     has_place = np.isfinite(path).all(axis=1)
     with serve(parse_planes(options.workspace_planes)) as server:
@@ -225,7 +225,7 @@ def refusal_page(
 
 
 def _places(goal: Goal, T_base_flange: Pose, tcp: Pose) -> list[Vector3]:
-    """Return where the tool and the points of a goal are in base; on a held part, at the start."""
+    """Return the positions in base of tool and points; for a held part, at the given flange."""
     start, frame = (T_base_flange @ tcp).position, goal.T_base_frame
     if goal.moving_frame is not None:
         start = goal.moving_frame.T_base_tool.position
@@ -245,7 +245,7 @@ def cell_page(
     Return the page of a cell with the arm at rest.
 
     :param q: the joint positions of the arm [rad].
-    :param texts: stand beside the scene: a table, then what is wrapped.
+    :param texts: the texts beside the scene: a table, then texts that are wrapped.
     :param touching: names of bodies and links that are drawn in red.
     :raises ImportError: viser is not installed; the text says how to get it.
     """
@@ -370,7 +370,7 @@ def _outputs(plan: Plan) -> Iterator[tuple[str, Floats]]:
 
 
 def _on_path(plan: Plan, T_base_tcp: Pose) -> Pose:
-    """Return where the tool is on the path when the TCP is somewhere."""
+    """Return the pose of the tool on the path for a pose of the TCP."""
     frame, tcp = plan.goal.moving_frame, plan.T_flange_tcp or plan.T_flange_active
     return T_base_tcp if frame is None else frame.tool(T_base_tcp @ tcp.inverse())
 

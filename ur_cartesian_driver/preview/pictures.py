@@ -29,7 +29,7 @@ def check_suffix(picture: Path) -> None:
     Refuse a picture in a format that matplotlib does not write; without a suffix it writes PNG.
 
     :raises OSError: matplotlib is not installed.
-    :raises ValueError: the suffix is that of another format.
+    :raises ValueError: the suffix belongs to another format.
     """
     formats = pyplot().Figure().canvas.get_supported_filetypes()
     if picture.suffix and picture.suffix[1:].lower() not in formats:

@@ -130,7 +130,7 @@ def _line(segments: Sequence[PlannedSegment], command: str) -> str:
 
 
 def _time(segments: Sequence[PlannedSegment]) -> str:
-    """Return the time of segments as text; OPTIMIZED moves have none that is known."""
+    """Return the time of segments as text; the time of OPTIMIZED moves is not known."""
     if any(isinstance(segment.primitive, OptimoveJ | OptimoveL) for segment in segments):
         return '      ? s'
     return f'{sum(segment.duration for segment in segments):7.3f} s'

@@ -69,7 +69,7 @@ class Scene:
 
         :param tcp: the TCP to which the tool is drawn.
         :param T_flange_active: the active TCP, which carries bodies in ``tool0_controller``; None
-            = that of the tool.
+            = ``tcp``.
         :param touching: names of bodies, and of links as in :data:`~.cell.LINK_NAMES`, that are
             drawn in red.
         """
@@ -133,9 +133,9 @@ class Scene:
         return node
 
     def _place(self, cell: Cell) -> None:
-        """Put the bodies where a cell has them."""
+        """Put the bodies at their places in a cell."""
         self._cell = cell
-        #: Of each body that the arm carries: its node, its link and ``T_link_body``.
+        #: Node, link and ``T_link_body`` of each body that the arm carries.
         self._carried = []
         for node, body in zip(self._bodies, cell.bodies, strict=True):
             link, T_link_body = T_carrier_body(body, self._frames, self._active or self._tcp)
@@ -167,7 +167,7 @@ class Scene:
 
     def hold(self, frame: MovingFrame, q: Joints) -> None:
         """
-        Let paths, points and outputs move with a part in the hand, and draw the fixed tool.
+        Attach paths, points and outputs to a held part, and draw the fixed tool.
 
         :param q: the joint positions at the start [rad].
         """
@@ -250,7 +250,7 @@ class Scene:
 
         While the joints are not known, the arm stays where it was.
 
-        :param cells: the cell from a row on, for each row at which it changes.
+        :param cells: the new cell, for each row at which the cell changes.
         """
         known = ~np.isnan(q.sum(axis=1))
         poses = self._frames.poses(np.where(known[:, None], q, 0.0))
