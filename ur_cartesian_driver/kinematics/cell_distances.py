@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Distances between the arm, what it carries, and the bodies of its cell.
+Distances between the arm, the bodies that it carries, and the other bodies of its cell.
 
 Each link of the arm is measured in two steps: by the convex bodies that contain it
 (:mod:`~.collision_bodies`) and, where these are too close, by its meshes, if the model has them. A

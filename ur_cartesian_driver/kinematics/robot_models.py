@@ -111,8 +111,8 @@ class RobotModel:
     geometry: DhTable
     #: Lowest and highest position of each joint [rad], infinite if the joint turns endlessly.
     position_limits: PositionLimits
-    #: Largest speed of each joint [rad/s]. For ur15, ur18 and ur8long nothing is published: they
-    #: are given the values of the ur20, which are the lowest of the series.
+    #: Largest speed of each joint [rad/s]. For ur15, ur18 and ur8long no speed is published: they
+    #: have the speeds of the ur20, the lowest of the series.
     max_joint_speed: Vector6
     #: Largest torque of each joint [Nm]; None = not published.
     max_joint_torque: Vector6 | None

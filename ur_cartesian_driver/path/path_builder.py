@@ -178,7 +178,7 @@ class Path(PathWithEvents):
         Round the corners of lines and arcs, so that the arm passes their points without a stop.
 
         The planned path is nowhere farther from the lines and arcs than the deviation, and the
-        tool slows down where it has to. A motion can have its own deviation at its end:
+        tool slows down where necessary. A motion can have its own deviation at its end:
         ``line(..., corner_deviation=mm(0.1))``.
 
         :param deviation: [m]; 0 = corners are rounded only after motions with their own deviation.

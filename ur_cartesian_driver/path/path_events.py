@@ -279,8 +279,8 @@ class PathWithEvents(PathOfMotions):
         :param max_yield_angle: how far it may give way about them [rad].
         :param max_deviation: how far the tool may be off its path along the other axes [m].
         :param max_deviation_angle: how far it may be turned about them [rad].
-        :param damping: of force mode, 0 to 1.
-        :param gain_scaling: of force mode, 0 to 2.
+        :param damping: damping of force mode, 0 to 1.
+        :param gain_scaling: gain scaling of force mode, 0 to 2.
         :param zero_sensor: zero the force sensor before the press.
         :param contact: the effect of the tool's first contact, which can end the goal.
         :raises InvalidGoal: as for :meth:`dwell`, or a number is out of its range.
@@ -446,8 +446,8 @@ class PathWithEvents(PathOfMotions):
         :meth:`set` at the same point.
 
         :param part: name of the body in the driver's cell.
-        :param mass: of the payload from there on [kg]; None = the payload stays as it is.
-        :param center_of_gravity: of this payload, in the flange frame [m].
+        :param mass: mass of the payload from there on [kg]; None = the payload does not change.
+        :param center_of_gravity: centre of gravity of this payload, in the flange frame [m].
         :raises InvalidGoal: as for :meth:`dwell`, or a number is out of its range.
         """
         return self._with_part(part, PartAction.ATTACH, mass, center_of_gravity)
@@ -465,8 +465,8 @@ class PathWithEvents(PathOfMotions):
         Open the gripper with :meth:`set` at the same point.
 
         :param part: name of a body that the tool carries.
-        :param mass: of the payload from there on [kg]; None = the payload stays as it is.
-        :param center_of_gravity: of this payload, in the flange frame [m].
+        :param mass: mass of the payload from there on [kg]; None = the payload does not change.
+        :param center_of_gravity: centre of gravity of this payload, in the flange frame [m].
         :raises InvalidGoal: as for :meth:`dwell`, or a number is out of its range.
         """
         return self._with_part(part, PartAction.RELEASE, mass, center_of_gravity)

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The bodies of a cell: where each is, what carries it, and what it may touch.
+The bodies of a cell: their places, their carriers, and the contacts that are allowed.
 
 A body is fixed in the robot's base, or carried by a link of the arm or by the tool. Frames are
 named as in the robot description for ROS, without a prefix.

@@ -23,8 +23,8 @@ To add a number to segments, declare it in MotionSegment.msg and PackedPoints.ms
 and ``SegmentColumns``, and use it where the motion is planned. Paths accept it by name, as in
 ``Path.at(name=...)``. A number that belongs to the whole goal is declared in the action instead of
 both messages, and needs no column. ``test/ros/test_goal_files.py`` compares table and messages.
-Decide also what the number means in a spline and in a goal with times, and refuse it where it
-would have no effect: the table cannot know.
+Decide also on its meaning in a spline and in a goal with times, and refuse it where it would have
+no effect: the table cannot know.
 
 There are two drawbacks. Each column is declared in addition to its field, because type checkers
 would not know it otherwise. And files list a few fields in another order than messages
@@ -384,9 +384,9 @@ class PayloadChange:
 class PartAction(IntEnum):
     """The change of a body of the cell, numbered as in ``PartChange.action``."""
 
-    #: From the point on, the body moves with the flange, from where it was.
+    #: From the point on, the body moves with the flange, from its place at this time.
     ATTACH = 0
-    #: From the point on, the body stays where it was put.
+    #: From the point on, the body stays at the place where it was put.
     RELEASE = 1
 
 
@@ -448,7 +448,7 @@ class PulseTrain:
     goes_on: Annotated[bool, Mark.NOT_SENT] = field(default=False, compare=False)
 
 
-#: ``Press.first_waypoint`` of the driver's own presses that begin where the motion begins.
+#: ``Press.first_waypoint`` of the driver's own presses that begin at the start of the motion.
 START_OF_MOTION = -1
 
 

@@ -21,7 +21,7 @@ _MAX_LISTED = 5
 
 
 class SlowCause(Enum):
-    """Why the tool is slower than asked; the value of each cause is the advice to the user."""
+    """The cause of a tool slower than asked; the value of each is the advice to the user."""
 
     #: Beginning and end of the motion, and of its parts between joint motions.
     RAMP = 'begin the path before the seam and end it behind, so that the tool has its speed there'
