@@ -16,12 +16,12 @@ from ur_cartesian_driver.motion.plan.slow_stretch import (
 )
 
 _FIELD = 'min_speed_fraction'
-#: A speed that is too low by less than this fraction is taken for a rounding error.
+#: A speed that is too low by less than this fraction counts as a rounding error.
 _ROUNDING = 1e-6
 
 
 def slower_by(goal: Goal) -> float:
-    """Return the speed deficit from which a stretch is slow, as a fraction of the asked speed."""
+    """Return the least deficit of a slow stretch, as a fraction of the requested speed."""
     return min(SLOWER_BY, 1.0 - goal.min_speed_fraction + _ROUNDING)
 
 
@@ -51,7 +51,7 @@ def unknown_speed_remark(goal: Goal, blends: Sequence[int], free: Sequence[int])
     Return the remark on motions whose tool speed is unknown and so not checked; [] if none.
 
     :param blends: the points in whose blends the robot chooses the speed.
-    :param free: the points to which joint and OPTIMIZED motions lead.
+    :param free: the points at the ends of joint and OPTIMIZED motions.
     """
     parts = [
         f'in the blends at {name_points(blends)}, where the robot chooses its speed'

@@ -27,7 +27,7 @@ MAX_POINTS, MAX_CLEARANCE = 1_000_000, 1.0
 
 
 class ProgramTraits(Protocol):
-    """The settings of a driver that say what its robot program can do."""
+    """The settings of a driver that describe the features of its robot program."""
 
     @property
     def dialect(self) -> Dialect:
@@ -93,7 +93,7 @@ class PlanningOptions:
     #: arm, or what it carries, too close to them are refused. The file is read once, at the start.
     #: A relative path begins at the folder in which the driver was started. Empty: no file.
     cell_file: str = ''
-    #: The bodies in cell_file, or those of the owner.
+    #: The bodies in cell_file, or the owner's bodies.
     cell: Detected[Cell] = EMPTY_CELL
     #: Values that outputs take when a goal or live session ends without success, and when the arm
     #: stops in a pause or a protective stop, each 'kind pin value [current | voltage] [restore]'.
@@ -251,7 +251,7 @@ class PlanningOptions:
         check_parameters(self)
         parse_planes(self.workspace_planes)
         parse_safe_outputs(self.safe_outputs)
-        # replace() reads a file again only if it names another one.
+        # replace() reads a file again only if the name of the file changes.
         lead_file, twin_file, cell_file = self.read_files
         if self.lead_file != lead_file and (lead_file or not self.leads):
             object.__setattr__(self, 'leads', _read_leads(self.lead_file))
@@ -266,7 +266,7 @@ class PlanningOptions:
 
     @property
     def twin_problem(self) -> str:
-        """Return how the twin's arm differs from the robot, as a clause; '' if not, or no twin."""
+        """The difference between the twin's arm and the robot, a clause; '' = none, or no twin."""
         return '' if self.twin is None else self.twin.arm.differences(self.robot)
 
     @property
@@ -292,7 +292,7 @@ class PlanningOptions:
 
     def lead_times(self, commands: Sequence[IOCommand]) -> tuple[IOCommand, ...]:
         """
-        Return output commands, each earlier by the dead time of the lead that it names.
+        Return output commands, each earlier by the dead time of its named lead.
 
         :raises InvalidGoal: a name is unknown, or its lead belongs to another output.
         """
@@ -305,7 +305,8 @@ class PlanningOptions:
             **detected,
             dialect=settings.dialect,
             prelude=settings.prelude,
-            # An older program may ignore the command that sets the TCP; the wrong TCP would move.
+            # An older program may ignore the command that sets the TCP; then the old TCP would
+            # follow the path.
             allow_tcp_change=self.allow_tcp_change and settings.dialect.is_own,
         )
 

@@ -60,7 +60,7 @@ def place_outputs(
         for kind in OUTPUT_EVENTS
         for found in kind.place_all(events.get(kind.field, ()), path)
     ]
-    # Where a stretch ends, something else may begin.
+    # The end of a stretch comes first, because another event may begin at the same time.
     switches.sort(key=lambda found: (found.time, not found.ends_stretch))
     _check_stretches(switches)
     _check_leads(switches)
@@ -82,7 +82,7 @@ def place_outputs(
 
 
 def _check_stretches(switches: Sequence[PlacedOutput]) -> None:
-    """Refuse what switches an output while the robot program drives that output by a law."""
+    """Refuse an event that switches an output while the robot program drives it by a law."""
     begins: dict[tuple[OutputKind, int], list[PlacedOutput]] = {}
     for found in switches:
         if found.stretch is not None:
@@ -92,7 +92,7 @@ def _check_stretches(switches: Sequence[PlacedOutput]) -> None:
             stretch = begin.stretch
             if stretch is None or found.stretch is not None or found.field == begin.field:
                 continue
-            # A slow tool switches an output with a lead later, up to its place.
+            # With a slow tool, an output with a lead switches later, at the latest at its place.
             latest = found.time + found.lead
             if latest > begin.time + SAME_TIME and found.time < stretch.end - SAME_TIME:
                 where = 'at its end' if found.ends_stretch else 'at its place'
@@ -105,7 +105,7 @@ def _check_stretches(switches: Sequence[PlacedOutput]) -> None:
 
 
 def _output(found: PlacedOutput) -> tuple[OutputKind, int]:
-    """Return the output that a record switches, and its pin."""
+    """Return the kind and the pin of a placed output."""
     record = found.records[-1]
     assert isinstance(record, SwitchOutput)
     return record.output, record.pin
@@ -113,14 +113,14 @@ def _output(found: PlacedOutput) -> tuple[OutputKind, int]:
 
 def _check_leads(switches: Sequence[PlacedOutput]) -> None:
     """
-    Refuse more leads at one time than the program follows, and one that reverses an order.
+    Refuse too many simultaneous leads, and a lead that reverses two changes of one output.
 
     :param switches: the outputs in the order of time.
     """
     if not any(found.lead for found in switches):
         return
     running: list[float] = []
-    #: The latest place of each output so far, with the lead to it.
+    #: By output: the change with the latest place so far.
     latest: dict[tuple[OutputKind, int], PlacedOutput] = {}
     for found in switches:
         output, place = _output(found), found.time + found.lead

@@ -154,7 +154,7 @@ def _plan_direct(
     options: PlanningOptions,
     running: PlannedSegment | None = None,
 ) -> Plan:
-    """Return the plan of a goal whose first motion begins where the arm stands."""
+    """Return the plan of a goal without a travel to its first point."""
     table = check_for_arm(goal, state.T_flange_tcp, arm, options)
     if table.segments.free_axes.any():
         return _plan_free(table, state, arm, options)
@@ -225,8 +225,8 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     if planner.kinematics.frame_moves:
         check_part_keeps_orientation(goal, planner.targets, state.actual_tcp_pose, first)
     if options.laws.blend_begin < 1.0 and goal.segments.blend_radii.any():
-        # A measured law must not let a goal pass that was refused: the path of the assumed blends
-        # has to be possible, too. How long it takes does not matter.
+        # A goal that is refused with the assumed blends must not pass because of a measured law:
+        # the path with the assumed blends has to be possible, too. Its duration does not matter.
         _checked_path(planner, first, replace(options, twin=None, twin_file=''), [], {})
     paths, geometries, lines = _checked_path(
         planner, first, options, planner.remarks, planner.reasons
@@ -270,7 +270,7 @@ def _checked_path(
     remarks: list[str],
     reasons: dict[int, list[str]],
 ) -> tuple[JointPathPlanner, SegmentGeometries, list[str]]:
-    """Return the joint path of a goal from a point on, without speeds, and its clearance lines."""
+    """Return joint paths, geometries and clearance lines of a goal from point ``first`` on."""
     state = planner.state
     paths = JointPathPlanner(
         planner.goal, planner.targets, planner.kinematics, options, remarks, reasons
@@ -369,7 +369,7 @@ PLANNERS: Mapping[ExecutionMode, PlanGoal] = {
 
 def _with_offset_band(plan: Plan, planner: GoalPlanner) -> Plan:
     """
-    Return the plan completed by the band in which path offsets may move the tool.
+    Return the plan with the band in which path offsets may move the tool.
 
     :raises GoalRefused: offsets are possible nowhere, or the arm cannot reach all of the band.
     """
@@ -396,7 +396,7 @@ def _with_offset_band(plan: Plan, planner: GoalPlanner) -> Plan:
 
 
 def _held_part_remark(plan: Plan, planner: GoalPlanner) -> str:
-    """Return a line about the arm behind a held part: how fast it is where it is fastest."""
+    """Return the remark on a held part, with the peak speeds of the TCP and of the joints."""
     goal, time = plan.goal, plan.reference.time
     led = (
         f'held part: {goal.frame_id or "the part"} is led along '
@@ -443,7 +443,7 @@ class GoalPlanner:
         self.kinematics = kinematics_of(goal.moving_frame, arm, state.T_flange_tcp)
         self.tool_tips = tool_tips(goal, T_flange_active)
         self.remarks = list(retargeted.remarks)
-        #: The reasons why a primitive is not the usual one of its segment type, by point.
+        #: By point: the reasons for a primitive that is not the usual one of its segment type.
         self.reasons: dict[int, list[str]] = {}
         #: The points in the frame of the path, rows (n, 7): in base, or on a held part.
         self.targets = transform_rows(goal.T_base_frame, goal.waypoints.poses)
@@ -469,7 +469,7 @@ class GoalPlanner:
 
     def first_target(self) -> int:
         """
-        Return the number of the first point to which there is a motion.
+        Return the number of the first point that needs a motion.
 
         It is 1 if point 0 is at time 0, because the robot is at point 0 already; else it is 0.
 

@@ -77,6 +77,6 @@ def predict_stop(state: RobotState, arm: Arm, deceleration: float) -> RobotState
 
 
 def _tcp_at(state: RobotState, arm: Arm, q: Joints) -> Pose:
-    """Return the reported TCP pose, displaced as the model's flange when it moves to ``q``."""
+    """Return the reported TCP pose, displaced by the model's motion from there to ``q``."""
     # Forward kinematics alone is not enough: the arm may differ from its model.
     return arm.forward(q) @ (arm.forward(state.actual_q).inverse() @ state.actual_tcp_pose)

@@ -1,16 +1,16 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Check the clearance of the arm, and of what it carries, from the bodies of the cell.
+Check the clearance of the arm, and of the bodies that it carries, from the cell.
 
-The check is of the motion, not of its samples. Between two rows no body moves farther than the
-boxes around all that its carriers carry. So one distance, measured in the middle of a stretch of
-rows, proves the whole stretch if it is large enough; if not, the stretch is halved. Halving goes
-on between two rows, along the straight line between their poses, until the bodies move less than
-:data:`RESOLUTION`; how far the true motion may be from this line is bounded by the second
-differences of the rows, and by the turns of the joints.
+The whole motion is checked, not only its samples. Between two rows, no body moves farther than the
+box around all bodies on its carrier. So one distance, measured in the middle of a stretch of rows,
+proves the whole stretch if it is large enough; otherwise the stretch is halved. Halving continues
+between two rows, along the straight line between their poses, until the bodies move less than
+:data:`RESOLUTION`. The second differences of the rows and the turns of the joints bound the
+deviation of the true motion from this line.
 
-A pair that is too close at the start may separate, as for the arm itself
+A pair that is too close at the start may separate, as in the check for self-collisions
 (:mod:`~.clearance`).
 """
 
@@ -30,17 +30,17 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 RESOLUTION = 2e-5
 # Rows of the longest stretch, and rows per block: blocks bound the memory.
 _STRETCH, _BLOCK = 64, 8192
-# A motion has so many stretches at least: to bound one more costs less than to halve it.
+# Least number of stretches of a motion: bounding one more costs less than halving one.
 _PARTS = 8
-# A pair counts as separating while its distance shrinks by no more than this [m], by rounding.
+# A separating pair may come closer by this much [m], because of rounding.
 _RECEDING_TOLERANCE = 1e-4
-# How far bodies of such a pair move between two places where it is measured, at most [m].
+# Greatest motion of a separating pair between two measurements [m].
 _LEAVING_STEP = 0.002
-# Places between two rows at which a pair that is too close there is measured.
+# Number of places between two rows at which a pair that is too close there is measured.
 _LOOKS = 9
 # Larger than any distance in a cell [m].
 _FAR = 1e3
-# The smallest distance of a path is found to this fraction of itself, or to this length [m].
+# Accuracy of the smallest distance on a path: this fraction of it or this length [m], if larger.
 _CLOSEST_FRACTION, _CLOSEST_LENGTH = 0.25, 0.001
 
 
@@ -56,7 +56,7 @@ class Place(NamedTuple):
 
     @property
     def row(self) -> int:
-        """The first checked row that is not before the place."""
+        """The first checked row at or after the place."""
         return max(ceil(self.at), 0)
 
     def joints(self, q: Floats, q_start: Joints) -> Joints:
@@ -68,33 +68,33 @@ class Place(NamedTuple):
 
 
 class CellResult(NamedTuple):
-    """What was found along a path."""
+    """The result of the check of a path."""
 
-    #: Where a pair is nearest between the first two rows between which it is closer than its
-    #: clearance; None = nowhere.
+    #: The first place at which a pair is closer than its clearance; between two rows, the place at
+    #: which it is closest. None = there is none.
     violation: Place | None
     #: The place at which a pair is closest; None = nothing is measured. Bodies on neighbouring
     #: links do not count: they are always close.
     closest: Place | None
-    #: A distance that no pair falls below anywhere [m].
+    #: Lower bound of the distances of all pairs on the whole path [m].
     at_least: float
 
 
 @dataclass(slots=True)
 class _Stretches:
-    """Stretches of consecutive rows of a block, by their ends; fractions are between two rows."""
+    """Stretches of a block by the rows of their ends; a fraction lies between two rows."""
 
     begin: Floats
     end: Floats
 
     @property
     def middle(self) -> Floats:
-        """The middle of each: a row, if the stretch has one inside."""
+        """The middle of each stretch, rounded to a row if the stretch has a row inside."""
         middle = 0.5 * (self.begin + self.end)
         return np.where(self.end - self.begin > 1.0, np.floor(middle), middle)
 
     def halves(self, which: Flags) -> _Stretches:
-        """Return the halves of some stretches, in order."""
+        """Return the halves of the flagged stretches, in order."""
         middle = self.middle[which]
         begin = np.stack([self.begin[which], middle], axis=1).ravel()
         end = np.stack([middle, self.end[which]], axis=1).ravel()
@@ -102,23 +102,24 @@ class _Stretches:
 
 
 class _Motion:
-    """Consecutive rows of joints, with a bound of how far bodies move between any two of them."""
+    """Consecutive rows of joints, with bounds on the motion of bodies between any two of them."""
 
     def __init__(self, bodies: CellDistances, q: Floats) -> None:
         self.poses = bodies.poses(q)
         points = bodies.box_points(self.poses)
         changes = np.diff(points, axis=0)
         steps, bends = _summed_lengths(changes), _summed_lengths(np.diff(changes, axis=0))
-        # A curve leaves its chord by an eighth of its second difference; twice that is safe.
+        # A curve deviates from its chord by an eighth of its second difference; twice as much is
+        # safe.
         padded = np.pad(bends, ((1, 1), (0, 0)))
         bends = 0.25 * np.maximum(padded[1:], padded[:-1])
-        # In a corner of the path this is too much: turns of the joints bend it no more than this.
+        # In a corner of the path this bound is too large; the turns of the joints give another.
         turns = np.cumsum(np.abs(np.diff(q, axis=0)), axis=1)
         turned = np.pad(turns, ((0, 0), (1, 0)))[:, :CARRIERS]
         by_turns = 0.25 * turned**2 * bodies.reaches
-        #: (n - 1, carriers) how far the motion may be from the line between two rows [m].
+        #: (n - 1, carriers) greatest deviation of the motion from the line between two rows [m].
         self.bends = np.minimum(bends, by_turns) if len(q) > 2 else by_turns
-        #: (n, carriers) how far bodies have moved since the first row, at most [m].
+        #: (n, carriers) upper bound of the motion of bodies since the first row [m].
         self.moved = np.vstack([np.zeros(CARRIERS), np.cumsum(steps + 2.0 * self.bends, axis=0)])
 
     def at(self, places: Floats) -> Floats:
@@ -138,33 +139,33 @@ class _Motion:
         return poses
 
     def moved_of(self, carriers: Indices) -> Floats:
-        """Return how far bodies on two carriers have moved in each row, together (n,) [m]."""
+        """Return the sum (n,) [m] of the motions of two carriers up to each row."""
         a, b = carriers.tolist()
         return self.moved[:, a] + self.moved[:, b] if b else self.moved[:, a]
 
     def bend(self, places: Floats, carriers: Indices) -> Floats:
-        """Return how far poses between two rows may be from the motion (k,) [m]; 0 in a row."""
+        """Return the bound (k,) [m] on the deviation of poses between rows; 0 in a row."""
         row = places.astype(np.intp)
         bends = self.bends[np.minimum(row, len(self.bends) - 1)][:, carriers].sum(axis=1)
         return np.where(places == row, 0.0, bends)
 
 
 def _summed_lengths(changes: Floats) -> Floats:
-    """Return the lengths of the four vectors of each carrier, together (n, carriers) [m]."""
+    """Return the summed lengths (n, carriers) [m] of the four vectors of each carrier."""
     lengths = np.sqrt(np.einsum('nckx,nckx->nck', changes, changes))
     together: Floats = np.einsum('nck->nc', lengths)
     return together
 
 
 def _at(moved: Floats, places: Floats) -> Floats:
-    """Return how far bodies have moved at places between rows [m]."""
+    """Return the interpolated motion of bodies up to places between rows [m]."""
     row = np.minimum(places.astype(np.intp), len(moved) - 2)
     found: Floats = moved[row] + (places - row) * (moved[row + 1] - moved[row])
     return found
 
 
 def _dense_places(moved: Floats) -> Floats:
-    """Return all rows but the first, and places between rows that are close to each other."""
+    """Return all rows but the first, and enough places between for :data:`_LEAVING_STEP`."""
     counts = np.maximum(1, np.ceil(np.diff(moved) / _LEAVING_STEP)).astype(np.intp)
     row = np.repeat(np.arange(len(counts)), counts)
     number = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -200,7 +201,7 @@ class CellClearance:
 
         :param q: (n, 6) [rad], in order of time.
         :param q_start: the start configuration; pairs that are too close there may separate.
-        :param closest: whether the closest pair is searched, too, which takes longer.
+        :param closest: whether to search the closest pair, too, which takes longer.
         """
         search = _Search(self.bodies, closest)
         before = np.array([q_start])
@@ -220,17 +221,17 @@ class _Search:
         self._bodies, self._seeks_closest = bodies, seeks_closest
         self.violation: Place | None = None
         self.closest: Place | None = None
-        #: The pairs that are too close since the start, with their distance so far.
+        #: By pair that has been too close since the start: its greatest distance so far [m].
         self._pending: dict[int, float] = {}
 
     @property
     def at_least(self) -> float:
-        """The distance that is proved for all pairs so far [m]."""
+        """The proved lower bound of the distances of all pairs so far [m]."""
         if self.closest is None:
             return inf
         distance = self.closest.distance
         proved = distance - max(_CLOSEST_LENGTH, _CLOSEST_FRACTION * distance)
-        # All pairs keep their clearances, unless one is too close since the start.
+        # All pairs keep their clearances, unless one has been too close since the start.
         return max(proved, min(distance, float(self._bodies.clearances.min())))
 
     def block(self, motion: _Motion, offset: int, *, is_first: bool) -> None:
@@ -244,7 +245,7 @@ class _Search:
         begins = np.arange(0, last, length, dtype=np.float64)
         stretches = _Stretches(begins, np.minimum(begins + length, last))
         middle = stretches.middle.astype(np.intp)
-        # The first row, too, in the same call: calls cost more than rows.
+        # The first row is in the same call, because calls cost more than rows.
         first, *_ = lower = bodies.lower_bounds(motion.poses[np.append(0, middle)])
         lower = lower[1:]
         moved = motion.moved
@@ -272,7 +273,7 @@ class _Search:
     def _look_where_close(
         self, motion: _Motion, rows: Indices, lower: Floats, offset: int
     ) -> None:
-        """Measure the pair and row that are likely to be closest, before all others have to be."""
+        """Measure the pair and row that are probably closest, to spare measuring most others."""
         if not (self._seeks_closest and lower.size):
             return
         far = np.where(self._bodies.are_neighbours, inf, lower)
@@ -282,14 +283,14 @@ class _Search:
         self._remember(int(column), some.astype(np.float64), distance, offset)
 
     def _enough(self, column: int) -> float:
-        """Return the distance that is of no interest if a pair keeps it everywhere [m]."""
+        """Return the distance [m] from which on a pair needs no closer look."""
         clearance = float(self._bodies.clearances[column])
         if not self._seeks_closest or self._bodies.are_neighbours[column]:
             return clearance
         return max(clearance, min(self.at_least, _FAR))
 
     def _find_pending(self, motion: _Motion, lower: Floats) -> None:
-        """Find the pairs that are too close in the first row; ``lower``: bounds there."""
+        """Find the pairs that are too close in the first row; ``lower``: their lower bounds."""
         bodies, first = self._bodies, motion.poses[:1]
         near = lower < bodies.clearances
         for column in np.flatnonzero(near).tolist():
@@ -303,7 +304,8 @@ class _Search:
         """
         Follow a pair that was too close at the start.
 
-        :returns: the place from which on it is clear; None = it stays close, or is violated.
+        :returns: the place from which on the pair is clear; None = it stays too close, or comes
+            closer.
         """
         clearance = float(self._bodies.clearances[column])
         moved = motion.moved_of(self._bodies.carriers[column])
@@ -328,7 +330,7 @@ class _Search:
     def _search_pair(
         self, column: int, motion: _Motion, offset: int, stretches: _Stretches
     ) -> None:
-        """Search stretches for one pair, by halving those that are not proved."""
+        """Search stretches for a violation of one pair, halving those that are not proved."""
         bodies, carriers = self._bodies, self._bodies.carriers[column]
         clearance, moved = float(bodies.clearances[column]), motion.moved_of(carriers)
         first = float(stretches.begin[0]) if len(stretches.begin) else 0.0
@@ -358,7 +360,7 @@ class _Search:
         """
         Return the place at which a pair is nearest between the two rows around a place.
 
-        :param first: no place before this one is looked at: there the pair may still separate.
+        :param first: the first place to measure; before it, the pair may still be separating.
         """
         places = np.array([place])
         if place != floor(place):
@@ -370,16 +372,16 @@ class _Search:
         return Place(offset + float(places[k]), column, float(sure[k]))
 
     def _remember(self, column: int, places: Floats, distances: Floats, offset: int) -> None:
-        """Take the closest place if it is closer than all before."""
+        """Record the closest of some places if it is closer than all before."""
         if not (self._seeks_closest and len(places)) or self._bodies.are_neighbours[column]:
             return
         k = int(np.argmin(distances))
         before = inf if self.closest is None else self.closest.distance
-        # Distances that are enough may be smaller than they really are.
+        # A distance that is enough may be only a lower bound.
         if distances[k] < min(before, self._enough(column)):
             self.closest = Place(offset + float(places[k]), column, float(distances[k]))
 
     def _violate(self, place: Place) -> None:
-        """Take a violation if it is the first one."""
+        """Record a violation if it is the first one on the path."""
         if self.violation is None or place.at < self.violation.at:
             self.violation = place

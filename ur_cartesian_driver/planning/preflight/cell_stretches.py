@@ -1,10 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The cell along a path on which the tool takes bodies and puts them down.
+The cell along a path on which the tool takes and releases bodies.
 
-A body that is taken keeps its place relative to the flange, a body that is put down its place in
-the robot's base.
+A body on the tool keeps its pose in the flange frame; a released body keeps its pose in base.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ class CellStretch(NamedTuple):
 
 def attached(cell: Cell, name: str, arm: Arm, q: Joints, T_flange_tcp: Pose) -> Cell:
     """
-    Return the cell with a body that the tool carries from where it is.
+    Return the cell with a body attached to the tool at its present place.
 
     :param q: the joint positions at which the tool takes the body [rad].
     :param T_flange_tcp: the active TCP, which may carry bodies.
@@ -51,9 +50,9 @@ def attached(cell: Cell, name: str, arm: Arm, q: Joints, T_flange_tcp: Pose) -> 
 
 def released(cell: Cell, name: str, arm: Arm, q: Joints, T_flange_tcp: Pose) -> Cell:
     """
-    Return the cell with a body that the tool has put down where it is.
+    Return the cell with a body released from the tool at its present place.
 
-    :param q: the joint positions at which the tool puts the body down [rad].
+    :param q: the joint positions at which the tool releases the body [rad].
     :raises ValueError: the cell has no such body, or it is not on the tool; a clause.
     """
     body = cell.body(name)
@@ -82,9 +81,9 @@ def cell_stretches(
     cell: Cell,
 ) -> Iterator[CellStretch]:
     """
-    Yield the stretches of a path; there may be none if the path has no rows.
+    Yield the stretches of a path, none if the path has no rows.
 
-    :param changes: the changes that passed the checks, in any order.
+    :param changes: the checked changes, in any order.
     :param segment: (n,) the segment of each row, by the number of the point at its end, not
         decreasing.
     :param q: (n, 6) [rad].

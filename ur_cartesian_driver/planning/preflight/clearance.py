@@ -3,12 +3,12 @@
 """
 Check the clearance of the arm from itself, the workspace planes and the cell along its path.
 
-Cylinders are checked in every row. Where they come close, the distance of the meshes is measured,
-for models that have them (:mod:`~ur_cartesian_driver.kinematics.collision_meshes`). Whether a
-distance below `min_clearance` is refused or only reported depends on `self_collision` and the
-model, never on whether meshes are installed. An arm that starts too close can move away: a pair
-that is too close at the start is accepted while its distance only grows. Once the pair is clear,
-it is treated like all others.
+Cylinders are checked in every row. Where cylinders come close, meshes are measured, if the model
+has them (:mod:`~ur_cartesian_driver.kinematics.collision_meshes`). Whether a distance below
+`min_clearance` is refused or only reported depends on `self_collision` and the model, never on
+whether meshes are installed. An arm that starts too close can move away: a pair that is too close
+at the start is accepted while its distance only grows. Once the pair is clear, it is treated like
+all others.
 """
 
 from __future__ import annotations
@@ -41,16 +41,16 @@ from ur_cartesian_driver.planning.request.goal_fields import point_field
 
 # Rows per block: blocks bound the memory, and a refusal ends the check early.
 _BLOCK = 4096
-# A pair counts as separating while its distance shrinks by no more than this [m], by rounding.
+# A separating pair may come closer by this much [m], because of rounding.
 _RECEDING_TOLERANCE = 1e-4
 # Bodies that overlap by less than this [m] touch.
 _DEPTH_SHOWN = 1e-4
-# How far a tool that works on a plane without a margin may be beyond it, by rounding [m].
+# Rounding error by which a tool that works on a plane without a margin may be beyond it [m].
 _ON_PLANE = 1e-6
 
 
 class JointSamples(NamedTuple):
-    """Where the arm is along the path of a goal; columns (n,)."""
+    """The joints along the path of a goal; columns (n,)."""
 
     #: The segment of each sample, by the number of the point at its end.
     segment: Int32s
@@ -77,7 +77,7 @@ class Violation:
 
 
 class ClosestInCell(NamedTuple):
-    """The place of a path at which a pair of bodies in the cell is closest."""
+    """The closest approach of two bodies in the cell along a path."""
 
     #: The row, as an index of the checked configurations.
     row: int
@@ -85,7 +85,7 @@ class ClosestInCell(NamedTuple):
     bodies: tuple[str, str]
     #: [m]
     distance: float
-    #: What no pair of bodies falls below on the whole path [m].
+    #: Lower bound of the distances of all pairs on the whole path [m].
     at_least: float
 
 
@@ -102,7 +102,7 @@ class ClearanceResult:
     margin: float
     #: The pair with that distance, and the shapes between which it was measured.
     description: str
-    #: Where the arm or what it carries is closest to a body of the cell; None = nowhere.
+    #: The closest pair in the cell; None = no pair is measured.
     in_cell: ClosestInCell | None = None
 
 
@@ -112,8 +112,8 @@ class Clearance:
 
     :param T_flange_tcp: the TCP of the goal; the cylinder of the tool leads from the flange to it.
     :param options: self_collision, min_clearance, tool_radius, workspace_planes and cell are used.
-    :param T_flange_active: the active TCP, for bodies in ``tool0_controller``; None = that of the
-        goal.
+    :param T_flange_active: the active TCP, for bodies in ``tool0_controller``; None = the TCP of
+        the goal.
     :raises NotAvailable: the cell has a mesh, and pinocchio is not installed.
     """
 
@@ -150,7 +150,7 @@ class Clearance:
         return close
 
     def violation_at(self, q: Joints) -> Violation | None:
-        """Return what is too close in a configuration [rad], regardless of the start."""
+        """Return the violation in a configuration [rad], regardless of the start."""
         row = np.array([q])
         for checker in self._checkers:
             _, distances = checker.measure(row, np.ones(len(checker.bounds), dtype=np.bool_))
@@ -163,11 +163,11 @@ class Clearance:
 
     def closest(self, q: Floats) -> tuple[Floats, list[tuple[str, str]]]:
         """
-        Return how close the bodies of the cell are to the arm and to what it carries.
+        Return the smallest distance and the closest pair in the cell for each configuration.
 
         :param q: (n, 6) [rad].
-        :returns: (n,) the smallest distance [m], infinite if no pair is measured, and the pair
-            that has it.
+        :returns: (n,) the smallest distance [m], infinite if no pair is measured, and the closest
+            pair.
         """
         if self._cell is None or not self._cell.bodies.pairs:
             return np.full(len(q), inf), [('', '')] * len(q)
@@ -181,9 +181,9 @@ class Clearance:
 
         :param q: (n, 6) [rad], all configurations of a goal, in order of time.
         :param q_start: the start configuration; pairs that are too close there may separate.
-        :param closest: whether the closest pair in the cell is searched, too, which takes longer.
+        :param closest: whether to search the closest pair in the cell, too, which takes longer.
         """
-        #: The first violation by whether its checker refuses (True) or only warns (False).
+        #: The first violation that is refused (True), and the first with only a warning (False).
         found: dict[bool, Violation] = {}
         margin, description = inf, ''
         start = np.array([q_start])
@@ -261,7 +261,7 @@ def _bodies(arm: Arm, T_flange_tcp: Pose, tool_radius: float) -> CollisionBodies
     return CollisionBodies(arm, T_flange_tcp, tool_radius)
 
 
-# A goal may take and put down a dozen parts, and its offsets come back to each stretch.
+# A goal may take and release a dozen parts, and each corner of its offsets needs all these cells.
 @lru_cache(maxsize=32)
 def _cell_clearance(
     arm: Arm, T_flange_active: Pose, cell: Cell, tool_radius: float, T_flange_tip: Pose
@@ -339,9 +339,8 @@ def clearances(
 
     :param tool_tips: the active TCP first.
     :param part_changes: the bodies that the tool takes or puts down along the path.
-    :param displaced: (n, 6) the joints to check, if an offset moves them from those of the path
-        [rad].
-    :param closest: whether the closest pair in the cell is searched, too, which takes longer.
+    :param displaced: (n, 6) joints displaced by an offset [rad], to check in place of the path's.
+    :param closest: whether to search the closest pair in the cell, too, which takes longer.
     :raises CollisionPredicted: there is a violation for which the goal is refused.
     """
     checked = path.q if displaced is None else displaced
@@ -394,7 +393,7 @@ class _InitialViolations:
 
 
 def _is_receding(values: Floats, reached: Floats) -> tuple[Floats, Flags]:
-    """Return each column's largest value, and whether each value is no less than those before."""
+    """Return each column's largest value, and whether each value is at least all before it."""
     largest = np.maximum.accumulate(np.vstack([reached, values]))
     receding: Flags = values >= largest[:-1] - _RECEDING_TOLERANCE
     return largest[-1], receding
@@ -436,10 +435,10 @@ class _SelfCollisionChecker:
 
     def measure(self, q: Floats, pending: Flags) -> tuple[Floats, Floats]:
         """
-        Return the distances of cylinders, and those to compare with the bounds, (n, columns) each.
+        Return the cylinders' distances, and distances to compare with the bounds, (n, columns).
 
-        :param pending: whether a column needs exact distances. Where a distance below the bound is
-            refused anyway, it is returned as 0 in the other columns, which is faster.
+        :param pending: whether each column needs exact distances. In the other columns, a distance
+            below the bound is returned as 0 if it is refused anyway, which is faster.
         """
         lower = self._bodies.distances(q, inf if pending.any() else self._bound)
         close = np.flatnonzero((lower < self._bound).any(axis=0))
@@ -519,7 +518,7 @@ class _PlaneChecker:
         return f'{self._names[which]} and the plane "{self._planes[number].name}"'
 
     def measure(self, q: Floats, pending: Flags) -> tuple[Floats, Floats]:
-        """Return the heights of links and TCP above the planes, the same (n, columns) twice."""
+        """Return the heights (n, columns) of links and TCP above the planes, twice the same."""
         low = self._bodies.heights(q, self._normals)[:, :, self._moving]
         links = np.minimum.reduceat(low, self._begins, axis=2)
         tcp = np.array(self._arm.frames_rows(q).point(self._tcp))

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Find goals whose two frames are probably exchanged, the part for the tool.
+Find goals in which the frames of part and tool are probably exchanged.
 
-Exchanged frames give another path, not a wrong one, so this cannot be told for sure. But people
-begin a path near where the arm stands: if the path as given begins far from there, and begins near
-with the frames exchanged, then that is said.
+Exchanged frames give another valid path, so nothing proves a mistake. But people begin a path near
+the arm. So a mistake is reported if the path as given begins far from the arm, and would begin
+near it with the frames exchanged.
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.motion.goal.moving_frame import MovingFrame
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
-#: Length for which a turn by one radian counts [m/rad].
+#: Length that is equivalent to a turn by one radian [m/rad].
 _TURN = 0.1
-#: The path as given begins at least this far away [m], and more than so many times as far.
+#: The path as given begins at least this far away [m], and more than this many times as far as
+#: with the frames exchanged.
 _FAR, _TIMES = 0.1, 3.0
 
 
 def exchanged_frames(goal: GoalTable, state: RobotState) -> str:
-    """Return a clause about frames that are probably exchanged; '' = nothing points to that."""
+    """Return a clause about frames that are probably exchanged; '' = nothing suggests it."""
     T_base_flange = state.actual_tcp_pose @ state.T_flange_tcp.inverse()
     held, first = goal.moving_frame, goal.waypoints.pose(0)
     if held is not None:

@@ -3,10 +3,10 @@
 """
 The kinematics of an arm that leads a held part along a tool that stands in the cell.
 
-The path is the pose P of the tool in the frame on the part. With the position p of the tool in
-base, fixed, and the part's own velocity v there and turn rate w, the tool moves in the part with
--v and turns with -w; and because p stands while the part turns, its acceleration in the part is
--(a - 2 w x v), with the acceleration a of the part at p. All these in the axes of the part.
+The path is given as poses of the tool in the frame on the part. The position p of the tool is
+fixed in base. At p, the part has the velocity v, the turn rate w and the acceleration a, in its
+own axes. So the tool moves in the part with the velocity -v and the turn rate -w. Because p stands
+still while the part turns, the acceleration of the tool in the part is -(a - 2 w x v).
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class HeldPartKinematics(TcpKinematics):
     """
     The kinematics of a path in a frame that the flange carries.
 
-    :param T_flange_tcp: the active TCP, whose speed in base is limited as that of any tool.
+    :param T_flange_tcp: the active TCP, whose speed in base is limited like any tool's.
     """
 
     frame_moves = True
@@ -122,7 +122,7 @@ class HeldPartKinematics(TcpKinematics):
 
 
 def kinematics_of(frame: MovingFrame | None, arm: Arm, T_flange_tcp: Pose) -> TcpKinematics:
-    """Return the kinematics of a path in a frame that moves; None = it stands in the base."""
+    """Return the kinematics of a path in a moving frame; None = the frame is fixed in base."""
     if frame is None:
         return TcpKinematics(arm, T_flange_tcp)
     return HeldPartKinematics(arm, T_flange_tcp, frame)

@@ -4,10 +4,10 @@
 Solve the joint path along sampled curves, or find why the arm cannot follow them.
 
 All samples of a goal are solved together. Between two samples the arm can move farther than their
-solutions suggest: near a singularity, joints swing round within a millimetre, and after so long a
-step the closest solution belongs to another branch. So samples are added, down to 2 um apart, if
-a joint turns far from one sample to the next, the branch changes, or there is no solution. A jump
-that then remains is real.
+solutions suggest: near a singularity, joints swing round within a millimetre, and the closest
+solution after such a step may belong to another branch. So samples are added, down to 2 um apart,
+if a joint turns far from one sample to the next, the branch changes, or there is no solution. A
+jump that then remains is real.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ _SAME = 1e-6
 #: Number of samples in the first block after a refinement, and in the longest block: longer ones
 #: would only need more memory.
 _FIRST_BLOCK, _LONGEST_BLOCK = 64, 8192
-#: Number of samples on the rest of a piece that show how far a joint would leave its range.
+#: Number of samples on the rest of a piece, to find how far a joint would leave its range.
 _SAMPLES_BEYOND = 16
-#: A block that is solved to its end is followed by one that is longer by this factor.
+#: After a block that is solved to its end, the next block is longer by this factor.
 _GROWTH = 8
 
 
@@ -63,7 +63,7 @@ class JointPath:
     poses: Floats
     #: (n, 6) joint positions [rad].
     q: Floats
-    #: Why the arm does not reach all samples; None = it reaches them.
+    #: The refusal of the first place that the arm does not reach; None = it reaches all samples.
     refusal: GoalRefused | None = None
     #: Segment of the refusal; -1 = none.
     refused_segment: int = -1
@@ -96,7 +96,7 @@ class _Refinement:
     t: list[float]
     poses: list[Pose]
     q: list[Joints]
-    #: The curve parameter at which the arm cannot follow any farther; None = it can.
+    #: The curve parameter at which the arm cannot follow any farther; None = it reaches the end.
     stop: float | None = None
     #: The solution at ``stop``, to which the arm would have to jump; None = there is no solution.
     jump: Joints | None = None
@@ -114,7 +114,7 @@ class _Refinement:
 def sample_joint_move(
     kinematics: TcpKinematics, pieces: CurvePieces, path: BlendedPath
 ) -> JointPath:
-    """Return the samples on a single piece, which is in joint space."""
+    """Return the samples on a single piece in joint space."""
     piece, t = sample_parameters(pieces)
     q = path.joint_rows(int(pieces.number[0]), t)
     return JointPath(pieces, piece, t, kinematics.pose_rows(q), q)
@@ -211,7 +211,7 @@ def _refine(
 def _refusal_at(
     kinematics: TcpKinematics, pieces: CurvePieces, k: int, refinement: _Refinement, q: Joints
 ) -> tuple[GoalRefused, int]:
-    """Return the refusal of a path that cannot go on from a configuration, and the segment."""
+    """Return the refusal of a path that cannot go on from a configuration, and its segment."""
     stop = refinement.stop
     assert stop is not None
     index, fraction = pieces.locate_one(k, stop)
@@ -225,8 +225,8 @@ def _refusal_at(
         return kinematics.discontinuity_error(pose, q, refinement.jump, where, poses_beyond), index
     refusal = kinematics.no_solution_error(pose, where)
     if not pieces.is_blend[k] and fraction < 1.0:
-        # Where the path becomes unreachable, the refused distance is only just out of bounds; the
-        # distance at the waypoint is more helpful in the refusal.
+        # At the place where the path becomes unreachable, the distance is only just out of bounds;
+        # the distance at the waypoint is more helpful in the refusal.
         end = pieces.pose(k, 1.0)
         at_end = kinematics.no_solution_error(end, where, 'at the point ')
         if type(at_end) is type(refusal) and kinematics.solution(end, q) is None:

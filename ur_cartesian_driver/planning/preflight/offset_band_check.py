@@ -3,9 +3,9 @@
 """
 The band in which path offsets may move the tool (``path_offset``): its frames, gaps and checks.
 
-The frame of the path turns with the path. No offset is possible where this turn alone would exceed
-the speed or acceleration of offsets for a displaced tool: in corners where the arm stops, and in
-arcs that are too tight. The offset fades out before these places, and before the end of the
+The frame of the path turns with the path. No offset is possible where this turn alone would move a
+displaced tool faster, or accelerate it more, than offsets may: in corners where the arm stops, and
+in arcs that are too tight. The offset fades out before these places and before the end of the
 path.
 
 The corners of the band are checked along the whole path, as the path itself was before.
@@ -63,8 +63,8 @@ FILTER_SETTLING = 0.2
 #: Time between two samples for the checks [s]; samples are added to the paths of the robot's own
 #: motions.
 _CHECK_STEP = 0.02
-#: The joints at a corner of the band are found from those on the path in steps of at most _STRIDE
-#: [m]. A joint that turns farther than _MAX_CHANGE [rad] in one step would change the branch.
+#: The joints at a corner of the band are found from the joints on the path in steps of at most
+#: _STRIDE [m]. A joint that turns farther than _MAX_CHANGE [rad] in a step changes the branch.
 _STRIDE, _MAX_CHANGE = 0.02, 0.5
 
 
@@ -131,7 +131,7 @@ def dense_path(path: ReferencePath) -> ReferencePath:
 
 def speeds_beside(q: Floats, time: Floats) -> Floats:
     """
-    Return the larger joint speed beside each row of joints (n, 6) [rad/s].
+    Return the larger joint speed before or after each row of joints (n, 6) [rad/s].
 
     :param q: (n, 6) [rad].
     :param time: (n,) [s].
@@ -355,7 +355,7 @@ class OffsetBandCheck:
         on_path, displaced = (singularity_distance_rows(arm, rows) for rows in (q, there))
         for k, measure in enumerate(SINGULARITY_MEASURES):
             bound = float(getattr(self.options, measure.option))
-            # Where the path itself is within the bound (possible at its start), it was accepted.
+            # If the path itself is within the bound (possible at its start), it was accepted.
             near = (displaced[:, k] < bound) & (on_path[:, k] >= bound)
             if near.any():
                 row = int(np.argmax(near))

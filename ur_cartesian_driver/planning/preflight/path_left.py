@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What is left of a planned path, to check it in another cell.
+Check the remainder of a planned path in another cell.
 
-Plans are checked when they are made. If the cell changes before the arm moves or while it moves,
-only the distances from the bodies of the cell are checked again.
+Plans are checked when they are made. If the cell changes before or during the motion, only the
+distances from the bodies of the cell are checked again.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from ur_cartesian_driver.planning.request.controlled_frame import tool_tips
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PathLeft:
-    """A path, and where it ends if another one takes its place."""
+    """A planned path, and the time from which another path takes its place."""
 
     reference: ReferencePath
     #: The joints over time of a goal in SPLINE or SERVO; None = they follow from the path.
@@ -52,7 +52,7 @@ class PathLeft:
     tool_tips: tuple[Pose, ...]
     #: The band in which offsets may move the tool; None = offsets are not allowed.
     band: OffsetBand | None = None
-    #: How the frame of the path moves; None = it stands in the base.
+    #: The moving frame of the path; None = the frame is fixed in base.
     moving_frame: MovingFrame | None = None
     #: Time from which another path is in effect [s].
     until: float = inf
@@ -88,10 +88,10 @@ class PathLeft:
 
         :param options: with the cell as it is at this time.
         :param q: the joint positions at this time [rad].
-        :param part_changes: those that are still to come.
+        :param part_changes: the changes after this time.
         :param time: since the start of the goal [s].
         :returns: the joint positions at the end of the path [rad].
-        :raises GoalRefused: the path would touch; or the joints along it are not known.
+        :raises GoalRefused: the arm would come too close to a body, or cannot reach a pose.
         """
         path = self.reference.since(time)
         if len(path.time) < 2 or self.end <= time:
@@ -111,7 +111,7 @@ class PathLeft:
             joints = self.spline.rows(path.time)[0]
         else:
             joints = solved_joints(kinematics, self.reference, path, self.joint_moves, q)
-        # The arm itself and the planes are as they were when the path was planned.
+        # Self-collisions and planes were checked when the path was planned.
         only_cell = replace(options, self_collision='off', workspace_planes=())
         samples = JointSamples(path.point, path.fraction, joints)
         for _ in clearances(

@@ -4,8 +4,8 @@
 The joints along the reference path of a plan.
 
 A plan keeps poses. Along lines and arcs the arm stays on its branch of solutions, so each solution
-is the one nearest to that before. A joint move may pass through singularities, where branches
-meet: there it is the solution nearest to the straight line between the joints at both ends.
+is the nearest to the solution before. A joint move may pass through singularities, where branches
+meet, so its solutions are the nearest to the straight line between the joints at both ends.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def joint_moves(plan: Plan) -> tuple[JointMove, ...]:
 
 
 def _joint_move_rows(primitives: Sequence[Primitive]) -> Indices:
-    """Return the rows of joint moves; moves to poses are not made objects, a goal has many."""
+    """Return the rows of joint moves, without making objects of the many moves to poses."""
     columns = primitives if isinstance(primitives, MoveRows) else None
     objects = range(len(primitives)) if columns is None else columns.others
     found = {k for k in objects if isinstance(primitives[k], _JOINT_MOVES)}
@@ -87,7 +87,7 @@ def _joint_move_rows(primitives: Sequence[Primitive]) -> Indices:
 
 def row_places(reference: ReferencePath, time: Floats) -> Floats:
     """
-    Return the places of times between the rows of a path: row + fraction (n,).
+    Return the place (n,) of each time on a path: row + fraction of the way to the next row.
 
     If rows have the same time, the last of them is used.
 
@@ -107,10 +107,10 @@ def joints_along(
     arm: Arm, flange_poses: Floats, places: Floats, moves: Sequence[JointMove], start: Joints
 ) -> Floats:
     """
-    Return the joints (n, 6) [rad] for poses of the flange in order; NaN where none is found.
+    Return the joints (n, 6) [rad] for consecutive flange poses; NaN if there is no solution.
 
     :param flange_poses: (n, 7).
-    :param places: (n,) where they are between the rows of the reference path.
+    :param places: (n,) the places of these poses between the rows of the reference path.
     :param moves: the joint moves of the path.
     :param start: the joints before the first pose [rad].
     """
@@ -147,7 +147,7 @@ def solved_joints(
     """
     Return the joints (n, 6) [rad] along a part of the reference path.
 
-    :param path: the part, with any samples of its own.
+    :param path: the part, whose samples may be different ones.
     :param moves: the joint moves of the reference path.
     :param start: the joints before the first sample [rad].
     :raises GoalRefused: a pose has no solution.

@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Kinematics of an arm with a tool, with refusals that say why a pose cannot be reached.
+Kinematics of an arm with a tool, with refusals that explain why a pose is out of reach.
 
-The robot receives poses; in which of up to eight configurations it arrives depends on its previous
-configuration. So configurations are predicted segment by segment: along a line or an arc by
-following the inverse kinematics (:mod:`~.joint_path_solver`), for a joint move by choosing the
-solution that is sent as ``q_near``.
+The robot receives poses. Its previous configuration decides in which of up to eight configurations
+it arrives. So configurations are predicted segment by segment: along a line or an arc by following
+the inverse kinematics (:mod:`~.joint_path_solver`), for a joint move by choosing the solution that
+is sent as ``q_near``.
 """
 
 from __future__ import annotations
@@ -62,9 +62,10 @@ class TcpKinematics:
     """
     The kinematics of the tool of one arm, with refusals that name the point.
 
-    Planners know poses and rates of the tool in the frame of the path, and get from here those of
-    flange and joints, and back. Here the frame of the path is the base, and the tool is the TCP;
-    a kinematics whose frame moves overrides the methods down to :attr:`reach`.
+    Planners use poses and rates of the tool in the frame of the path; this class converts them to
+    poses of the flange and rates of the joints, and back. Here the frame of the path is the base,
+    and the tool is the TCP. A subclass for a moving frame overrides the methods down to
+    :attr:`reach`.
 
     :param arm: nominal or calibrated.
     :param T_flange_tcp: the active TCP.
@@ -115,11 +116,11 @@ class TcpKinematics:
     def largest_joint_rates(
         self, q: Floats, rates: tuple[float, float], accelerations: tuple[float, float]
     ) -> tuple[Floats, Floats]:
-        """Return bounds of these (n, 6), see :func:`~.largest_joint_rates`."""
+        """Return bounds of joint rates (n, 6), see :func:`~.largest_joint_rates`."""
         return largest_joint_rates(self.arm, self.T_flange_tcp, q, rates, accelerations)
 
     def carrier_speeds(self, q: Floats, qd: Floats) -> Floats | None:
-        """Return the speeds of the TCP in base (n,) [m/s]; None = they are those of the tool."""
+        """Return the speeds of the TCP in base (n,) [m/s]; None = the same as the tool's."""
         return None
 
     @property
@@ -167,7 +168,7 @@ class TcpKinematics:
         """
         Return the refusal of a pose without a solution: out of reach, or outside joint limits.
 
-        :param there: a phrase that names the place of the pose if this is not ``where``.
+        :param there: a phrase for the place of the pose if this is not ``where``.
         """
         T_base_flange = self.flange(T_base_tcp)
         reason = there + explain_unreachable(self.arm, T_base_flange)
@@ -240,7 +241,7 @@ class TcpKinematics:
         self, T_base_tcp: Pose, posture: Posture, q: Joints, where: str, tf_prefix: str
     ) -> tuple[Joints, str]:
         """
-        Return the solution that a posture selects, and how ``q`` misses it ('' if it does not).
+        Return the solution that a posture selects, and a clause if ``q`` misses it, else ''.
 
         Errors as for :meth:`nearest`.
         """
@@ -252,7 +253,7 @@ class TcpKinematics:
         self, T_base_tcp: Pose, posture: Posture, q: Joints, index: int, tf_prefix: str
     ) -> str:
         """
-        Return a clause that says how a path misses the posture of a point; '' if it does not.
+        Return a clause if a path misses the posture of a point, else ''.
 
         Errors as for :meth:`nearest`.
 

@@ -32,7 +32,7 @@ from ur_cartesian_driver.planning.preflight.joint_path_solver import describe_lo
 START_LENGTH = 0.001
 #: Turn [rad] after a start at rest during which the arm is allowed to be near a singularity.
 START_ANGLE = 0.01
-#: Rounding error by which the distance from a singularity may shrink and still counts as growing.
+#: Rounding error by which a growing distance from a singularity may shrink.
 _ROUNDING = 1e-9
 #: Rows per block, so that intermediate arrays stay in the CPU cache.
 _BLOCK = 8192
@@ -191,8 +191,8 @@ def _is_leaving(joint_path: JointPath, rows: Indices, measures: Floats) -> Flags
     """
     Return whether each sample of a segment is allowed to be near each singularity (n, 3).
 
-    The goal does not choose where the robot is. So close to a start at rest, any distance from a
-    singularity is allowed, and so it is after that, while the distance only grows.
+    The goal does not choose where the robot starts. So any distance from a singularity is allowed
+    close to a start at rest, and after that while the distance only grows.
     """
     number, pieces = int(joint_path.piece[rows[0]]), joint_path.pieces
     excused = np.zeros((len(rows), len(SINGULARITY_MEASURES)), dtype=np.bool_)
