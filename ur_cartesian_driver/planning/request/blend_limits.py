@@ -83,14 +83,14 @@ def blends_are_measured(options: PlanningOptions) -> bool:
 
 
 def blend_law(options: PlanningOptions) -> str:
-    """Return the origin of the law of blends, for a text that goes on after ``as``."""
+    """Return the origin of the law of blends, to follow ``as`` in a text."""
     if blends_are_measured(options):
         return measured_on(options)
     return 'assumed for motion version 1'
 
 
 def measured_on(options: PlanningOptions) -> str:
-    """Return where and when the laws of the twin were measured."""
+    """Return the arm and the date of the measurement of the twin's laws, as a phrase."""
     twin = options.used_twin
     assert twin is not None
     return f'measured on {"another" if options.twin_problem else "this"} arm, {twin.date}'
@@ -98,9 +98,9 @@ def measured_on(options: PlanningOptions) -> str:
 
 def blend_time_uncertainty(options: PlanningOptions) -> float:
     """
-    Return the uncertainty of the time in blends by measured laws, as a fraction of that time.
+    Return the relative uncertainty of the time in blends that follow measured laws.
 
-    The time grows in proportion to the begin of a blend, and falls with the speed in it.
+    The time is proportional to ``blend_begin``, and falls with the speed in the blend.
     """
     twin, laws = options.used_twin, options.laws
     assert twin is not None
@@ -112,10 +112,10 @@ def blend_time_uncertainty(options: PlanningOptions) -> float:
 
 def blend_uncertainty(options: PlanningOptions) -> float:
     """
-    Return the distance of the robot's blends from the modelled ones, as a fraction of the assumed.
+    Return the deviation of the robot's blends from the model, as a fraction of the assumed one.
 
-    Where the law was measured, only the interval of the begin is left: a blend grows with its
-    begin in proportion, and the assumed distance is half the height of the parabola.
+    If the law was measured, only the uncertainty of ``blend_begin`` remains: the size of a blend
+    is proportional to it, and the assumed deviation is half the height of the parabola.
     """
     if not blends_are_measured(options) or (twin := options.used_twin) is None:
         return 1.0

@@ -166,7 +166,7 @@ def _check_no_angular_rates(goal: GoalTable, index: int, remedy: str) -> None:
 
 
 def _retarget_goal(goal: GoalTable, T_controlled_tcp: Pose) -> GoalTable:
-    """Return the goal of the TCP for the same motion; of vias, only the positions matter."""
+    """Return the same motion as a goal of the TCP; only the positions of vias matter."""
     points, segments = goal.waypoints, goal.segments
     poses = points.poses.copy()
     poses[:, 3:] = normalized_rows(poses[:, 3:])

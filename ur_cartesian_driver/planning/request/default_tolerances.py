@@ -47,7 +47,7 @@ def _with_defaults(tolerance: Tolerance, name: str, options: PlanningOptions) ->
         return tolerance
 
     def filled(values: Iterable[float], first: int) -> list[float]:
-        """Return values, three for each quantity from the ``first`` on."""
+        """Return values without zeros, three for each quantity from number ``first`` on."""
         return [value or defaults[first + k // 3] for k, value in enumerate(values)]
 
     return Tolerance(

@@ -35,8 +35,8 @@ IS_JOINT_MOVE = type_table((SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT))
 IS_STRAIGHT = ~(IS_JOINT_MOVE | IS_ARC)
 IS_OPTIMIZED = type_table(_OPTIMIZED)
 TAKES_TOOL_SPEED = ~type_table((SegmentType.JOINT, *_OPTIMIZED))
-#: By segment type: whether the blend behind it follows the measured laws of blends. Those of
-#: PROCESS are documented, those of OPTIMIZED types are not measured.
+#: By segment type: whether the blend after it follows the measured laws of blends. Blends of
+#: PROCESS are documented, blends of OPTIMIZED types have not been measured.
 FOLLOWS_BLEND_LAWS = type_table((SegmentType.LINEAR, SegmentType.JOINT, SegmentType.CIRCULAR))
 
 

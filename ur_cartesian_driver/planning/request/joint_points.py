@@ -61,7 +61,7 @@ def check_for_arm(goal: Goal, T_flange_tcp: Pose, arm: Arm, options: PlanningOpt
 
     :param T_flange_tcp: the active TCP; a controlled frame of the goal takes its place.
     :raises GoalRefused: the goal is wrong, a joint position is out of its range, or a pose is
-        needed that an unknown calibration does not tell.
+        needed although the calibration is unknown.
     """
     table = check(goal, options)
     by_joints = gives_joints(table)
@@ -84,7 +84,7 @@ def check_for_arm(goal: Goal, T_flange_tcp: Pose, arm: Arm, options: PlanningOpt
 
 
 def _check_calibration(goal: GoalTable, by_joints: Flags, options: PlanningOptions) -> None:
-    """Refuse points whose pose must be known, if only a calibration would tell it."""
+    """Refuse points whose pose is needed if the calibration is unknown."""
     is_sent = IS_JOINT_MOVE[goal.motions.types]
     for i in rows_where(by_joints & ~is_sent)[:1]:
         if not options.calibration_known:
@@ -97,7 +97,7 @@ def _check_calibration(goal: GoalTable, by_joints: Flags, options: PlanningOptio
 
 
 def _check_ranges(index: int, q: Joints, arm: Arm) -> None:
-    """Refuse joint positions out of their ranges: whole turns are not taken off."""
+    """Refuse joint positions out of their ranges; whole turns are not subtracted."""
     limits = np.array(arm.model.position_limits)
     for k in rows_where((q < limits[:, 0]) | (q > limits[:, 1]))[:1]:
         nearest = limits[k, 0] if q[k] < limits[k, 0] else limits[k, 1]

@@ -26,7 +26,7 @@ class ModeRule:
     remedy: str = ''
 
 
-#: Rules for fields of the goal as a whole; those for events at points are in ``point_events``.
+#: Rules for fields of the goal as a whole; rules for events at points are in ``point_events``.
 GOAL_RULES = {
     rule.field: rule
     for rule in (

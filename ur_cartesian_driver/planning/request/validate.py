@@ -394,7 +394,7 @@ def check_posture(field: str, posture: Posture, tf_prefix: str) -> None:
 
 
 def check_joint_name(field: str, name: str, before: Sequence[str], tf_prefix: str) -> None:
-    """Refuse the name of an unknown joint, and one that is among those ``before``."""
+    """Refuse the name of an unknown joint, and a name that is repeated from ``before``."""
     known = [tf_prefix + each for each in JOINT_NAMES]
     if name not in known:
         raise InvalidJoints(

@@ -57,9 +57,9 @@ def refuse_dwells_of_open_goals(
     segments: Sequence[Segment], *, keep_open: bool, first: int = 0
 ) -> None:
     """
-    Refuse dwells in a goal to which points can be appended.
+    Refuse dwells in a goal that stays open for points.
 
-    :param first: the number that the first of ``segments`` has in the goal.
+    :param first: the number of the first of ``segments`` in the goal.
     """
     rows = rows_where(SegmentRows.of(segments).dwells > 0.0) if keep_open else []
     if rows:

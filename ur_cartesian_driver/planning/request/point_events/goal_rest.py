@@ -34,9 +34,9 @@ class GoalRest:
     #: is refused for an offset > 0. Its other arguments are the name and value of the time offset
     #: of an event at the place.
     time_since: Callable[[float, str, float], float]
-    #: Function that returns the way from one place to another along the path [m].
+    #: Function that returns the distance from one place to another along the path [m].
     distance: Callable[[float, float], float]
-    #: Function that returns the place that is some way [m] behind another one.
+    #: Function that returns the place at a distance [m] after another one, negative = before it.
     behind: Callable[[float, float], float]
 
     @property
@@ -49,7 +49,7 @@ class GoalRest:
         return waypoint + 1.0 <= self.begin + NO_FRACTION
 
     def index(self, waypoint: int) -> int:
-        """Return the number that a waypoint has in the resumed goal."""
+        """Return the number of a waypoint in the resumed goal."""
         places = self.places
         return min(range(len(places)), key=lambda i: abs(places[i] - waypoint - 1.0))
 
@@ -62,7 +62,7 @@ class GoalRest:
         ]
 
     def with_last(self, events: Sequence[E]) -> list[E]:
-        """Return the events of the last passed point, moved to the new start, and those ahead."""
+        """Return the last passed point's events, moved to the new start, and the events ahead."""
         first, left = self.first, self.ahead(events)
         passed = [event for event in events if self.is_passed(*points_of(event).values())]
         if not passed or self.places[first] > self.begin + NO_FRACTION:  # no point there

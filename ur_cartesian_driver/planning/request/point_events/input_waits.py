@@ -32,7 +32,7 @@ class InputWaits(PointEvent[InputWait]):
     field = 'input_waits'
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Refuse a second wait at a point, and what :meth:`check_event` refuses."""
+        """Refuse a second wait at a point, and wrong waits (:meth:`check_event`)."""
         for i, wait in enumerate(goal.input_waits):
             if any(wait.waypoint == other.waypoint for other in goal.input_waits[:i]):
                 raise InvalidGoal(

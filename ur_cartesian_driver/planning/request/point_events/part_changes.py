@@ -3,8 +3,8 @@
 """
 Bodies of the cell that the tool takes or puts down at points where the arm stops.
 
-Nothing is sent to the robot for them: they say what the arm carries from a point on, for the
-checks and for the driver's cell. Outputs of a gripper and payloads are events of their own.
+Nothing is sent to the robot for them: they change the bodies on the tool from a point on, in the
+checks and in the driver's cell. Outputs of a gripper and payloads are events of their own.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ class PartChanges(PointEvent[PartChange]):
 
 def check_part_changes(goal: Goal | GoalTable, cell: Cell) -> None:
     """
-    Refuse changes that cannot be made, in the order of their points, to the bodies of a cell.
+    Refuse changes to the bodies of a cell that are impossible in the order of their points.
 
-    :raises InvalidGoal: the text names the field, and what the cell has.
+    :raises InvalidGoal: a change is impossible; the text names field and body.
     """
     on_tool = {body.name for body in cell.bodies if body.is_on_tool}
     order = sorted(range(len(goal.part_changes)), key=lambda i: goal.part_changes[i].waypoint)

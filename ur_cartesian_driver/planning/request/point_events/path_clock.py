@@ -1,13 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The way and the pose of the tool at each time of a planned path, and the time at each way.
+Distance and pose of the tool at each time of a planned path, and the time at each distance.
 
-Lines are sampled only where the acceleration changes, so the tool does not move evenly between
-samples: it moves at constant acceleration. The speeds at the samples follow from that, one after
-the other: the mean of the speeds at both ends of a piece is its length over its time. On splines,
-and where samples are dense, the mean speeds of the pieces on both sides are the better source,
-because an error in one speed does not go on to the next.
+Lines are sampled only where the acceleration changes, so the tool moves between samples at
+constant acceleration, not at constant speed. The speeds at the samples follow one after the other:
+the mean of the speeds at both ends of a piece is its length divided by its time. On splines, and
+where samples are dense, the mean speeds of the pieces on both sides are the better source, because
+an error in one speed does not propagate to the next.
 """
 
 from __future__ import annotations
@@ -21,10 +21,9 @@ from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, distance_rows
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 
-# How far a point beside the TCP moves when the tool turns by 1 rad [m]: so a tool that only turns
-# makes way, too.
+# Distance that counts for a turn of the tool by 1 rad [m], so that a mere turn has a speed, too.
 _ARM_LENGTH = 0.1
-# A tool with less way than this per turn [m/rad] only turns.
+# A tool that moves less than this per turn [m/rad] only turns.
 _MIN_LENGTH_PER_TURN = 1e-3
 # Samples that are not farther apart than this are dense [s].
 _DENSE = 0.03
@@ -37,14 +36,14 @@ class PathClock:
 
     def __init__(self, reference: ReferencePath, *, is_spline: bool) -> None:
         """
-        Measure the way between the samples.
+        Measure the distances between the samples.
 
-        :param is_spline: whether the acceleration changes all the time, not only at samples.
+        :param is_spline: whether the acceleration changes continuously, not only at samples.
         """
         self._poses, self._times = reference.poses, reference.time
         a, b = self._poses[:-1], self._poses[1:]
         lengths, angles = distance_rows(a, b), angle_rows(a[:, 3:], b[:, 3:])
-        #: (m,) way of the tool from the start to each sample [m].
+        #: (m,) distance along the path from the start to each sample [m].
         self._arc_lengths = np.append(0.0, np.cumsum(lengths))
         self._turns = np.append(0.0, np.cumsum(angles))
         self._steps = np.hypot(lengths, _ARM_LENGTH * angles)
@@ -56,11 +55,11 @@ class PathClock:
         return pose_from_row(self._poses[k]).interpolate(pose_from_row(self._poses[k + 1]), part)
 
     def arc_length(self, time: float) -> float:
-        """Return the way from the start to a time [m]."""
+        """Return the distance that the tool has moved from the start to a time [m]."""
         return self._between(self._arc_lengths, time)
 
     def turn(self, time: float) -> float:
-        """Return by how much the tool has turned from the start to a time [rad]."""
+        """Return the angle that the tool has turned from the start to a time [rad]."""
         return self._between(self._turns, time)
 
     @property
@@ -72,10 +71,10 @@ class PathClock:
         """
         Return the motion of the tool that ends at a time [s].
 
-        :param span: how long it takes [s].
-        :returns: its way [m]; the speeds (pieces + 1,) [m/s] at equal distances in time, from its
-            end back to its begin; whether way and speeds are angular [rad], [rad/s], because the
-            tool only turns.
+        :param span: duration of the motion [s].
+        :returns: its distance [m]; the speeds (pieces + 1,) [m/s] at equal intervals of time, from
+            its end back to its beginning; whether distance and speeds are angular [rad], [rad/s],
+            because the tool only turns.
         """
         arc_length = self.arc_length(time) - self.arc_length(time - span)
         turn = self.turn(time) - self.turn(time - span)
@@ -83,9 +82,9 @@ class PathClock:
         values, length = (self._turns, turn) if turns else (self._arc_lengths, arc_length)
         times = (time - span * np.arange(pieces + 1) / pieces).tolist()
         speeds = np.array([self._speed(values, each) for each in times])
-        # The robot program takes the acceleration between two speeds for constant. Where it is
-        # not, the speeds beside give the piece its length; but those at begin and end are exact:
-        # at the begin the program measures how fast the time of the path runs.
+        # The robot program assumes a constant acceleration between two speeds. Where it is not
+        # constant, the inner speeds are changed so that the piece has its length. The speeds at
+        # both ends stay exact: at the beginning the program measures the rate of the path's time.
         lengths = np.array([self._between(values, each) for each in times])
         lacking = -np.diff(lengths) * (pieces / span) - 0.5 * (speeds[1:] + speeds[:-1])
         speeds[1:-1] += 0.5 * (lacking[1:] + lacking[:-1])
@@ -108,9 +107,9 @@ class PathClock:
 
     def time_at(self, arc_length: float, *, leaving: bool) -> float:
         """
-        Return when the tool has made some way from the start [s].
+        Return the time [s] at which the tool has moved a distance from the start.
 
-        :param leaving: where the tool rests there, whether the end of the rest is meant.
+        :param leaving: whether to return the end of the rest, if the tool rests there.
         """
         if leaving:
             k = int(np.searchsorted(self._arc_lengths, arc_length + _NO_LENGTH, side='right')) - 1
@@ -121,13 +120,13 @@ class PathClock:
         part = min(max((arc_length - begin) / (end - begin), 0.0), 1.0) if end > begin else 0.0
         span = float(self._times[k + 1] - self._times[k])
         u, v = float(self._speeds[k]), float(self._speeds[k + 1])
-        # The part of the way is (u t + (v - u) t^2 / 2) / ((u + v) / 2), with t = 0 to 1.
+        # The part of the distance is (u t + (v - u) t^2 / 2) / ((u + v) / 2), with t = 0 to 1.
         root = sqrt(max(u * u + (v * v - u * u) * part, 0.0))
         t = part * (u + v) / (u + root) if u + root > 0.0 else part
         return float(self._times[k]) + span * t
 
     def _piece(self, time: float) -> tuple[int, float]:
-        """Return the sample before a time, and the part of the way to the next one."""
+        """Return the sample before a time, and the part of the distance to the next one."""
         k = int(np.searchsorted(self._times, time, side='right')) - 1
         k = min(max(k, 0), len(self._steps) - 1)
         span = float(self._times[k + 1] - self._times[k])
@@ -136,7 +135,7 @@ class PathClock:
         return k, (2.0 * u + (v - u) * t) * t / (u + v) if u + v > 0.0 else t
 
     def _speed(self, values: Floats, time: float) -> float:
-        """Return the rate of change at a time [1/s] of what is ``values`` at the samples."""
+        """Return the rate of change [1/s], at a time, of a quantity with ``values`` at samples."""
         k, _ = self._piece(time)
         span = float(self._times[k + 1] - self._times[k])
         u, v = float(self._speeds[k]), float(self._speeds[k + 1])

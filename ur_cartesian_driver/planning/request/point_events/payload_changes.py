@@ -42,7 +42,7 @@ class PayloadChanges(PointEvent[PayloadChange]):
             )
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Refuse inertia and transition also where the robot's software has none."""
+        """Refuse wrong payloads, and inertia and transition if the robot's software lacks them."""
         super().check(goal, options)
         if options.target_payload_known:
             return

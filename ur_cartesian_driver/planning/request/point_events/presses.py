@@ -156,7 +156,7 @@ class Presses(PointEvent[Press]):
                 yield PlacedStop(press.first_waypoint, record, note, order=2)
 
     def left(self, events: Sequence[Press], rest: GoalRest) -> Sequence[Press]:
-        """Return the presses ahead, and one that has begun, which zeroes the sensor no more."""
+        """Return the presses ahead, and one already begun, without zeroing the sensor again."""
         return rest.stretches(
             events,
             begun=lambda press: replace(press, zero_sensor=False) if press.zero_sensor else press,
@@ -178,9 +178,9 @@ def press_records(
     """
     Yield the records with which a press begins, each with its note for the report.
 
-    :param T_base_frame: the frame of the goal; of a held part its axes, at the fixed tool.
-    :param T_base_tool: the fixed tool before a held part, on which the arm acts with the opposite
-        of what the tool does to the part; None = the arm holds the tool.
+    :param T_base_frame: the frame of the goal; for a held part, its axes at the fixed tool.
+    :param T_base_tool: the fixed tool, if the arm holds the part and so presses with the opposite
+        forces; None = the arm holds the tool.
     """
     # TOOL has no fixed frame while the arm holds the tool: the robot program follows it.
     task = {PressFrame.TOOL: T_base_tool or IDENTITY, PressFrame.GOAL: T_base_frame}

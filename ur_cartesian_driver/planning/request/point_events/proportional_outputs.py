@@ -67,7 +67,7 @@ class ProportionalOutputs(OutputEvent[ProportionalOutput]):
     def left(
         self, events: Sequence[ProportionalOutput], rest: GoalRest
     ) -> Sequence[ProportionalOutput]:
-        """Return the entries ahead, and those that have begun, with a begin lead of 0."""
+        """Return the entries ahead, and the entries already begun with ``begin_lead`` = 0."""
         return rest.stretches(events, begun=lambda output: replace(output, begin_lead=0.0))
 
     def place(self, output: ProportionalOutput, field: str, path: TimedPath) -> list[PlacedOutput]:

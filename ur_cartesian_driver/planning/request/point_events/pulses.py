@@ -26,9 +26,9 @@ from ur_cartesian_driver.planning.request.point_events.timed_path import (
 )
 from ur_cartesian_driver.protocol.program.trajectory_points import MAX_PULSE_TRAINS
 
-#: A pulse is in place if it is not farther than this from there [m].
+#: A pulse is in place if it is within this distance of its place [m].
 _SAME_PLACE = 1e-6
-#: How much faster than a distance allows the tool may be planned.
+#: Fraction by which the planned speed may exceed the highest speed for a pulse distance.
 _SAME_SPEED = 1e-3
 #: Decimal places to which the remaining phase [m] is rounded.
 _DIGITS = 9
@@ -63,7 +63,7 @@ class Pulses(OutputEvent[PulseTrain]):
             )
 
     def of(self, goal: Goal) -> Sequence[PulseTrain]:
-        """Return the entries; one to the last point of an open goal goes on along later points."""
+        """Return the entries; in an open goal, an entry to the last point goes on beyond it."""
         last = len(goal.waypoints) - 1
         return tuple(
             replace(train, goes_on=goal.keep_open and train.last_waypoint == last)
@@ -81,7 +81,7 @@ class Pulses(OutputEvent[PulseTrain]):
             raise InvalidGoal(f'{where}.{name}', wrong, remedy)
 
     def left(self, events: Sequence[PulseTrain], rest: GoalRest) -> Sequence[PulseTrain]:
-        """Return the entries ahead, and the pulses of others that are behind the stop."""
+        """Return the entries ahead, and the remaining pulses of entries already begun."""
         return [left for train in events for left in _left(train, rest)]
 
     def place_all(self, events: Sequence[PulseTrain], path: TimedPath) -> list[PlacedOutput]:
@@ -144,7 +144,7 @@ class Pulses(OutputEvent[PulseTrain]):
 
 
 def _check_open(goal: GoalTable) -> None:
-    """Refuse pulses in a goal to which points can be appended but no outputs."""
+    """Refuse pulses in an open goal whose mode or horizon rules them out."""
     mode = resolve_execution_mode(goal)
     if mode.traits.streams_setpoints:
         raise NotAvailable(
@@ -163,7 +163,7 @@ def _check_open(goal: GoalTable) -> None:
 def _check_others(
     goal: GoalTable, field: str, train: PulseTrain, before: Sequence[PulseTrain]
 ) -> None:
-    """Refuse other pulses of the output on the part of the path of an entry, and presses."""
+    """Refuse other pulses of the same output, and presses, on an entry's part of the path."""
     first, last = train.first_waypoint, train.last_waypoint
     name = output_name(train.output, train.pin)
     for other in before:
@@ -188,7 +188,7 @@ def _check_others(
 
 
 def _passed(path: TimedPath, field: str, waypoint: int) -> PassedPoint:
-    """Return how the tool passes a point."""
+    """Return the passage of the tool through a point."""
     point = path.point(waypoint)
     if point is None:
         raise InvalidGoal(
@@ -200,7 +200,7 @@ def _passed(path: TimedPath, field: str, waypoint: int) -> PassedPoint:
 
 
 def _count(train: PulseTrain, field: str, length: float) -> int:
-    """Return how many pulses there are on a part of the path with a length [m]."""
+    """Return the number of pulses on a part of the path with a length [m]."""
     most = floor((length - train.phase + _SAME_PLACE) / train.distance) + 1
     between = (
         f'but the path from point {train.first_waypoint} to point {train.last_waypoint} is '
@@ -221,7 +221,7 @@ def check_speed(
     train: PulseTrain, field: str, clock: PathClock, cycle: float, times: tuple[float, float]
 ) -> None:
     """
-    Refuse a distance that the tool passes before the pulse and a cycle behind it are over.
+    Refuse a pulse distance that the tool covers in less time than a pulse and one more cycle.
 
     :param cycle: cycle of the controller [s].
     :param times: when the pulses begin and end [s].
@@ -243,7 +243,7 @@ def check_speed(
 
 
 def _left(train: PulseTrain, rest: GoalRest) -> list[PulseTrain]:
-    """Return what is left of an entry when a stopped goal is resumed; empty = nothing."""
+    """Return the remainder of an entry when a stopped goal is resumed; empty = nothing."""
     begin = train.first_waypoint + 1.0
     if rest.is_passed(train.last_waypoint):
         return []

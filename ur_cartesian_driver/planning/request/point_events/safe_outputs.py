@@ -52,7 +52,7 @@ def add_safe_outputs(goal: GoalTable, options: PlanningOptions) -> GoalTable:
                 restore=True,
             ),
         )
-    # The program is the one that ends a pulse, and it does not run in a pause.
+    # The robot program ends the pulses, and it does not run in a pause.
     for train in goal.pulses:
         outputs.setdefault(
             (train.output, train.pin),

@@ -45,7 +45,7 @@ class Stops:
         self._stops: list[PlacedStop] = sorted(stops, key=lambda one: (one.waypoint, one.order))
         #: The goal without its stops, with the times of the motion only.
         self.moving_goal = goal
-        #: The waypoints at which the arm stops, also those where the robot has nothing to do.
+        #: The waypoints at which the arm stops, even if the robot has nothing to do there.
         self.waypoints = frozenset(
             [stop.waypoint for stop in self._stops]
             + [change.waypoint for change in goal.part_changes]
@@ -59,7 +59,7 @@ class Stops:
             self.moving_goal = replace(self._shifted(goal, -1.0, **rates), execution=mode)
 
     def delayed(self, times: Floats) -> Floats:
-        """Return when points (n,) are reached [s], stops included, from their times without."""
+        """Return the times (n,) [s] of points with stops, from their times without stops."""
         rests = np.zeros(len(times))
         for each in self._stops:
             if isinstance(each.stop, Wait) and each.waypoint + 1 < len(rests):
@@ -134,7 +134,7 @@ class Stops:
         )
 
     def _only_rests(self, goal: GoalTable) -> bool:
-        """Return whether set-points lead the arm, and nothing is done along them but to rest."""
+        """Return whether set-points lead the arm, and it only rests at stops."""
         return resolve_execution_mode(goal).traits.streams_setpoints and not (
             any(kind.of(goal) for kind in OUTPUT_EVENTS)
             or any(not isinstance(each.stop, Wait) for each in self._stops)

@@ -51,7 +51,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
                 _check_open(f'{self.field}[{i}]', command)
 
     def check_event(self, where: str, command: IOCommand) -> None:
-        """Refuse an output that the robot does not have, its value, or a place that is two."""
+        """Refuse a wrong output or value, and both a distance and a fraction."""
         check_output(where, command)
         if command.distance and command.fraction:
             raise InvalidGoal(
@@ -80,7 +80,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
                 offset=max(round(due, _DIGITS), 0.0),
                 distance=0.0,
                 fraction=0.0,
-                lead='',  # the arm rests there, so nothing can come ahead
+                lead='',  # the arm rests there, so a lead is impossible
             )
             if due > 0.0:
                 left.append(command)
@@ -132,7 +132,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
         ]
 
     def _passed(self, command: IOCommand, field: str, path: TimedPath) -> PassedPoint:
-        """Return how the tool passes the place of a command."""
+        """Return the passage of the tool through the place of a command."""
         if command.distance or command.fraction:
             return path.beside(command.waypoint, command.distance, command.fraction, field)
         point = path.point(command.waypoint)
@@ -182,7 +182,7 @@ def _ahead(command: IOCommand, place: float, rest: GoalRest) -> IOCommand:
         number, distance, fraction = rest.first, rest.distance(rest.begin, place), 0.0
     else:
         number = rest.index(point)
-        if fraction < 0.0 and rest.begin > point:  # of a segment that is cut
+        if fraction < 0.0 and rest.begin > point:  # a fraction of a segment that is cut
             distance, fraction = rest.distance(point + 1.0, place), 0.0
     return replace(command, waypoint=number, distance=round(distance, _DIGITS), fraction=fraction)
 

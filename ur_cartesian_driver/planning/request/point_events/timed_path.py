@@ -61,7 +61,7 @@ _BEYOND = 1e-4
 class DrivenStretch:
     """A stretch of the path on which the robot program drives an output by a law."""
 
-    #: When nothing drives the output any more at full speed [s].
+    #: Time from which the law no longer drives the output, at full speed [s].
     end: float
     #: The law and the points between which it holds, as part of a sentence.
     text: str
@@ -73,7 +73,7 @@ class PlacedOutput:
 
     #: Name of the event in a refusal.
     field: str
-    #: When the output is switched at full speed [s].
+    #: Time at which the output is switched, at full speed [s].
     time: float
     #: The row of the segment after which the records are sent.
     after_index: int
@@ -85,7 +85,7 @@ class PlacedOutput:
     stretch: DrivenStretch | None = None
     #: Whether a stretch ends here.
     ends_stretch: bool = False
-    #: How much later the tool is at the place of the output, at full speed [s].
+    #: Time from the switching until the tool is at the place of the output, at full speed [s].
     lead: float = 0.0
     #: The field that gives the lead, in a refusal.
     lead_field: str = ''
@@ -93,15 +93,15 @@ class PlacedOutput:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PassedPoint:
-    """How the tool passes a point of the goal, or stops there."""
+    """The passage of the tool through a point of the goal, or its stop there."""
 
     #: The row of the motion that leads to the point.
     row: int
     #: The row of the motion after which the record of an output at the point is read.
     after: int
-    #: When the point is reached [s].
+    #: Time at which the point is reached [s].
     time: float
-    #: When an output at the point is triggered [s]; None = as soon as its record is read.
+    #: Time at which an output there is triggered [s]; None = as soon as its record is read.
     trigger_time: float | None
     #: A clause for the report.
     where: str
@@ -130,8 +130,8 @@ class TimedPath:
         :param point_times: when points are passed within a motion (n,) [s]; None = each point is
             at the end of a motion.
         :param control_cycle: cycle of the controller [s], needed for pulses only.
-        :param to_tcp: returns where the TCP is in base, which the robot program looks at; None =
-            it is the tool.
+        :param to_tcp: returns poses of the TCP in base, which the robot program watches; None =
+            the tool is the TCP.
         """
         self.control_cycle = control_cycle
         self._to_tcp = to_tcp
@@ -158,7 +158,7 @@ class TimedPath:
         }
 
     def point(self, waypoint: int) -> PassedPoint | None:
-        """Return how the tool passes a point; None if no motion leads there."""
+        """Return the passage of the tool through a point; None if no motion leads there."""
         row = self._rows.get(waypoint)
         if self._point_times is not None and (row is None or self._passes(row)):
             return self._within(waypoint, float(self._point_times[waypoint]))
@@ -174,10 +174,10 @@ class TimedPath:
 
     def beside(self, waypoint: int, distance: float, fraction: float, field: str) -> PassedPoint:
         """
-        Return how the tool passes a place beside a point.
+        Return the passage of the tool through a place before or after a point.
 
-        :param distance: way along the path from the point to the place [m], negative before it;
-            0 = ``fraction`` of the length of the segment before or after the point instead.
+        :param distance: distance along the path from the point to the place [m], negative before
+            the point; 0 = ``fraction`` gives it, in lengths of the segment before or after.
         :param field: name of the event in a refusal.
         :raises InvalidGoal: the path does not lead there, or the robot program would read the
             record too late.
@@ -218,7 +218,7 @@ class TimedPath:
         )
 
     def _doubt(self, time: float) -> str:
-        """Return a clause about a place in a blend, of whose shape only a bound is known."""
+        """Return a clause about the uncertainty of a place in a blend, or ''."""
         k = min(
             max(int(np.searchsorted(self._reference.time, time)), 1), len(self._reference.time)
         )
@@ -244,7 +244,7 @@ class TimedPath:
         )
 
     def _within(self, waypoint: int, time: float) -> PassedPoint:
-        """Return how the tool passes a point at a time [s] within a motion."""
+        """Return the passage of the tool through a point at a time [s] within a motion."""
         after = self.last_returned(time)
         return PassedPoint(
             row=min(int(np.searchsorted(self.ends, time)), len(self.ends) - 1),
@@ -256,7 +256,7 @@ class TimedPath:
 
     def triggered(self, record: SwitchOutput, time: float | None, after: int) -> SwitchOutput:
         """
-        Return a record that is triggered at the tool pose of a time; None = without a trigger.
+        Return a record that is triggered at the TCP pose of a time; None = without a trigger.
 
         :param after: the row of the motion after which the record is read.
         """
@@ -279,9 +279,9 @@ class TimedPath:
         The output is triggered where the lead is due at full speed; a slower tool switches later.
 
         :param time: when the tool is at the place of the record [s].
-        :param lead: how much ahead of that the output switches, in real time [s].
-        :raises InvalidGoal: the lead reaches back to before the record can be read, or over a
-            rest; the text gives the longest possible lead.
+        :param lead: time by which the output switches earlier, in real time [s].
+        :raises InvalidGoal: the lead begins before the record can be read, or before a rest; the
+            text gives the longest possible lead.
         """
         rests = [
             float(self.ends[k])
@@ -322,7 +322,7 @@ class TimedPath:
         return 'while passing it' if self._passes(k) else 'after stopping there'
 
     def _at_end(self, k: int) -> float | None:
-        """Return when the tool is closest to a motion's target [s]; None if it stops there."""
+        """Return the time [s] at which the tool is closest to a target; None if it stops there."""
         if not self._passes(k):
             return None
         end, half = float(self.ends[k]), float(self._blend_halves[k])
@@ -332,7 +332,7 @@ class TimedPath:
         return self._nearest(np.array(target.position), end - half, end + half, end)
 
     def _nearest(self, position: Floats, begin: float, end: float, middle: float) -> float:
-        """Return the time in a period when the tool is nearest a position; ``middle`` at rest."""
+        """Return the time at which the tool is nearest to a position; ``middle`` if it rests."""
         times, rows = self._reference.time, self._reference.poses
         own = slice(
             max(int(np.searchsorted(times, begin, side='right')) - 1, 0),
@@ -349,7 +349,7 @@ class TimedPath:
         return float(np.clip(t[k] + u[k] * (t[k + 1] - t[k]), begin, end))
 
     def _tcp_pose(self, time: float) -> Pose:
-        """Return where the TCP is in base at a time."""
+        """Return the pose of the TCP in base at a time."""
         pose = self.clock.pose(time)
         if self._to_tcp is None:
             return pose
