@@ -63,20 +63,20 @@ from ur_cartesian_driver.planning.request.joint_points import named_joints
 
 #: Length between two samples of a segment [m].
 _SAMPLE_LENGTH = 0.02
-#: Tilt of the axis between two samples [rad], where it needs more samples than the length.
+#: Tilt of the axis between two samples [rad], if the tilt needs more samples than the length.
 _SAMPLE_TILT = pi / 18.0
 #: Greatest number of samples of a segment (at density 1).
 _MAX_SAMPLES = 32
-#: Where all rotations are allowed, rotations are chosen at points that are this far apart, by
-#: length [m] or tilt [rad], and interpolated between these points.
+#: If all rotations are allowed, rotations are chosen at points that are this far apart, by length
+#: [m] or tilt [rad], and interpolated between these points.
 _KNOT_LENGTH = 0.01
 _KNOT_TILT = pi / 36.0
 #: Length [m] that adds as much to the size of a path as a tilt of one radian.
 _LENGTH_PER_RADIAN = 0.05
 #: Greatest number of searches; each avoids the collisions found by the earlier ones.
 _MAX_SEARCHES = 8
-#: Costs of a small clearance: a rotation costs a key's value if its clearance is below the
-#: required one plus the key [m]; the costs of all keys for which this holds are added.
+#: Costs of a small clearance: each key [m] adds its value to the cost of a rotation whose
+#: clearance is below the required clearance plus the key.
 _NEARNESS = {0.0: 1000.0, 0.003: 100.0, 0.01: 20.0}
 #: Number of smoothing passes.
 _SMOOTHING_PASSES = 40
@@ -214,7 +214,7 @@ class _FreePath:
         seen = state if goal.moving_frame is None else goal.moving_frame.seen(state)
         self.start = seen.actual_tcp_pose @ T_tcp_controlled
         starts = np.concatenate([[self.start.row()], poses[:-1]])
-        # At ends of FIXED arcs, the poses become those in which the arcs arrive.
+        # At the ends of FIXED arcs, the poses become the poses of arrival.
         self.arc_rows, self.arcs, _ = goal_arcs(goal.segments, goal.T_base_frame, starts, poses)
         self.poses = poses
         self.references, self.rotations = self._references()
@@ -297,7 +297,7 @@ class _FreePath:
 
     def _layers(self, ends: Indices, whole: Floats, tilts: Floats) -> list[Layer]:
         postures = self.goal.waypoints.postures
-        # Where the rotation is not free, the change that the goal prescribes must be allowed.
+        # If the rotation is not free, the change that the goal prescribes must be allowed.
         commanded = np.abs(np.diff(self.rotations, prepend=0.0))
         bound = ~self.is_any | np.append(False, ~self.is_any[:-1])
         tilted = tilts * self.sizes  # the axis deviates by tilt x turn / 8

@@ -13,8 +13,8 @@ joint limits hold along that way.
 The search is first coarse, over all rotations, then finer and finer around the best way.
 
 Rotations are angles [rad] about the axis from the reference orientation, which goes along the path
-without turning about the axis. Rotations are not wrapped: those that differ by a full turn are
-different nodes, because their joints differ.
+without turning about the axis. Rotations are not wrapped: two rotations that differ by a full turn
+are different nodes, because their joints differ.
 """
 
 from __future__ import annotations
@@ -179,7 +179,7 @@ class RotationLattice:
     """
     The lattice of one path.
 
-    :param kinematics: those of the controlled frame, which has the free axis.
+    :param kinematics: the kinematics of the controlled frame, which has the free axis.
     :param axis: unit vector of the free axis in the controlled frame.
     """
 
@@ -259,7 +259,7 @@ class RotationLattice:
 
     @property
     def arm(self) -> Arm:
-        """The arm, of which the ideal one is used."""
+        """The arm; the lattice is solved for its ideal arm."""
         return self.kinematics.arm
 
     @property
@@ -491,7 +491,7 @@ class RotationLattice:
     def _joint_edges(
         self, tables: _Tables, layer: Layer, targets: Floats, cost: Floats, q: Floats
     ) -> tuple[Floats, Floats, Int64s, Floats]:
-        """Return what :meth:`_edges` returns, for a joint move, which connects any two nodes."""
+        """Return the same as :meth:`_edges` for a joint move, which connects any two nodes."""
         sample = layer.end - 1
         flat = cost.ravel()
         sources = np.argsort(flat)[:_JOINT_SOURCES]

@@ -89,12 +89,12 @@ class Moves(_Columns):
     entry_rate: Floats
     #: Time that the controller loses before the move [s].
     idle: Floats
-    #: Rate half-way through the blend before the move, as a multiple of that of an even change.
+    #: Rate half-way through the blend before the move, relative to the rate of an even change.
     bend: Floats
 
     @property
     def accelerations(self) -> Floats:
-        """Accelerations; for a move with a time, the one needed to meet it from rest to rest."""
+        """Accelerations; of a move with a time, the acceleration to meet it from rest to rest."""
         p = self.ramp_part
         by_time = self.length / np.maximum(p * (1.0 - p) * self.time**2, _TINY)
         return np.where(self.time > 0.0, by_time, self.acceleration)
@@ -151,7 +151,7 @@ class MoveTimes(_Columns):
     leave: Floats
     #: Time lost before the move [s].
     idle: Floats
-    #: Rate half-way through the blend before the move, as a multiple of that of an even change.
+    #: Rate half-way through the blend before the move, see :attr:`Moves.bend`.
     bend: Floats
 
     @property

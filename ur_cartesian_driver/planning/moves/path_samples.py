@@ -46,7 +46,7 @@ class BlendSamples:
     index: Int32s
     #: Parameter ``s`` of the blend half-way between the previous sample and this one.
     s: Floats
-    #: Half of the difference between the two in ``s``.
+    #: Half of the difference in ``s`` between these two samples.
     half_step: Floats
     #: Time per unit of ``s`` at the joint speed limits [s].
     joint_time: Floats

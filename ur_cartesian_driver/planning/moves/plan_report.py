@@ -126,7 +126,7 @@ def blend_remarks(
 
 
 def motion_version_remarks(options: PlanningOptions) -> list[str]:
-    """Return the remark on a robot whose moves follow other laws than plans do; 0 = unknown."""
+    """Return the remark on a motion version that plans do not follow, if the version is known."""
     motion_version = options.robot_motion_version
     if motion_version <= 1:
         return []

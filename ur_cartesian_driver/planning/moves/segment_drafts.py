@@ -203,7 +203,7 @@ class SegmentDrafts:
         both = radii + np.append(0.0, radii[:-1])
         for row in rows_where((both > lengths - 2.0 * _MIN_BLEND_GAP) & (both > 0.0)):
             before, after = float(radii[row - 1]) if row else 0.0, float(radii[row])
-            # Which of two equal blends is shortened must not depend on rounding.
+            # Rounding must not decide which of two equal blends is shortened.
             length = dist(positions[row].tolist(), positions[row + 1].tolist())
             excess = before + after - (length - _MIN_BLEND_GAP)
             if excess > 0.0 and before + after > 0.0:

@@ -4,7 +4,7 @@
 Choose the primitive of each segment.
 
 Nearly all primitives are rows of numbers. Moves to a posture, and moves that older robot programs
-expect in another form are separate objects.
+expect in another form, are separate objects.
 """
 
 from __future__ import annotations

@@ -242,10 +242,10 @@ class SegmentTimings:
             return
         after = samples.index - self._geometries.begin + 1
         begin, end = times.begin_rate[after], times.end_rate[after]
-        # A measured law may make a blend slower, but never the arm faster than by the assumed law.
+        # A measured law may slow a blend, but never make the arm faster than the assumed law does.
         bend = np.maximum(times.bend[after], 1.0)
-        # Where it makes the blend faster, the rate has a peak half-way: take the end of the sample
-        # that is nearer to it.
+        # If a measured law makes the blend faster, the rate has a peak half-way: take the end of
+        # each sample that is nearer to the peak.
         nearer = np.clip(0.5, samples.s - samples.half_step, samples.s + samples.half_step)
         at_sample = ramp_rate(begin, end, np.where(bend > 1.0, nearer, samples.s), bend)
         over = at_sample * np.maximum(
@@ -342,7 +342,7 @@ class SegmentTimings:
         takes_too_long = self.wire_times > self.options.max_segment_time
         slowest = np.minimum(self.velocities, self.accelerations)
         too_slow = by_speed & (slowest < MIN_SPEED)
-        # Their blend is skipped if the tool covers its radius in one control cycle.
+        # The robot skips such a blend if the tool covers its radius in one control cycle.
         needs_a_cycle = IS_ARC_OR_PROCESS[self._geometries.kinds] & path.has_blend_after
         # A blend that is too small for the requested speed is refused, not passed slowly.
         asked = np.where(self._is_slowed_in_arc(), requests.speed, self.velocities)

@@ -4,8 +4,8 @@
 Find the lines, arcs and PROCESS motions that are planned slower than requested.
 
 Only motions that carry the tool along a path are examined. Joint moves and OPTIMIZED moves have no
-requested tool speed, and turns on the spot have no path. In a blend, the speed is that of the
-planned path, which follows an assumed law (:mod:`~.move_chain`).
+requested tool speed, and turns on the spot have no path. In a blend, the speed of the planned path
+counts, which follows an assumed law (:mod:`~.move_chain`).
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def unknown_speeds(geometries: SegmentGeometries) -> tuple[list[int], list[int]]
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
 class SlowStretches(Rows[SlowStretch]):
     """
-    Slow stretches in columns (n,), named like their fields: a long goal can have several a point.
+    Slow stretches in columns (n,) named like their fields: a long goal can have several per point.
 
     Reasons have ``{point}`` and ``{speed}`` in place of numbers.
     """
@@ -210,7 +210,7 @@ class _SlowMoves:
             'it is still slow because of the blend at point {point}',
             rows - 1,
         )
-        # Stops: the tool brakes before the point, or speeds up behind it, or both.
+        # Stops: the tool brakes before the point, or speeds up after it, or both.
         heads, opens, ends = (
             np.append(heads[1:], False), np.append(opens[1:], False), np.append(ends[1:], 0.0)
         )  # fmt: skip

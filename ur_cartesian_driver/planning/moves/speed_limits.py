@@ -48,7 +48,7 @@ class SpeedLimits:
         )
         travel = np.where(curves.is_joint_line, curves.joint_travel, curves.angle)
         length = np.where(self.is_turn, travel, curves.length)
-        # What leads an OPTIMIZED move is the time it takes with some joint always at its limit.
+        # An OPTIMIZED move is led by the time that it takes with some joint always at its limit.
         length = np.where(self.is_optimized, self._bounds.times_at_limits, length)
         #: Length of the leading quantity: [m], [rad], or for an OPTIMIZED move [s].
         self.length: Floats = np.maximum(length, _MIN_LENGTH)

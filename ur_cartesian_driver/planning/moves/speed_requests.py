@@ -93,7 +93,7 @@ class SpeedRequests:
     speed: Floats
     #: Accelerations.
     acceleration: Floats
-    #: Greatest accelerations to which meeting a time may lead.
+    #: Greatest accelerations that may be used to meet a time.
     max_acceleration: Floats
     #: Greatest accelerations that goal and limits allow, for the leading quantity instead of the
     #: length that the robot uses.
@@ -340,7 +340,7 @@ class SpeedRequests:
     def _by_time(self) -> None:
         """Request times."""
         geometries, limits, timed = self.geometries, self.limits, self.has_wire_time
-        # How fast these run if the turn leads has not been measured.
+        # The speed of these motions has not been measured if the turn leads.
         unmeasured = ~timed & limits.is_turn & IS_ARC_OR_PROCESS[self._kinds]
         for row in rows_where(unmeasured)[:1]:
             raise InvalidGoal(
