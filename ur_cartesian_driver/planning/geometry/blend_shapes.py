@@ -30,7 +30,7 @@ from ur_cartesian_driver.planning.geometry.curves import (
 
 # Segments that go straight on or straight back, to within this angle [rad], have no fillet.
 _STRAIGHT = 1e-6
-# Of Gauss-Legendre quadrature.
+# Nodes and weights of Gauss-Legendre quadrature.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 # Least radius of the fillet between segments that go straight back [m].
 _MIN_RADIUS = 1e-9

@@ -67,7 +67,7 @@ class CurveSequence(Protocol):
         """Return length [m] and turn [rad] of a curve (on a joint line, the leading joint's)."""
 
     def locate(self, number: Indices, t: Floats) -> tuple[Indices, Floats]:
-        """Return the segments (n,) of places on curves, and the fractions (n,) of them before."""
+        """Return the segment (n,) of each place, and the fraction (n,) of the segment up to it."""
 
 
 class CurveRows:
@@ -207,8 +207,8 @@ class BlendedPath:
         #: The radius of the blend after each curve [m], 0 = no blend; whether this blend is a
         #: circular arc between lines (``movep``).
         self.radius, self.fillet = np.zeros(n), np.zeros(n, dtype=np.bool_)
-        #: The distance from the waypoint at which the blend begins and ends [m]: the radius, or by
-        #: a measured law less.
+        #: The distance from the waypoint at which the blend begins and ends [m]: the radius, or
+        #: less by a measured law.
         self.reach = np.zeros(n)
         #: Radius of the blend after each curve [m]; inf if the blend is no arc.
         self.arc_radius = np.full(n, np.inf)

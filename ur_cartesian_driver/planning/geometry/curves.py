@@ -41,7 +41,7 @@ SAME_POSITION = 1e-6
 SAME_ANGLE = 1e-6
 #: Minimum height of the via above the chord [m] at which three points make a circle.
 MIN_ARC_HEIGHT = 1e-5
-#: How far rounding to micrometres on the wire moves three points relative to each other [m].
+#: Displacement of three points relative to each other by rounding to micrometres on the wire [m].
 _ROUNDING = 1.5e-6
 #: Largest turn that rounding on the wire may add at the end of an arc whose tangent the tool
 #: follows [rad].
@@ -268,7 +268,7 @@ def goal_arcs(
 
 def arc_faults(start: Floats, via: Floats, end: Floats, is_fixed: Flags) -> dict[int, str]:
     """
-    Return why positions (n, 3 or more) [m] make no arc, by row: clauses.
+    Return the faults of positions (n, 3 or more) [m] that make no arc, by row: clauses.
 
     The rounding of three points on the wire tilts their circle by rounding / height of the
     triangle. At the end of a FIXED arc this tilt turns the tool by 2 sin(sweep / 2) times as much.

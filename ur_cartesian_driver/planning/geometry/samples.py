@@ -88,8 +88,7 @@ def check_sample_count(
     """
     Refuse a goal that needs too many samples.
 
-    :param count: (n,) the number of samples of each part; ``points``: (n,) the point to which it
-        leads.
+    :param count: (n,) the number of samples of each part; ``points``: (n,) the point at its end.
     :param before: the number of samples on the path before these parts.
     """
     if (total := before + count.sum()) > most:
@@ -110,9 +109,9 @@ class CurvePieces:
     first: int
     #: Number of each piece's curve.
     number: Indices
-    #: Where each piece begins on its curve: ``u`` of a segment's curve, ``s`` of a blend.
+    #: The parameter at which each piece begins: ``u`` of a segment's curve, ``s`` of a blend.
     begin: Floats
-    #: Where each piece ends on its curve, likewise.
+    #: The parameter at which each piece ends, likewise.
     end: Floats
     #: Number of samples on each piece.
     sample_count: Indices

@@ -123,7 +123,7 @@ class ToolSpline:
         """
         Return poses, twists and accelerations of the tool at m times.
 
-        :param piece: (m,) the piece to which each time belongs.
+        :param piece: (m,) the piece of each time.
         :param t: (m,) time since this piece began [s].
         """
         return ToolRows(self.poses(piece, t), *self.rates(piece, t))

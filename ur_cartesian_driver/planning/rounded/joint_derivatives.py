@@ -1,11 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Derivatives of the joints along a rounded path, where a joint may come near one of its limits.
+Derivatives of the joints along a rounded path, if a joint may come near one of its limits.
 
-Away from singularities, the tool's limits keep the joints far below theirs. A few configurations
-along the path show this: the inverse of the Jacobian bounds the joint rates by those of the tool.
-If these few do not show it, the joints are found at all places.
+Away from singularities, the tool's limits keep the joints far below their own limits. A few
+configurations along the path usually prove this: there, the inverse of the Jacobian turns bounds
+on the rates of the tool into bounds on the joint rates. If they do not prove it, the joints are
+found at all places.
 """
 
 from __future__ import annotations
@@ -33,13 +34,13 @@ class JointDerivatives:
     """Derivatives by s of k joints at m places."""
 
     #: (m, k) the first derivative; k = 0 if no joint comes near a limit, or if the arm cannot
-    #: follow the whole path: a later check of the plan refuses it.
+    #: follow the whole path, which a later check of the plan refuses.
     q1: Floats
     #: (m, k) the second derivative.
     q2: Floats
     #: Joint positions at the last place [rad]; None = the arm cannot follow the path.
     end: Joints | None
-    #: (m,) way of the TCP in base [m] per unit of s; None = the tool's, or no limit is near.
+    #: (m,) distance of the TCP in base [m] per unit of s; None = the tool's, or no limit is near.
     carrier: Floats | None = None
 
 

@@ -51,7 +51,7 @@ _NO_TURN = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SegmentEnds:
-    """Where the segments of a section end."""
+    """The ends of the segments of a section."""
 
     #: (k,) the segments of the goal that the section contains, in order.
     segments: Indices
@@ -93,7 +93,7 @@ def programmed_sections(
     curves, faults = curves_of(goal.motions, goal.T_base_frame, starts, targets.copy())
     for row, fault in faults.items():
         raise arc_error(row, fault)
-    # With the largest spacing of samples, these are the fewest: an impossible path ends here.
+    # The largest spacing gives the least number of samples: an impossible path is refused here.
     fewest = np.maximum(curves.length / STEP_LENGTH, curves.angle / STEP_ANGLE)
     check_sample_count(fewest, np.arange(n), CHECK_SPEEDS)
     count = curves.chord_counts(_CHORD_ERROR, _CHORD_TURN)

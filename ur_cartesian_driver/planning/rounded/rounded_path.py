@@ -39,7 +39,7 @@ MIN_WIDTH = 2e-6
 _RATIO = 1.5
 #: Fraction of a bound to which widths are fitted, so that few deviations exceed the bound.
 _AIM = 0.95
-#: Greatest number of rounds of this fit, which ends when no width changes by this part.
+#: Greatest number of rounds of this fit; it ends when no width changes by more than this fraction.
 _ROUNDS, _SAME = 10, 0.006
 #: Smallest and greatest factor on a width in a round.
 _STEPS = 0.5, 1.3

@@ -61,22 +61,22 @@ from ur_cartesian_driver.planning.spline.spline_path import (
 PIECE_TOLERANCE = 1e-5
 #: Greatest such deviation as a fraction of the smallest bound of a corner.
 _PIECE_PART = 0.2
-#: Fraction of this deviation that is allowed to the tool spline; the joints get the remainder.
-#: They need little of it: pieces are short beside the arm.
+#: Fraction of this deviation for the tool spline; the joints get the remainder. They need little
+#: of it, because pieces are short compared with the arm.
 _TOOL_PART = 0.6
 #: Fraction of the jerk limit at which the law aims, because the pieces have a little more jerk.
 _JERK_PART = 0.97
-#: Corners get no larger width than the tool travels in this time [s].
+#: The width of a corner is at most the distance that the tool travels in this time [s].
 _WIDTH_TIME = 0.25
 #: Widths up to this [m] are allowed even if the tool is slower.
 _SLOW_WIDTH = 0.001
 #: A tool that travels less [m] turns on the spot, if it turns farther than this [rad].
 _NO_TRAVEL, _NO_TURN = 1e-6, 1e-6
-#: Samples inside each piece that measure its deviation and its accelerations: a quintic that
-#: starts and ends like the law is farthest from it near these quarters.
+#: Number of samples inside each piece that measure its deviation and its accelerations: near the
+#: quarters, a quintic that starts and ends like the law is farthest from it.
 _SAMPLES_INSIDE = 3
-#: Accelerations are measured inside a piece if they may exceed those of the tool spline by more
-#: than the first fraction of their limit, or if a joint exceeds the second fraction of a limit.
+#: Accelerations inside a piece are measured if they may exceed the tool spline's by more than the
+#: first fraction of their limit, or if a joint exceeds the second fraction of a limit.
 _MORE_ACCELERATION, _FAST = 0.002, 0.5
 
 
@@ -308,7 +308,7 @@ class Places:
 
 
 def _coarse_times(motion: RoundedMotion, tolerance: float, options: PlanningOptions) -> Floats:
-    """Return begin and end (k, 2) [s] of the pieces that do not follow the law closely enough."""
+    """Return the ends (k, 2) [s] of the pieces that do not follow the law closely enough."""
     pieces = motion.polynomials
     bounds = (1.0 - _TOOL_PART) * tolerance * np.array([1.0, 1.0 / ANGLE_TOLERANCE_RADIUS])
     coarse = np.any(pieces.deviations > bounds, axis=1)

@@ -28,10 +28,10 @@ _DIGITS = 8
 
 class RoundedReport:
     """
-    What is said of a plan with rounded corners.
+    The report of a plan with rounded corners.
 
-    It keeps a few numbers for each place of the path, because texts are made only when they are
-    read, and a plan is kept until its motion ends.
+    It keeps only a few numbers for each place of the path, because a plan is kept until its motion
+    ends; texts are made when they are read.
     """
 
     def __init__(self, motion: RoundedMotion) -> None:

@@ -4,10 +4,10 @@
 The time law of a section of a rounded path, within the limits of tool and joints.
 
 Limits are evaluated at places that are a fraction of a corner's width apart. A first law gives the
-times of the places, and so the places that the averaging window reaches from each; the next law is
-found with each speed limit lowered to the least one in the window. Averaging mixes accelerations
-of neighbouring places, so the averaged law is measured. Limits are tightened around places where
-one is exceeded, until none is or the greatest number of rounds is reached.
+time of each place, and so the places within the averaging window around it. The next law is found
+with each speed limit lowered to the least limit in the window. Averaging mixes accelerations of
+neighbouring places, so the averaged law is measured. Limits are tightened around places where a
+limit is exceeded, until all limits are kept or the greatest number of rounds is reached.
 """
 
 from __future__ import annotations
@@ -49,14 +49,14 @@ _MIN_WINDOW = 0.02
 _RAMP_PART = 0.35
 #: Fraction of the acceleration limits at which the law aims, because averaging adds a little.
 _AIM = 0.975
-#: How often limits are tightened; the power of the excess by which they are, a smaller one where
-#: the excess is far from 1, because jerk grows with a higher power of the speed; and an extra
-#: factor.
+#: Greatest number of rounds in which limits are tightened: by the excess to the power ``_MORE``
+#: and an extra factor. Above ``_FAR``, the power is ``_LESS``, because jerk grows with a higher
+#: power of the speed.
 _ROUNDS = 8
 _FAR, _LESS, _MORE, _EXTRA = 2.0, 0.6, 1.5, 1.01
-#: Speeds may be this much higher than their limits, as a factor, between places.
+#: Factor by which speeds may exceed their limits between places.
 _SPEED_MARGIN = 1.005
-#: Samples while the window of the average passes a place at which limits change.
+#: Number of samples while the averaging window passes a place at which limits change.
 _AROUND = 13
 #: Time between anchors [s].
 _ANCHOR_TIME = 2.0
@@ -66,8 +66,8 @@ _SLOWER = 1.5
 _JERK_STEP = 0.002
 #: Number of times that are measured at once, so that the intermediate arrays stay in the cache.
 _BLOCK = 8192
-#: Names of the limits of a held part: its speed in base; and, behind the name of a joint, the
-#: acceleration that its motion along the path needs even at a constant speed.
+#: Names of the limits of a held part: its speed in base; and, after the name of a joint, the
+#: acceleration that the joint needs along the path even at a constant speed.
 HELD_PART, BENDS = 'held part', ' bends'
 _TINY = 1e-12
 _NEARLY = 1e-10
@@ -75,7 +75,7 @@ _NEARLY = 1e-10
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ToolLimits:
-    """The limits of the tool in each row (k,), a segment or a place, and of its jerk [m/s^3]."""
+    """The limits of the tool in rows (k,), for segments or places; jerk [m/s^3] has one limit."""
 
     speeds: Floats
     turn_rates: Floats
@@ -84,7 +84,7 @@ class ToolLimits:
     jerk: float
 
     def at(self, *rows: Indices) -> ToolLimits:
-        """Return the limits in m rows, each the least of those in ``rows``, arrays (m,)."""
+        """Return limits in m rows: the least limits of several ``rows``, each an array (m,)."""
         return replace(
             self,
             **{
@@ -96,7 +96,7 @@ class ToolLimits:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CurveSamples:
-    """The derivatives of a rounded path by s at m places: of the tool, in base."""
+    """The derivatives of the tool by s, in base, at m places of a rounded path."""
 
     s: Floats
     #: (m, 3) first derivative of the position.
@@ -158,7 +158,7 @@ class SectionLaw:
         row = self._rows(s)
         #: (m - 1,) the rows of the tool's limits between places.
         self._rows_between = row[1:]
-        # Where two segments meet, the lower limits apply, because the next step is in the second.
+        # Between two segments the lower limits apply, because the next step is in the second one.
         after = np.minimum(row + np.isin(s, section.ends), len(section.ends) - 1)
         self._limits_at = tool.at(row, after)
         self._tool, self._options, self._model = tool, options, kinematics.arm.model
@@ -210,7 +210,7 @@ class SectionLaw:
         return self._tool.accelerations[row], self._tool.turn_accelerations[row]
 
     def _rows(self, s: Floats) -> Indices:
-        """Return, for places (m,), the rows that their segments have in the tool's limits."""
+        """Return the rows (m,) of the tool's limits for places (m,)."""
         rows: Indices = np.searchsorted(self.section.ends, s, side='left')
         return np.minimum(rows, len(self.section.ends) - 1)
 
@@ -218,7 +218,7 @@ class SectionLaw:
         """
         Replace the law by one that is slower in some periods.
 
-        :param times: (k, 2) begin and end of each period since the beginning of the section [s].
+        :param times: (k, 2) both ends of each period, since the beginning of the section [s].
         """
         before = self.law.times
         inside = np.zeros(len(self.samples.s), dtype=np.bool_)
@@ -258,7 +258,7 @@ class SectionLaw:
             for k, column in enumerate(joints.q1.T)
         }
         if joints.carrier is not None:
-            # While the tool crawls around an edge of the part, the part may fly.
+            # While the tool moves slowly around an edge of the part, the part may move fast.
             bound = options.max_tool_speed or inf
             caps[HELD_PART] = bound / np.maximum(joints.carrier, _TINY)
             for name, column in zip(JOINT_NAMES, joints.q2.T, strict=True):
@@ -271,7 +271,7 @@ class SectionLaw:
         travel = length_rows(samples.x1)
         return LawLimits(
             speed=self._speed,
-            # The acceleration along the path is one more column beside the joints.
+            # The acceleration along the path is one more column after the joints.
             first=np.column_stack([joints.q1, travel]),
             second=np.column_stack([joints.q2, np.zeros(len(travel))]),
             bound=np.column_stack(
@@ -298,7 +298,7 @@ class SectionLaw:
             slowed = self._speed / np.sqrt(self._tightened)
             before, y = y, squares(lowered_over(slowed, first.times, 0.5 * window))
             found = TimeLaw(s, y, window)
-            # Elsewhere the law is as it was, only later.
+            # Elsewhere the law is the same, only later.
             changed = np.where(y == before, 0.0, 1.0)
             again = _largest_around(changed, found.times, 2.0 * window) > 0.0
             excess[again] = self.excess(found, again)[again]
@@ -311,7 +311,7 @@ class SectionLaw:
         return found
 
     def _measured_times(self, law: TimeLaw, at: Flags) -> Floats:
-        """Return times near which the law passes places, closer together where limits change."""
+        """Return times near which the law passes places, denser where limits change."""
         tool = self._tool
         changes = np.flatnonzero(
             (np.diff(tool.accelerations) != 0.0) | (np.diff(tool.turn_accelerations) != 0.0)
@@ -363,7 +363,7 @@ class SectionLaw:
             length_rows(x1 * a + x2 * square) / tool.accelerations[row],
             length_rows(x1 * jerk + x2 * (3.0 * v * a) + rows(samples.x3) * (square * v))
             / tool.jerk,
-            # Speeds have their limits at the places; between them they may be a little higher.
+            # Speed limits apply at the places; between them, speeds may be a little higher.
             length_rows(x1) * law.v / (_SPEED_MARGIN * tool.speeds[row]),
         ]
         if samples.turns:

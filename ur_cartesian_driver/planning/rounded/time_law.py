@@ -33,7 +33,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
 _HALVINGS = 30
 _TINY = 1e-12
 _JUST_BELOW = 1.0 - 1e-9
-# Whether a time just within reach counts must not depend on rounding errors [s].
+# Margin by which rounding errors may put a time out of reach [s].
 _NO_TIME = 1e-9
 # Newton's method finds times of places, unless the law nearly rests there [1/s].
 _NEWTON_STEPS = 4
@@ -138,7 +138,7 @@ class FastestLaw:
     The fastest law along a path, for limits that may be tightened.
 
     :param s: the places (m,), increasing.
-    :param limits: the limits as they are; those that no law can reach are left out.
+    :param limits: the limits before tightening; limits that no law can reach are left out.
     """
 
     def __init__(self, s: Floats, limits: LawLimits) -> None:
@@ -149,7 +149,7 @@ class FastestLaw:
         """
         Return the square of the greatest possible ds/dt at places (m,); it is 0 at both ends.
 
-        :param speed: (m,) greatest ds/dt, not above that of the limits.
+        :param speed: (m,) greatest ds/dt, not above the speed of the limits.
         :param factor: (m,) factor on the limits of acceleration.
         """
         bounds, step = self._bounds.scaled(factor), self._step
@@ -166,7 +166,7 @@ class FastestLaw:
 
 
 def _possible(bounds: _Bounds, y: Floats) -> Floats:
-    """Return the largest y (m,), but at most the given ones, at which some u is allowed."""
+    """Return the largest y (m,), at most the given y, at which some u is allowed."""
     for r, n in zip(bounds.r, bounds.n, strict=True):
         y = np.minimum(y, _JUST_BELOW * r / np.maximum(n, _TINY))
     low, high = bounds.range(y)
@@ -187,9 +187,9 @@ def _possible(bounds: _Bounds, y: Floats) -> Floats:
 
 def _lowered(y: Floats, reachable: Callable[[Indices | slice, Floats], Floats]) -> Floats:
     """
-    Return the given y (m,), lowered until the step between each and the next is possible.
+    Return the given y (m,), lowered until the step from each row to the next is possible.
 
-    All ramps are followed at the same time, each from its lower end and a row at a time.
+    All ramps are followed at the same time, each from its lower end, one row at a time.
 
     :param reachable: takes rows (r,) and the y (r,) in the rows after them; returns the largest y
         in these rows for which the step between the two is possible.
@@ -206,7 +206,7 @@ def _lowered(y: Floats, reachable: Callable[[Indices | slice, Floats], Floats]) 
             y[rows] = lower[lowered]
             changed[rows] = True
             rows = rows[rows > 0] - 1
-        # Steps to and from the other rows are as they were.
+        # Steps to and from the other rows have not changed.
         again = np.flatnonzero(falls | changed[:-1] | changed[1:])
         falls[again] = np.maximum(reachable(again, y[again + 1]), 0.0) < y[again] - _TINY
     return y
@@ -234,7 +234,7 @@ class TimeLaw:
         v, ds = np.sqrt(y), np.diff(s)
         dt = 2.0 * ds / np.maximum(v[1:] + v[:-1], _TINY)
         self.window = window
-        #: (m,) when the law without averaging passes each place [s].
+        #: (m,) time at which the law passes each place before averaging [s].
         self.times = np.concatenate([[0.0], np.cumsum(dt)])
         self.duration = float(self.times[-1]) + window
         self._s, self._v = s, v
@@ -281,12 +281,12 @@ class TimeLaw:
 
     @cached_property
     def table(self) -> tuple[Floats, PathTimes]:
-        """:meth:`sampled_times`, begin and end of the motion (k,) [s], and the law at these."""
+        """:meth:`sampled_times` with both ends of the motion (k,) [s], and the law at them."""
         times = np.concatenate([[0.0], self.sampled_times(), [self.duration]])
         return times, self.at(times)
 
     def times_of(self, s: Floats) -> Floats:
-        """Return when the averaged law passes places (m,) [s]."""
+        """Return the times (m,) [s] at which the averaged law passes places."""
         low = np.interp(s, self._s, self.times)
         high = low + self.window
         times, known = self.table
@@ -309,7 +309,7 @@ def lowered_over(values: Floats, times: Floats, reach: float) -> Floats:
     reach += _NO_TIME
     low = np.searchsorted(times, times - reach, side='left')
     high = np.searchsorted(times, times + reach, side='right')
-    # Two ranges of 2^k values cover each range, so its least value is the lesser of theirs.
+    # Two ranges of 2^k values cover each range, so the lesser of their least values is its own.
     result = np.empty_like(values)
     level = np.floor(np.log2(high - low)).astype(np.intp)
     table, size = values, 1

@@ -4,8 +4,8 @@
 The knots between which quintics follow the tool along a section of a rounded path.
 
 Knots lie on a grid whose steps are no shorter than the shortest piece. The grid begins anew at
-the anchors of the section, which are places on the path: where the law is slowed, pieces change,
-and pieces elsewhere are only shifted in time.
+the anchors of the section, which are places on the path. So if the law is slowed somewhere, only
+pieces near there change; the others are only shifted in time.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ CLOSE_ENOUGH, _SPLIT_EXCESS, _SPLIT_JERK = 1.017, 1.012, 1.01
 TRIES = 6
 #: Number of shortest pieces that are joined into one at first; the result is split as necessary.
 _JOINED = 8
-#: Where inside a shortest piece its accelerations are measured; and inside one that can be split,
-#: beside the half steps: it may have most acceleration close to its ends.
+#: Fractions of a shortest piece at which its accelerations are measured; and of a piece that can
+#: be split, in addition to the half steps: its acceleration may be greatest close to its ends.
 _QUARTERS, _MEASURED = (0.25, 0.5, 0.75), (0.08, 0.16, 0.3, 0.42, 0.58, 0.7, 0.84, 0.92)
 #: Greatest error of the acceleration, as a fraction of its limit, on pieces that can be split.
 _ACCELERATION_PART = 0.15
-#: Greatest distance [m] of a chord between two samples from the path: as that of the pieces.
+#: Greatest distance [m] of a chord between two samples from the path, the same as of the pieces.
 _CHORD_ERROR = 1e-5
 #: Greatest error [m] along the path of a place between two samples, by its time.
 _TIME_ERROR = 5e-5
@@ -113,9 +113,10 @@ class _HalfSteps:
 
     def sample_counts(self, ends: Indices) -> tuple[Indices, ...]:
         """
-        Return the numbers of samples between grid times (n,), at most 2 mm and one degree apart.
+        Return the two numbers of samples in :class:`ToolKnots` for pieces between grid rows (n,).
 
-        The first ones also follow the curve of the path, and its course over time.
+        Samples are at most 2 mm and one degree apart. Those that describe the path also follow its
+        curve, and its course over time.
         """
         twists, accelerations = self._points.twists, self._points.accelerations[:, :3]
         speed = length_rows(twists[:, :3])
@@ -150,7 +151,7 @@ class _HalfSteps:
         return fits
 
     def _follows(self, pieces: _Pieces, tolerance: float, *, at_quarters: bool) -> Flags:
-        """Return whether pieces follow the law at all half steps, or at those near quarters."""
+        """Return whether pieces follow the law at all half steps, or only near the quarters."""
         begin, end = pieces.begin, pieces.end
         exact, times = self._points, self._points.times
         steps = 2 * (end - begin)
@@ -187,7 +188,7 @@ class _HalfSteps:
         return self._excess(self._pieces(begin, begin + 1), _QUARTERS)
 
     def _excess(self, pieces: _Pieces, parts: tuple[float, ...]) -> Floats:
-        """Return the greatest such ratio (r,) at some parts of the time of each piece."""
+        """Return the greatest ratio (r,) of :meth:`excess` at some parts of each piece's time."""
         begin, end = pieces.begin[:, None], pieces.end[:, None]
         t = ((self.grid[end] - self.grid[begin]) * parts).ravel()
         _, accelerations = pieces.spline.rates(np.repeat(pieces.number, len(parts)), t)
@@ -229,7 +230,7 @@ def _grid(law: SectionLaw) -> Floats:
 
 
 def _piece_ends(steps: _HalfSteps, tolerance: float) -> Indices:
-    """Return the rows of the grid at which the pieces end that follow the law closely enough."""
+    """Return the rows of the grid between which pieces follow the law closely enough."""
     last = len(steps.grid) - 1
     # The first piece is short, so that an output can be sent soon after the start.
     ends = np.unique([0, 1, *range(_JOINED, last, _JOINED), last])
