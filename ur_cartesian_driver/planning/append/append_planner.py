@@ -90,7 +90,7 @@ class AppendPlan:
 
     #: The plan, including the ending; the times of its reference path are motion times.
     plan: Plan
-    #: Number of the goal's records that stay before this plan.
+    #: Number of the goal's records that precede this plan.
     records_before: int
     #: Motion time at which these records end [s].
     start_time: float
@@ -407,7 +407,7 @@ class _PartPlanner:
         ending: the outputs follow that piece on the wire, and their triggers depend on the next
         points.
 
-        :param pulses: those that begin in this part.
+        :param pulses: the pulses that begin in this part.
         """
         start_time = begin.time
         closing = self._stop(end) if end.is_moving and not self._appended.last else None
@@ -514,9 +514,9 @@ class _PartPlanner:
         self, field: str, command: IOCommand, path: TimedPath, ends: Mapping[int, float]
     ) -> float:
         """
-        Return when a new command is due [s].
+        Return the time at which a new command is due [s].
 
-        :raises InvalidGoal: its place is behind the last point, on a path that may change.
+        :raises InvalidGoal: its place is after the last point, on a path that may change.
         """
         if not (command.distance or command.fraction or command.offset < 0.0):
             return ends[command.waypoint] + command.offset
@@ -551,7 +551,7 @@ class _PartPlanner:
         :param ending: the number of motions of the ending.
         """
         last, rows = self._appended.last, plan.rows
-        # The plan of the first part has checked them, from the point where they begin.
+        # The plan of the first part has checked its own pulses, from their beginning.
         pulses = self._before.pulses if self._before.points else ()
         if pulses:
             clock = PathClock(plan.reference, is_spline=rows.are_spline)

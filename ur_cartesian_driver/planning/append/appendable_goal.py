@@ -45,7 +45,7 @@ from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
 
 class Replacement(IntEnum):
-    """What the appended points replace, if anything; values as in ``AppendPoints``."""
+    """The kind of replacement by appended points, if any; values as in ``AppendPoints``."""
 
     APPEND = 0
     REPLACE_FROM_POINT = 1
@@ -101,7 +101,7 @@ class ReplannablePoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AppendableGoal:
-    """The state of a goal to which points can be appended, without the points passed so far."""
+    """The state of a goal that stays open for points, without the points passed so far."""
 
     #: The goal without its points.
     goal: Goal
@@ -202,7 +202,7 @@ def numbered(appended: AppendedPoints, first: int) -> tuple[IOCommand, ...]:
 def _check_times(
     appendable: AppendableGoal, appended: AppendedPoints, options: PlanningOptions
 ) -> None:
-    """Refuse points that are not later than those before them, or much later, in client time."""
+    """Refuse points that are not later, or much later, than the point before, in client time."""
     is_tail = appended.replace_from_time is not None
     times, first = WaypointRows.of(appended.waypoints).times, appendable.points
     if appendable.last_client_time == 0.0 and not times.any():

@@ -27,7 +27,7 @@ class PlannedPart:
 
     #: The joints over motion time, including the stop after the last point, if there is one.
     spline: JointSpline
-    #: For each piece but that stop, the point to which the piece leads.
+    #: For each piece but that stop, the point at its end.
     waypoints: Int32s
     #: For each piece but that stop, the number of records of the goal before the piece.
     records_before: Indices

@@ -36,7 +36,7 @@ _TIME_DIGITS = 6
 
 def cut_time(before: AppendableGoal, new_points: AppendedPoints) -> float:
     """
-    Return the motion time [s] at which a new tail is to begin; infinite = at the last point.
+    Return the beginning of a new tail in motion time [s]; infinite = at the last point.
 
     :raises GoalRefused: the request names both a point and a time, the point does not exist, the
         time is not finite, or the goal is no spline.
@@ -172,7 +172,7 @@ def _end_time(before: AppendableGoal, point: int) -> float:
 
 
 def _away_from_ends(part: PlannedPart, time: float) -> float:
-    """Return the first time [s] from ``time`` on at which a cut leaves no short piece."""
+    """Return the first time [s], not before ``time``, for a cut that leaves no short piece."""
     row = part.row_at(time)
     begin, end = part.begin(row), part.begin(row + 1)
     if time - begin < SAME_TIME:

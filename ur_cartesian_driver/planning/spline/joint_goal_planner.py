@@ -86,7 +86,7 @@ class _Trajectory(JointKnots):
 class _Samples:
     """Joints and tool along a trajectory; row 0 is the start."""
 
-    #: (m,) the point to which each sample's piece leads.
+    #: (m,) the point at the end of each sample's piece.
     points: Int32s
     #: (m,) the piece of each sample.
     piece: Indices

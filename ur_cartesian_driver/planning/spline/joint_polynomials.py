@@ -68,7 +68,7 @@ class JointKnots:
 class JointPolynomials(JointKnots):
     """Pieces that keep the tool on a tool spline."""
 
-    #: (n,) the piece of the tool spline to which each joint piece belongs.
+    #: (n,) the piece of the tool spline on which each joint piece lies.
     piece: Indices
     #: (n, 2) maximum deviation of the tool from the tool spline [m], [rad].
     deviations: Floats
@@ -151,7 +151,7 @@ def fit_joint_polynomials(
 
 
 class _PieceRefinement:
-    """The pieces so far, in order of time, with flags for those whose deviation is not known."""
+    """The pieces so far, in order of time, with flags for pieces of unknown deviation."""
 
     def __init__(
         self,

@@ -48,8 +48,8 @@ def slow_spline_stretches(
     Return the slow stretches of a spline from rest to rest.
 
     :param twists: (n, 6) the twists of the goal's points; NaN and 0 = none.
-    :param stretch: the factor by which the times of the goal were stretched because of the limit.
-    :param limit: that limit; None = there was none.
+    :param stretch: the factor by which the times of the goal were stretched because of ``limit``.
+    :param limit: the limit that would be exceeded otherwise; None = none.
     :param slower_by: a speed is too low if it is more than this fraction below the requested one.
     """
     piece, u, times = _places(path)

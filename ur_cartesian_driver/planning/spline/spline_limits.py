@@ -34,7 +34,7 @@ _ROUNDING = 1e-6
 _NEAR = 0.5
 #: The inverse of the Jacobian is computed at one of this many samples.
 _FEW = 3
-# Fractions of a short piece at which its rates are computed, beside those at its samples.
+# Fractions of a short piece at which its rates are computed, in addition to its samples.
 _QUARTERS = (0.25, 0.5, 0.75)
 # The rates of a piece are computed at this many steps if a quantity may exceed the known greatest
 # excess by this factor between samples.
@@ -61,11 +61,11 @@ class LimitExcess:
     factor: float
     #: The point at the end of the segment with the greatest value.
     point: int
-    #: When this value occurs, as a fraction of the segment's time.
+    #: The time of this value, as a fraction of the segment's time.
     fraction: float
     #: The greatest value.
     needed: float
-    #: Why the tool is slow if the times are stretched to keep the limit.
+    #: The cause of a slow tool if the times are stretched to keep the limit.
     cause: SlowCause
 
     @property
@@ -169,8 +169,9 @@ def may_near_limits(
     """
     Return whether a joint may come near a limit in one of the configurations (n, 6) [rad].
 
-    The inverse of the Jacobian bounds the joint rates by those of the tool. Where the frame of the
-    path moves, True: the speed of the TCP in base has to be known, too.
+    The inverse of the Jacobian turns bounds on the rates of the tool into bounds on the joint
+    rates. The result is True if the frame of the path moves: then the speed of the TCP in base has
+    to be known, too.
 
     :param rates: greatest speed and turn rate of the tool [m/s], [rad/s].
     :param accelerations: likewise [m/s^2], [rad/s^2].
@@ -203,7 +204,7 @@ def worst_excess_between(
     """
     count = np.bincount(piece)
     short = np.flatnonzero(count < MIN_SAMPLES)
-    # Accelerations of cubics jump where pieces meet; those of quintics peak near the quarters.
+    # Accelerations jump between cubic pieces, and peak near the quarters of quintic pieces.
     later, inner = np.arange(1, len(count)), np.array(_QUARTERS)
     piece = np.concatenate([piece, later, np.repeat(short, len(inner))])
     u = np.concatenate([u, np.zeros(len(later)), np.tile(inner, len(short))])
@@ -228,9 +229,9 @@ def worst_excess_between(
 
 def _possible_peaks(values: Floats, piece: Indices) -> Floats:
     """
-    Return how high a quantity (n,) may get beside each sample of pieces (n,).
+    Return upper bounds (n,) of a quantity around each sample of pieces (n,).
 
-    A parabola through three samples is higher than these by up to an eighth of their second
+    A parabola through three samples is higher than the samples by up to an eighth of their second
     difference; twice as much is allowed for.
     """
     bend = np.zeros(len(values))

@@ -95,7 +95,7 @@ class SplinePath:
 
     @property
     def samples(self) -> JointSamples:
-        """The samples behind the start."""
+        """The samples after the start."""
         return JointSamples(self.points[1:], self.fractions[1:], self.q[1:])
 
     @property
@@ -131,8 +131,8 @@ def solve_spline_path(
     :param first: the number of the point at the end of the first segment.
     :param rests: whether the arm is at rest at the start.
     :param places: the segments over time, see :class:`ToolSplinePath`.
-    :param count: (n,) the number of samples of each piece, where the sizes of pieces are known to
-        be right; None = measured.
+    :param count: (n,) the number of samples of each piece, if the sizes of the pieces are known to
+        be right; None = both are measured.
     """
     if count is None:
         count = _measured_count(kinematics, spline, first)

@@ -124,7 +124,7 @@ def plan_spline(
         the motion. With ``keep_open``, the arm may still be moving at the last point; the stop by
         :func:`plan_stop` is then checked as well.
     :param kinematics: of the arm with the TCP of the motion.
-    :param first: the index that the first of these waypoints has in the whole goal.
+    :param first: the index of the first of these waypoints in the whole goal.
     :param tool_tips: the tool tips to check for collisions; empty = only this TCP.
     :raises GoalRefused: the spline cannot be executed; the text names point, quantity, value and
         bound.
@@ -196,7 +196,7 @@ def _max_piece_time(goal: GoalTable) -> float:
     """
     Return the longest duration of a piece [s].
 
-    Pieces are sent whole, so those of a replaceable tail must be short: a third of
+    Pieces are sent whole, so the pieces of a replaceable tail must be short: a third of
     ``replace_horizon``. Goals that are sent as set-points have no such limit.
     """
     if not goal.replace_horizon or resolve_execution_mode(goal).traits.streams_setpoints:
@@ -226,7 +226,7 @@ def plan_stop(state: SplineState, arm: Arm, options: PlanningOptions, point: int
     ``max_joint_acceleration``, if a joint would otherwise leave its range or, while still
     accelerating, exceed its speed limit.
 
-    :param point: index of the point at which the arm has the state, for refusals.
+    :param point: index of the point with this state, for refusals.
     :raises JointLimitExceeded: a joint is too close to the end of its range.
     :raises TooFast: a joint that still accelerates is too close to its speed limit.
     """

@@ -3,9 +3,9 @@
 """
 The tool points of a SPLINE or SERVO goal, with NaN replaced by chosen values.
 
-The tool stops at a point whose twist is 0. In place of NaN, the driver chooses a velocity from the
-parabola through the point and its neighbours, and as acceleration the mean of the accelerations
-that the cubics before and after the point have at that point.
+The tool stops at a point whose twist is 0. In place of a NaN velocity, the driver chooses the
+velocity of the parabola through the point and its neighbours; in place of a NaN acceleration, the
+mean acceleration at the point of the cubics before and after it.
 """
 
 from __future__ import annotations

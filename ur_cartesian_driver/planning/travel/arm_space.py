@@ -19,7 +19,7 @@ from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_chan
 
 #: No joint turns farther than this from one checked configuration to the next [rad].
 _ROW_STEP = radians(1.0)
-#: Only every so many of these configurations are looked at first.
+#: Stride of the first look at these configurations.
 _FIRST_STRIDE = 8
 #: Distance between two configurations on a line along the axis of the tool [m], and the largest
 #: turn of a joint between them [rad]: a greater one leads to another branch.
@@ -30,10 +30,10 @@ _MIN_WEIGHT = 0.05
 
 class ArmSpace:
     """
-    The configurations of an arm, and those in which it is clear of itself and of its cell.
+    The configurations of an arm, with checks that it is clear of itself and of its cell.
 
     :param kinematics: the arm and its TCP.
-    :param options: those of :class:`~.clearance.Clearance`.
+    :param options: the options for :class:`~.clearance.Clearance`.
     """
 
     def __init__(self, kinematics: TcpKinematics, options: PlanningOptions) -> None:
@@ -46,11 +46,11 @@ class ArmSpace:
         self._cell = Clearance(arm, T_flange_tcp, only_cell)
         #: Lowest and highest position of each joint, (2, 6) [rad].
         self.limits: Floats = np.array(model.position_limits).T
-        # A length along the axis of a joint moves nothing, one across it, and all that follow, do.
+        # A joint moves the lengths across its axis and all lengths after it, none along its axis.
         across, along = np.abs(model.geometry.a), np.abs(model.geometry.d)
         beyond = np.cumsum((across + along)[::-1])[::-1] - along
         length = float(np.linalg.norm(kinematics.T_flange_tcp.position))
-        #: How far each joint moves the arm at most, (6,) [m/rad].
+        #: Greatest motion of the arm by each joint, (6,) [m/rad].
         self.weights: Floats = np.maximum(beyond + length, _MIN_WEIGHT)
 
     def free(self, q: Floats) -> Flags:
@@ -58,9 +58,9 @@ class ArmSpace:
         return ~self._clearance.too_close(q)
 
     def seems_free(self, a: Floats, b: Floats) -> bool:
-        """Return whether a straight joint motion is clear in places, but for its beginning."""
+        """Return whether a straight joint motion is clear in all rows but its beginning."""
         rows = _rows(a, b)
-        # Most motions that are not free are found by a few places.
+        # A few rows reveal most motions that are not free.
         return not any(
             self._clearance.too_close(some).any()
             for some in (rows[::-_FIRST_STRIDE], rows)
@@ -69,9 +69,9 @@ class ArmSpace:
 
     def is_free(self, a: Floats, b: Floats) -> bool:
         """
-        Return whether a straight joint motion that seems free is accepted.
+        Return whether a straight joint motion that seems free is clear of the cell everywhere.
 
-        The arm itself and the planes are checked in rows only, which have been looked at.
+        Self-collisions and planes are checked in rows only, which :meth:`seems_free` has done.
         """
         start = vector6(a.tolist())
         return self._cell.check(_rows(a, b), start, closest=False).violation is None
@@ -82,9 +82,9 @@ class ArmSpace:
 
     def touching(self, q: Joints) -> Violation | None:
         """
-        Return why the arm is not clear of everything in a configuration; None if it is.
+        Return the violation in a configuration; None if the arm is clear of everything.
 
-        A travel keeps clear also of what the planner only warns of.
+        A travel also avoids violations of which the planner only warns.
         """
         return self._clearance.violation_at(q)
 
@@ -92,7 +92,7 @@ class ArmSpace:
         """
         Return the configurations on a line along the axis z of the tool, without the first.
 
-        :param distance: how far the line goes, negative = backwards [m].
+        :param distance: length of the line [m], negative = backwards.
         :returns: (n, 6) [rad]; None if the arm cannot follow the line.
         """
         count = ceil(abs(distance) / _LINE_STEP)
@@ -115,7 +115,7 @@ class ArmSpace:
         """
         Return the configurations in which the arm reaches a pose, the nearest first.
 
-        Each joint is turned as near to a configuration as its limits allow.
+        Whole turns bring each joint as near to ``q_near`` as its limits allow.
         """
         found = solutions(self.kinematics.arm, self.kinematics.flange(T_base_tcp), q_near)
         if not found:

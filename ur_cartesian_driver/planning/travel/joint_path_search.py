@@ -10,10 +10,10 @@ by a :class:`JointSpace`, so the search knows neither arm nor obstacles. The num
 bounds the search, not the time, and a seed draws them: the same question has the same answer on
 every machine.
 
-To prove that a motion is free takes much longer than to look at places on it. So trees grow by
-motions that seem free, and those that lead from the start to a goal are proved when they are
-found (R. Bohlin and L. Kavraki, "Path planning using lazy PRM", ICRA 2000, do likewise). What
-lies behind a motion that is not free is cut off, and the search goes on.
+Proving that a motion is free takes much longer than checking places on it. So trees grow by
+motions that seem free, and a connection from the start to a goal is proved when it is found
+(R. Bohlin and L. Kavraki, "Path planning using lazy PRM", ICRA 2000, do likewise). If a motion is
+not free, all nodes beyond it are cut off, and the search goes on.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 #: Length of the motion by which a tree grows, as a fraction of the greatest weight: the joint that
 #: moves the arm most turns by this angle [rad].
 _STEP = 0.35
-#: Samples are drawn around start and goals, up to this far outside of the box about them [rad]:
+#: Smallest and largest margin around the box of start and goals in which samples are drawn [rad]:
 #: most ways round an obstacle are near, and some need another turn of a joint.
 _MIN_MARGIN, _MAX_MARGIN = 0.2, pi
 #: Rounds of shortening, and random chords that are tried in each.
 _ROUNDS, _CHORDS = 3, 30
-#: A chord replaces what it cuts off if it is shorter by more than this fraction.
+#: A chord replaces a detour if it is shorter by more than this fraction.
 _WORTHWHILE = 0.01
 
 
 class JointSpace(Protocol):
-    """The configurations of an arm, and those in which it touches nothing."""
+    """The configurations of an arm, with checks that it touches nothing."""
 
     @property
     def limits(self) -> Floats:
@@ -47,21 +47,21 @@ class JointSpace(Protocol):
 
     @property
     def weights(self) -> Floats:
-        """How far each joint moves the arm, (6,) [m/rad]."""
+        """Motion of the arm by each joint, (6,) [m/rad]."""
 
     def free(self, q: Floats) -> Flags:
         """Return whether the arm touches nothing in each configuration (n, 6) [rad]."""
 
     def seems_free(self, a: Floats, b: Floats) -> bool:
-        """Return whether the arm touches nothing in places on the straight motion from a to b."""
+        """Return whether the arm touches nothing at places on the straight motion from a to b."""
 
     def is_free(self, a: Floats, b: Floats) -> bool:
-        """Return whether the arm touches nothing anywhere on this motion, which seems free."""
+        """Return whether the arm touches nothing anywhere on a motion that seems free."""
 
 
 @dataclass(frozen=True, slots=True)
 class FoundPath:
-    """A joint path, and what it took to find it."""
+    """A joint path, and the effort of its search."""
 
     #: (k, 6) [rad]; between two rows the joints move straight.
     waypoints: Floats
@@ -76,7 +76,7 @@ def search_joint_path(
     Return a free joint path from the start to one of the goals; None if none was found.
 
     :param start: (6,) [rad], a free configuration.
-    :param goals: (n, 6) [rad]; those that are not free, or out of the limits, are left out.
+    :param goals: (n, 6) [rad]; goals that are not free, or out of the limits, are left out.
     :param max_samples: the number of samples after which the search gives up.
     """
     goals = goals[_within(space.limits, goals) & space.free(goals)]
@@ -94,7 +94,7 @@ def search_joint_path(
 
 
 def path_length(space: JointSpace, waypoints: Floats) -> float:
-    """Return the length of a joint path, weighted by how far each joint moves the arm [m]."""
+    """Return the length of a joint path, weighted by the weights of the joints [m]."""
     return float(_lengths(space, np.diff(waypoints, axis=0)).sum())
 
 
@@ -134,7 +134,7 @@ class _Tree:
         """
         Grow by one step from a node towards a configuration.
 
-        :returns: the new node, -1 if the step is not free, and whether it is the configuration.
+        :returns: the new node, -1 if the step is not free; whether it reaches the configuration.
         """
         here = self._rows[node]
         length = float(_lengths(self._space, (q - here)[None])[0])
@@ -170,7 +170,7 @@ class _Tree:
         return True
 
     def _cut(self, node: int) -> None:
-        """Take a node and all that follow it out of the tree: none of them is near anything."""
+        """Cut off a node and all nodes beyond it: at infinity, they are never the nearest."""
         gone = {node}
         for k in range(node + 1, len(self._before)):
             if self._before[k] in gone:

@@ -4,8 +4,8 @@
 Find a transfer: the way from one configuration of an arm to one of several others.
 
 The tool is retracted along its axis z, the joints move through free space, and the tool
-approaches along its axis z. Each of the three parts begins and ends at rest or in a blend, which
-is for the planner to check.
+approaches along its axis z. Each of the three parts begins and ends at rest or in a blend; the
+planner checks the blends.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from ur_cartesian_driver.planning.travel.joint_path_search import search_joint_p
 
 #: The largest retract and approach [m]; more must be millimetres by mistake.
 MAX_RETRACT = 1.0
-#: The fractions of a length that are tried where it may be shorter.
+#: The fractions of a length that are tried if it may be shortened.
 _SHORTER = (1.0, 0.4, 0.0)
 #: The largest number of samples.
 MAX_SAMPLES = 1_000_000
@@ -34,20 +34,20 @@ MAX_SAMPLES = 1_000_000
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TransferSettings:
     """
-    How a transfer begins and ends, and how it is searched.
+    The lines at both ends of a transfer, and the parameters of its search.
 
     :raises ValueError: a number is out of its range; the text is a clause.
     """
 
-    #: How far the tool is retracted along its axis z before the joints move freely [m].
+    #: The length of the retract along the tool's axis z before the joints move freely [m].
     retract: float = 0.05
-    #: The length of the line along the axis z of the tool on which it arrives [m].
+    #: The length of the approach along the tool's axis z [m].
     approach: float = 0.05
-    #: The samples after which a search gives up.
+    #: The number of samples after which a search gives up.
     max_samples: int = 2000
     #: Another seed finds another way; the same seed finds the same way again.
     seed: int = 0
-    #: Whether retract and approach may be shorter, down to none, where they are not possible.
+    #: Whether retract and approach may be shortened, down to none, if they are not possible.
     shorten: bool = False
 
     def __post_init__(self) -> None:
@@ -70,7 +70,7 @@ class Transfer:
 
     #: (k, 6) [rad]; between two rows the joints move straight.
     waypoints: Floats
-    #: The configuration in which the transfer ends: one of those that were asked for [rad].
+    #: The configuration in which the transfer ends: one of the requested ones [rad].
     goal: Joints
     #: The number of samples that the search took.
     samples: int

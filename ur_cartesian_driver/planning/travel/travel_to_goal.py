@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Begin the plan of a goal with a travel from where the arm stands (``allow_travel``).
+Begin the plan of a goal with a travel from the present position of the arm (``allow_travel``).
 
-The travel is planned as a goal of its own that ends, at rest, in front of the first point. From
-there the client's goal is planned as if the arm stood there. So all texts name points as the
-client numbers them, and in the joined plan the travel is a part of the segment to point 0.
+The travel is planned as a goal of its own that ends, at rest, in front of the first point. Then
+the client's goal is planned as if the arm stood there. So all texts name points as the client
+numbers them, and in the joined plan the travel is a part of the segment to point 0.
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ class _Travel:
             except GoalRefused as error:
                 if refusal is None:
                     refusal = error
-                    # The goal takes less time to plan than another search.
+                    # Planning the goal takes less time than another search.
                     entries = [q for q in entries if self._can_begin(q)]
             else:
                 if travel is None:
@@ -173,7 +173,7 @@ class _Travel:
         return found
 
     def _can_begin(self, q: Joints) -> bool:
-        """Return whether the goal can be executed by an arm that stands at its first point."""
+        """Return whether the goal can be executed from a configuration at its first point."""
         begin = state_at_rest(self._arm, q, self._state.T_flange_tcp)
         try:
             self._plan(self._goal, begin, self._arm, self._options)
@@ -203,7 +203,7 @@ class _Travel:
         raise refusal.reworded(f'{_WHERE}: {refusal}')
 
     def _stops(self, found: Transfer) -> Iterator[_Stop]:
-        """Yield the ends of the motions: the retract, and those of the joints."""
+        """Yield the ends of the motions: of the retract, then of each joint motion."""
         rows = [vector6(row) for row in found.waypoints.tolist()]
         if found.retracts:
             yield _Stop(rows[0], SegmentType.LINEAR)
@@ -230,7 +230,7 @@ class _Travel:
 
 
 def _goal_like(goal: Goal, waypoints: Sequence[Waypoint], segments: Sequence[Segment]) -> Goal:
-    """Return a goal with other points, but the frames of a goal."""
+    """Return a goal with other points in the same frames."""
     return Goal(
         frame_id=goal.frame_id,
         controlled_frame=goal.controlled_frame,
@@ -252,7 +252,7 @@ def _remark(travel: Plan, found: Transfer, reason: str) -> str:
 
 
 def _joined(travel: Plan, rest: Plan, remark: str) -> Plan:
-    """Return the plan of a goal after the plan of the way to it."""
+    """Return the plan of a travel joined with the plan of the goal after it."""
     before, after = travel.rows, rest.rows
     path = replace(travel.reference, point=np.zeros_like(travel.reference.point))
     path = replace(path, fraction=np.zeros_like(travel.reference.fraction))
