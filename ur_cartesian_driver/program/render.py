@@ -16,7 +16,7 @@ Lines of the program that start with ``#!`` are instructions for this module:
 ``#! calls``
     insert the code that calls the functions of the prelude by their numbers.
 ``#! if FEATURE`` ... ``#! end``, ``#! if not FEATURE`` ... ``#! end``
-    keep these lines only if the controller's software has the feature, or has not, because a
+    keep these lines only if the controller's software has, or lacks, the feature, because a
     controller refuses a program that names an unknown function. Two features do not depend on
     the software: lines for ``freedrive`` are kept if the settings allow freedrive, and lines for
     ``prelude`` if the prelude defines functions.
@@ -75,11 +75,11 @@ SERVO_MAX_STEPS = 50
 #: The buffered servo has come to rest at a set-point if the target is within this distance [rad],
 #: and slower than this speed [rad/s]; both are norms over all joints.
 SERVO_END_TOLERANCE, SERVO_REST_SPEED = 1e-4, 1e-3
-#: It is taken to be at rest, too, when the time of the motion, delayed by the lag of servoj, is
-#: within this time [s] of the set-point's: nine lookahead times later.
+#: The buffered servo counts as at rest, too, if the time of the motion, delayed by the lag of
+#: servoj, is within this time [s] of the set-point's time: nine lookahead times later.
 SERVO_SETTLED = 1e-5
 
-#: Stands for the first version with a feature if no version is known to have it; above any.
+#: Placeholder, above any version, for a feature that no version is known to have.
 _NO_VERSION = (1000, 0, 0)
 #: For each feature, the first version of CB3/e-Series and of PolyScope X software that has it.
 FEATURES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
@@ -117,7 +117,7 @@ SPLINE_CONSTANTS: dict[str, float] = {
     #: Largest distance [rad] from the arm to a first point at time 0, as in the client library.
     'START_TOLERANCE': 0.01,
     #: If, at the end of a spline, the arm is farther than this [rad] from the last point, or still
-    #: moves by more than this in a step, a movej covers what remains.
+    #: moves by more than this in a step, a movej covers the rest.
     'END_TOLERANCE': 1e-05,
     #: Acceleration [rad/s^2] and speed [rad/s] of that movej.
     'END_ACCELERATION': 15.0,
@@ -134,14 +134,14 @@ SPLINE_CONSTANTS: dict[str, float] = {
 PRESS_CONSTANTS: dict[str, float] = {
     #: Time [s] for which the arm stands still before force mode begins, as the manual advises.
     'REST_TIME': 0.02,
-    #: Acceleration [m/s^2] and speed [m/s] of the move back to where the contact began.
+    #: Acceleration [m/s^2] and speed [m/s] of the move back to the place of contact.
     'RETURN_ACCELERATION': 0.5,
     'RETURN_SPEED': 0.02,
     #: The step [s] of a CB3 controller; its force mode has no gain scaling.
     'STEP_WITHOUT_GAIN': 0.008,
 }
 
-#: The watch for contact takes the tool for resting below this speed [m/s].
+#: Speed [m/s] below which the watch for contact regards the tool as resting.
 WATCH_REST_SPEED = 0.001
 
 #: Constants of path offsets.
@@ -186,22 +186,22 @@ OUTPUT_COLUMNS = {
 #: whether the output follows the speed now, and the filtered speed [m/s].
 FOLLOW_COLUMNS = ('GAIN', 'OFFSET', 'MINIMUM', 'MAXIMUM', 'FILTER_TIME', 'ACTIVE', 'SPEED')
 
-#: The columns for an output with a lead after the planned speeds: the lead [s], the way that is
-#: left [m or rad], the way that is left at the end of the present piece, the number of this piece,
-#: how fast the time of the path runs, whether the lead runs, and whether the tool only turns.
+#: The columns for an output with a lead, after the planned speeds: the lead [s], the way left
+#: [m or rad], the way left at the end of the present piece, the number of this piece, the rate of
+#: the path's time, whether the lead runs, and whether the tool only turns.
 LEAD_COLUMNS = ('TIME', 'LEFT', 'LEFT_LATER', 'PIECE', 'RATE', 'ACTIVE', 'TURNS')
-#: The columns for the pulses of an output: the distance between them [m], the way left to the next
-#: one [m], their width [s], how many are left, the slot, kind and pin of the output, whether those
-#: that are left at the end are dropped; how long the output stays on [s], whether pulses are
-#: given (1: since this step), and their count.
+#: The columns for the pulses of an output: the distance between pulses [m], the way to the next
+#: one [m], their width [s], their number left, the slot, kind and pin of the output, whether
+#: pulses left at the end are dropped; the time for which the output stays on [s], whether pulses
+#: are given (1: since this step), and their count.
 PULSE_COLUMNS = (
     *('DISTANCE', 'WAY', 'WIDTH', 'LEFT', 'SLOT', 'OUTPUT', 'PIN', 'GOES_ON'),
     *('TIME_ON', 'ACTIVE', 'GIVEN'),
 )
-#: The slowest motion that counts as one [m per cycle]. A slower tool is at a pulse that is no
-#: farther away than this.
+#: The slowest motion that counts as one [m per cycle]. A slower tool is at a pulse if the pulse is
+#: no farther away than this [m].
 PULSE_TOLERANCE = 1e-6
-#: Planned speed [m/s or rad/s] below which the speed does not tell how fast the time runs.
+#: Planned speed [m/s or rad/s] below which the actual speed does not give the rate of the time.
 LEAD_MIN_SPEED = 2e-4
 
 

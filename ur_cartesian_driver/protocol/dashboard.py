@@ -142,7 +142,7 @@ class DashboardRequest:
     argument: str = ''
 
     def __post_init__(self) -> None:
-        """Refuse an unknown command, and an argument that is missing, surplus or several lines."""
+        """Refuse an unknown command, and a missing, surplus or multi-line argument."""
         spec = COMMAND_SPECS.get(self.name)
         if spec is None:
             raise LocalProtocolError(f'{self.name!r} is not a dashboard command.')

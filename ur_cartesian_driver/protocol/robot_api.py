@@ -30,9 +30,9 @@ from ur_cartesian_driver.protocol.dashboard import DashboardReply, DashboardRequ
 BASE_PATH = '/universal-robots/robot-api'
 #: The first software with a Robot API; older PolyScope X has neither this API nor a dashboard.
 FIRST_VERSION = (10, 11)
-#: How the text of a refusal begins if the robot is in local control.
+#: Beginning of a refusal if the robot is in local control.
 FORBIDDEN = 'HTTP 403'
-#: How the text of a refusal begins if the robot's state does not allow the request.
+#: Beginning of a refusal if the robot's state does not allow the request.
 CONFLICT = 'HTTP 409'
 
 _STATE, _PROGRAM = '/robotstate/v1/state', '/program/v1/state'
@@ -209,12 +209,12 @@ def parse_program_names(body: bytes) -> list[str]:
 
 
 def parse_program_name(body: bytes) -> str:
-    """Return the name that the robot gave to a program; empty if it does not say it."""
+    """Return the name that the robot gave to a program; empty if the answer lacks it."""
     return _text(_fields(body).get('programName'))
 
 
 def _fields(body: bytes) -> Mapping[str, Any]:
-    """Return the JSON object in an answer; empty if the answer is none (a proxy's error page)."""
+    """Return the JSON object in an answer; empty without one (as in a proxy's error page)."""
     try:
         fields = json.loads(body)
     except (ValueError, RecursionError):

@@ -30,14 +30,14 @@ CONNECT_TIMEOUT = 2.0
 MAX_UNSENT = 1 << 20
 #: Most data that is read at once [bytes].
 MAX_READ = 1 << 16
-#: How long a closed connection may take to send its remaining data [s].
+#: Longest time for a closed connection to send its remaining data [s].
 LINGER_TIMEOUT = 1.0
 #: Largest number of log lines about clients in a period; this period [s].
 MAX_LINES, WARNING_PERIOD = 3, 60.0
 #: Largest number of different failures to connect that are counted separately.
 MAX_FAILURES = 20
 
-#: What to do when a port cannot be opened.
+#: Remedies if a port cannot be opened.
 REMEDIES = {
     errno.EADDRINUSE: 'another driver may use it; set {name} to a free port or to 0',
     errno.EACCES: 'set {name} to a port above 1023 or to 0',
@@ -186,7 +186,7 @@ async def dial(connection: TcpConnection, host: str, port: int) -> None:
 
 
 def error_reason(error: OSError) -> str:
-    """Return the system's text for an error; asyncio's text has the address or counts attempts."""
+    """Return the system's text for an error; asyncio's adds the address, or counts attempts."""
     if error.errno is not None and error.errno in errno.errorcode:
         return os.strerror(error.errno).lower()
     return error.strerror or str(error)  # such as an unknown host name

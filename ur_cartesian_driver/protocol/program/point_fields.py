@@ -44,8 +44,8 @@ output: words 0 - 11 are the planned speeds from that output's place back to its
 13 is the lead [s], 15 the distance between place and trigger pose [m or rad], and 17 is 1 if the
 tool only turns. Kind 7 gives the law of the pulses that begin with the next record of kind 8:
 words 0 - 7 are the distance between pulses [mm], the way to the first one [m], their width [s],
-their number in millions, the slot of their count, kind and pin of the output, and 1 if those that
-are left at the end of the trajectory are not given.
+their number in millions, the slot of their count, kind and pin of the output, and 1 if pulses left
+at the end of the trajectory are dropped.
 
 The stops, which only our own program knows, are motions during which the arm stands still.
 WAIT waits: word 18 is the time from the end of the previous motion until the next one may begin.
@@ -328,9 +328,9 @@ _STOPS: dict[type[Stop], MotionType] = {
 }
 #: Types whose word 18 is not the duration of a move.
 _WITH_DELAY = frozenset((MotionType.SWITCH_OUTPUT, *_STOPS.values()))
-#: Arcs.
+#: Motion types of arcs.
 ARC_TYPES = frozenset(_ARC_TYPES.values())
-#: Moves other than arcs that have a velocity and an acceleration.
+#: Motion types of moves with a velocity and an acceleration, other than arcs.
 MOVE_TYPES = frozenset(kind for kinds in _TYPES.values() for kind in kinds)
 _OPTIMOVES = frozenset((*_TYPES[OptimoveJ], *_TYPES[OptimoveL]))
 
@@ -460,7 +460,7 @@ def _output_kind(output: SwitchOutput) -> int:
 
 def _law_fields(law: SpeedLaw) -> PointFields:
     numbers = (law.gain, law.offset, law.minimum, law.maximum, law.filter_time, 0)
-    # At a stop, the robot program executes pending outputs of value 0; this record is none.
+    # The value is 1: at a stop, the robot program executes pending outputs of value 0.
     switch = (FollowKind.LAW, 0, 1, 0, 1, 0)
     return (*numbers, *ZERO6, *switch, 0, 0, MotionType.SWITCH_OUTPUT)
 

@@ -26,7 +26,7 @@ from the program   int         26         points of the running trajectory that 
 from the program   double      24         lag: motion time in the buffer [s]
 from the program   double      25 - 30    present path offset (:class:`OffsetOutput`)
 from the program   double      31         feed override of splines, 0 to 1
-from the program   double      32         by how much it has delayed them, in total [s]
+from the program   double      32         total delay of splines by the feed override [s]
 from the program   int         27         set-points carried out
 from the program   int         28         set-points repeated because the arm was not near them
 from the program   int         29         sequence numbers skipped

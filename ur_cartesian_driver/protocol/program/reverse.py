@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The reverse interface: tells the robot program what to do, and how long to wait for a message.
+The reverse interface: orders to the robot program, with the timeout of its next read.
 
 One message is 8 big-endian int32, 32 bytes; S = 1,000,000. The robot sends nothing back.
 
@@ -13,7 +13,7 @@ index  mode          meaning
 3      FORWARD       START: 1 = the path accepts offsets (:mod:`~.registers`)
 4, 5   FORWARD       feed override: fraction of the planned speed of splines x S, and its largest
                      rate of change [1/s] x S; 0 = no override
-1, 2   BUFFERED_     trajectory action, number of points: what is done along the set-points
+1, 2   BUFFERED_     trajectory action, number of points: events along the set-points
        SERVO
 1 - 6  IDLE,         no meaning; URCL sends uninitialized memory
        STOPPED
@@ -62,8 +62,8 @@ class ControlMode(IntEnum):
     #: Trajectories; the points come over the trajectory interface.
     FORWARD = 3
     #: Our own program only: set-points come through RTDE registers (:mod:`~.registers`), are
-    #: buffered and fed to ``servoj``; reverse messages keep the program alive, and start what is
-    #: done along the set-points.
+    #: buffered and fed to ``servoj``; reverse messages keep the program alive, and start the
+    #: events along the set-points.
     BUFFERED_SERVO = 100
 
 
@@ -125,9 +125,9 @@ class ReverseMessage:
 class FeedTarget(NamedTuple):
     """A feed override in FORWARD mode."""
 
-    #: Fraction of the planned speed to go to.
+    #: The target, as a fraction of the planned speed.
     fraction: float
-    #: How fast the feed goes there [1/s].
+    #: Rate at which the feed approaches the target [1/s].
     rate: float
 
     def encode(self) -> tuple[int, int]:

@@ -26,9 +26,10 @@ zeros. All argument words are scaled by 1,000,000 except those marked raw.
 ==  =========================  =================================================================
 
 The driver never sends SET_TOOL_VOLTAGE; its robot program runs it because URCL's program does.
-Neither has URCL's commands 3 and 4 (force mode), 7 and 11 (friction), and 8 (force sensor).
+Driver and robot program lack URCL's commands 3 and 4 (force mode), 7 and 11 (friction), and 8
+(force sensor).
 
-Only START_TOOL_CONTACT is answered: one int32, 0 = contact, 1 = ended before a contact.
+Only START_TOOL_CONTACT is answered: one int32, 0 = contact, 1 = end without contact.
 
 Poses are ``x y z rx ry rz`` [m, rad], as in URScript.
 """
@@ -61,7 +62,7 @@ class ScriptCommand(IntEnum):
 
 
 class TcpPersistence(IntEnum):
-    """How long a TCP lasts; robot programs other than ours ignore this."""
+    """The lifetime of a TCP; robot programs other than ours ignore this."""
 
     #: Until another TCP is set.
     PERMANENT = 0
@@ -73,7 +74,7 @@ class TcpPersistence(IntEnum):
 
 
 class SafeOutputsAction(IntEnum):
-    """What the robot program does with safe outputs; then it reports the command's token."""
+    """An action on safe outputs; after it, the robot program reports the command's token."""
 
     #: Forget the outputs.
     DISARM = 0
@@ -81,8 +82,8 @@ class SafeOutputsAction(IntEnum):
     ARM = 1
     #: Set the outputs now, and forget them.
     SET = 2
-    #: Give the outputs these values after a pause, or the last ones that the goal has given them,
-    #: even if another client has changed them since; what the program remembers stays.
+    #: Give the outputs these values after a pause, or their last values from the goal, even if
+    #: another client has changed them since; the program still remembers the outputs.
     RESTORE = 3
 
 
@@ -234,7 +235,7 @@ def _safe_outputs(outputs: SafeOutputs, _: str) -> list[int]:
     return words
 
 
-#: How a field becomes words, by its annotation. The fields of a command are in wire order.
+#: The encoders of fields to words, by annotation. The fields of a command are in wire order.
 _ENCODERS: Mapping[str, Callable[[Any, str], list[int]]] = {
     'float': lambda value, name: [to_fixed(value, name)],
     'TcpPersistence': _raw,

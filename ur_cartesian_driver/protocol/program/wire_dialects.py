@@ -28,9 +28,9 @@ milliseconds and radii whole millimetres. (The library of that time truncated ti
 which no program can notice.)
 
 Types 4 and 5 came with 2.2, so dialect 2.0 omits them: a program silently skips a type that it
-does not know. On the reverse socket only the stream actions differ. It is not recorded which
-library version introduced which script command, and a program skips unknown commands, too. So only
-the newest dialect sets a temporary TCP for a goal.
+does not know. On the reverse socket only the stream actions differ. The first library version of
+each script command is not recorded, and a program skips unknown commands, too. So only the newest
+dialect sets a temporary TCP for a goal.
 
 The library discusses a 22nd word, the number of a move (``move_id``, its change 552). It will be
 one more row: a dialect then also has the number of its words, which :mod:`~.trajectory_points` and

@@ -109,7 +109,7 @@ def _other_half(is_lower: bool) -> str:
 
 
 class RtdeState(Enum):
-    """State of the handshake; each member's value says what the client waits for, for errors."""
+    """State of the handshake; the values name the expected answers, for error texts."""
 
     NEW = 'start()'
     PROTOCOL_VERSION = 'the answer to the protocol version'
@@ -230,7 +230,7 @@ class RtdeClientCodec:
 
     def feed(self, data: bytes) -> list[RtdeEvent]:
         """
-        Take bytes from the controller (``b''`` = end of stream) and return what happened.
+        Take bytes from the controller (``b''`` = end of stream) and return the events in them.
 
         :raises RemoteProtocolError: the controller violated the protocol, closed the connection
             too early, or lacks a field (:class:`FieldsNotFound`), or another client writes an

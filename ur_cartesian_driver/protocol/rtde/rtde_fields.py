@@ -44,7 +44,7 @@ class DataType(Enum):
         return number if self.length == 1 else (number,) * self.length
 
 
-#: The controller reserves this many int and double registers for fieldbuses: the first ones.
+#: Number of int registers, and of double registers, reserved for fieldbuses: from 0 on.
 LOWER_REGISTERS = 24
 #: Matches the name of an int or double register, and captures its number.
 REGISTER = re.compile(r'(?:in|out)put_(?:int|double)_register_(\d+)')
@@ -132,9 +132,9 @@ OUTPUT_TYPES: Mapping[str, DataType] = {
     **_registers('output'),
 }
 
-#: The fields whose introduction the manufacturer's guide dates: the first software version that
-#: has them on CB3 (None = no version), the same on e-Series, and the pattern of their names. Of
-#: the registers, only those for clients other than fieldbuses are in the table.
+#: Fields for which the manufacturer's guide gives a first software version: this version on CB3
+#: (None = no version has them), the same on e-Series, and the pattern of their names. Registers
+#: for fieldbuses are not in the table.
 _INTRODUCED: tuple[tuple[tuple[int, ...] | None, tuple[int, ...], str], ...] = (
     ((3, 5), (5, 0), r'elbow_(position|velocity)'),
     ((3, 9), (5, 3), r'\w+_bit_register_\d+|\w+_(int|double)_register_(2[4-9]|[34]\d)'),

@@ -92,7 +92,7 @@ class RtdeServerCodec:
         self.output: OutputStream | None = None
         self._inputs: list[Recipe] = []
         self._version = version
-        # Assumed: the request exists because older clients, which do not know it, are served too.
+        # An assumption: a client that never requests a version is an old one, and uses version 1.
         self._protocol = 1
         self._taken = taken_inputs
         self._frequency = frequency
