@@ -185,14 +185,14 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         self._running.abort('The driver was closed.')
 
     def heartbeat(self) -> None:
-        """Tell the robot loop that the owner is alive; due at least every ``node_timeout``."""
+        """Tell the robot loop that the owner is alive, at least once every ``node_timeout``."""
         self._send(OwnerHeartbeat())
 
     # ---- state and status ---------------------------------------------------------------------
 
     @property
     def status(self) -> ConnectionStatus:
-        """The state of the connection, and what to do next to get the robot ready."""
+        """The state of the connection, and the next step to get the robot ready."""
         return self._robot.status
 
     @property
@@ -255,8 +255,8 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         """
         Wait until a goal can run; the driver connects, and reconnects, by itself.
 
-        :raises RobotNotReady: the robot is not ready after ``timeout`` [s]; the text says what to
-            do.
+        :raises RobotNotReady: the robot is not ready after ``timeout`` [s]; the text gives the
+            next step.
         """
         if not self._robot.ready.wait(timeout):
             raise RobotNotReady(self.status.not_ready())
@@ -290,7 +290,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         """
         Return the plan, or a new one if it begins with a travel and the arm has moved since.
 
-        :raises GoalRefused: the goal fails a check from where the arm stands now.
+        :raises GoalRefused: the goal fails a check from the arm's present place.
         :raises RobotNotReady: the robot does not report its state.
         """
         if plan.travelled_goal is None:
@@ -453,9 +453,9 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
 
     def _goal_of(self, path: Path, state: RobotState) -> Goal:
         """
-        Return the goal of a path for the robot in a state.
+        Return the goal of a path, for a state of the robot.
 
-        :raises InvalidGoal: a frame is not known, or the arm is not at the start of the path.
+        :raises InvalidGoal: a frame is unknown, or the arm is not at the start of the path.
         """
         snapshot = ArmSnapshot.of(state)
         goal = path.goal(self.frames, snapshot)

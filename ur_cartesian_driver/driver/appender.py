@@ -68,7 +68,7 @@ def encode_part(part: AppendPlan) -> tuple[bytes, MotionJob]:
         ending_records=part.ending_records,
         spline=part.spline,
     )
-    # A plan that is streamed as set-points needs no records.
+    # A plan streamed as set-points needs no records.
     points = b'' if plan.execution.traits.streams_setpoints else encode_plan(plan)
     return points, replace(job, due=part.end_time)
 
@@ -201,7 +201,7 @@ class Appender:
         if progress is not None:
             self._goal = without_passed(self._goal, progress.time)
             if cut_time(self._goal, new_points) < progress.time:
-                # Motion that was sent but has not run yet cannot be replaced either.
+                # Motion sent but not yet run cannot be replaced either.
                 ahead = progress.buffered if isnan(progress.lag) else progress.lag
                 raise AlreadySent(*first_replaceable(self._goal, progress.time + ahead))
         return self._goal

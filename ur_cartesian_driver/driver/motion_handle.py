@@ -144,7 +144,7 @@ class MotionHandle:
         :param along: offset along the path [m]. Like ``across`` and ``normal`` it is in the frame
             of the path (:mod:`~ur_cartesian_driver.motion.plan.offset_band`), and bounded by
             ``path_offset.limits`` of the goal.
-        :param age: how long ago the offset was measured [s].
+        :param age: time since the offset was measured [s].
         :raises InvalidGoal: the goal permits no offset, a value is not a finite number, or the age
             is more than ``path_offset.timeout``; the previous offset stays.
         """
@@ -177,7 +177,7 @@ class MotionHandle:
         passed: a stale or invalid fraction brings the motion to ``feed_override.minimum``.
 
         :param fraction: of the planned speed, 0 to 1; all other numbers, and NaN, are invalid.
-        :param age: how long ago it was measured [s].
+        :param age: time since the fraction was measured [s].
         :raises InvalidGoal: the goal has no feed override, an input of the robot gives the signal
             (parameter ``feed_override_input``), or a value is not a number.
         """
@@ -201,7 +201,7 @@ class MotionHandle:
         :raises TimeoutError: no outcome came within ``timeout`` [s]; the motion goes on.
         """
         if timeout is None:
-            self._make_report()  # while the arm moves
+            self._make_report()  # done while the arm moves
         return self._outcome.result(timeout)
 
     def add_done_callback(self, callback: Callable[[Outcome], None]) -> None:

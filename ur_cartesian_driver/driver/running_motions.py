@@ -49,7 +49,7 @@ class RunningMotions:
         Send the request that starts a motion.
 
         :param request: the packed request.
-        :param explain_not_ready: returns why the robot accepts no motion; '' = it accepts one.
+        :param explain_not_ready: returns the reason why the robot accepts no motion; '' = none.
         :raises RobotNotReady: the robot accepts no motion, or another motion runs.
         """
         with self._loop.lock:
@@ -125,7 +125,7 @@ class RunningMotions:
                     call.set_result(answer)
 
     def abort(self, text: str) -> None:
-        """End all motions and calls of a robot loop that is gone."""
+        """End all motions and calls of a lost robot loop."""
         self.abort_calls(text)
         with self._loop.lock:
             motions, self._motions = self._motions, {}
@@ -133,7 +133,7 @@ class RunningMotions:
             active.end(Outcome(code=ErrorCode.CONNECTION_LOST, text=text))
 
     def abort_calls(self, text: str) -> None:
-        """Answer all calls of a robot loop that is gone."""
+        """Answer all calls of a lost robot loop."""
         with self._loop.lock:
             calls, self._calls = self._calls, {}
         for call in calls.values():

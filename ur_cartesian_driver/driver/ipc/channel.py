@@ -8,8 +8,7 @@ notification that refuses the message, for a receiver that cannot read it (None 
 no answer). The second has the sizes of the arrays, which follow it, each at a multiple of
 :data:`ALIGNMENT`. The last is the message itself, one of the dataclasses below. Both ends run this
 package, and no other process can open the pipe (a pair of sockets), so pickle is safe here. A
-large plan has 60 MB of arrays: they are sent without a copy, and unpickling copies none of what
-was received (PEP 574).
+large plan has 60 MB of arrays: neither sending nor unpickling copies them (PEP 574).
 """
 
 from __future__ import annotations
@@ -358,7 +357,7 @@ def pack_parts(message: Request | Notification) -> list[Buffer]:
     arrays: list[memoryview] = []
 
     def keep_inside(buffer: pickle.PickleBuffer) -> bool:
-        """Return whether a buffer stays inside of the pickle."""
+        """Return whether a buffer stays inside the pickle."""
         array = buffer.raw()
         is_small = array.nbytes < LARGE_ARRAY
         if not is_small:

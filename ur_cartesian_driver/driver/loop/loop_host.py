@@ -42,7 +42,7 @@ class LoopHost(Protocol):
     memory: state_memory.StateMemory
 
     def join(self) -> None:
-        """End the loop, killing a process that hangs, and release pipe and memory."""
+        """End the loop, if necessary by killing its process, and release pipe and memory."""
 
 
 def start(robot_loop: str) -> LoopHost:

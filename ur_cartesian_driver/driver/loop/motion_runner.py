@@ -142,7 +142,7 @@ class MotionRunner:
     # ---- requests -----------------------------------------------------------------------------
 
     async def start(self, request: StartMotion) -> None:
-        """Start a motion, or refuse it and say why."""
+        """Start a motion, or refuse it with a reason."""
         machine = await run_in_thread_if_large(
             MIN_THREAD_SIZE if is_slow_to_make(request) else len(request.points),
             make_machine,
@@ -171,7 +171,7 @@ class MotionRunner:
             self.handle_event(ContactWatchChanged(is_active=True))
 
     def _refusal(self, job: MotionJob) -> str:
-        """Return why a motion cannot start now; empty if it can."""
+        """Return the reason why a motion cannot start now; '' = it can."""
         if self.is_running or self._ends.is_pending:
             return 'Another motion is running; wait for its end or cancel it.'
         if self._is_changing_settings():
@@ -184,7 +184,7 @@ class MotionRunner:
         return 'The TCP of the robot changed after the goal was planned; send the goal again.'
 
     async def _foreign_program(self, job: MotionJob | None) -> str:
-        """Return why the program on the robot cannot run the motion; empty if it can."""
+        """Return the reason why the running program cannot run the motion; '' = it can."""
         needs = '' if job is None else job.own_program_needs
         if not needs or await self._link.control.tracker.wait_for_identity():
             return ''
@@ -266,7 +266,7 @@ class MotionRunner:
             reason = f'{type(error).__name__}: {error}'.rstrip('.')
             text = f'The motion cannot go on ({reason}).'
             self._pipe.log(logging.ERROR, f'{text} {traceback.format_exc()}')
-            # Stop first: after _finish() the next goal could start in the program that is to end.
+            # Stop first: after _finish() the next goal could start in the program that must end.
             self._link.control.stop(text)
             self._finish(Outcome(code=ErrorCode.EXECUTION_FAILED, text=text))
 
@@ -336,7 +336,7 @@ class MotionRunner:
         self._pipe.send(AppendAnswered(motion=self._number, answer=answer))
 
     def _open_inputs(self, exchange: RegisterExchange) -> None:
-        """Open a connection that claims the RTDE inputs which the running motion writes."""
+        """Open a connection that claims the RTDE inputs of the running motion."""
         self._inputs = RegisterConnection(exchange, lower_registers=self._config.lower_registers)
         self._spawn(
             self._inputs.run(

@@ -37,7 +37,7 @@ class OutputSecurer:
         """
         self._config, self._link = config, link
         self._spawn, self._on_event = spawn, on_event
-        #: Numbers of the newest order, and of the first one of this motion.
+        #: Number of the newest order; number of the first order of this motion.
         self._newest = self._first = 0
         #: Number of orders whose first attempt has not ended.
         self._pending = 0

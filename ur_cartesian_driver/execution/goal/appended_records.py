@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Accept, replace or refuse the records that are appended to an open goal (keep_open)."""
+"""Accept, replace or refuse records appended to an open goal (keep_open)."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class AppendedRecords(Phrasing, Reporting):
         self._is_resting = False
 
     def location(self, *, started: bool) -> str:
-        """Return where the arm waits for points, as a clause; '' while it moves."""
+        """Return the place where the arm waits for points, as a clause; '' while it moves."""
         if not self._is_resting:
             return ''
         return f'at rest behind point {self._last_stop_point}, waiting for more'

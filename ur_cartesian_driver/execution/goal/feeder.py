@@ -18,7 +18,7 @@ The word feed has two meanings here. A feeder *feeds* the robot (:meth:`Feeder.f
 a motion, as a fraction of the planned one (``feed_override``).
 
 To add a capability, write its class here, add a line to :class:`Capabilities`, use it in the
-machine, and let the feeder or part that has it inherit from the class. The other feeders need no
+machine, and derive the feeder or part that has it from the class. The other feeders need no
 change.
 """
 
@@ -94,7 +94,7 @@ class Prepared:
 
     def explain_not_ready(self, packet: RobotState | None) -> str:
         """
-        Return why the motion cannot begin yet, as a clause; '' = it can begin.
+        Return the reason why the motion cannot begin yet, as a clause; '' = none.
 
         :param packet: the newest packet of the robot; None before the first packet.
         """
@@ -104,7 +104,7 @@ class Prepared:
 class Appendable:
     """The client can append points while the goal runs, or replace the tail of the motion."""
 
-    #: How long a goal waits at rest for more points [s]; 0 = without limit.
+    #: Longest wait at rest for more points [s]; 0 = no limit.
     append_timeout = 0.0
 
     def append(self, append_job: AppendJob, state: GoalState) -> list[GoalCommand]:
@@ -235,7 +235,7 @@ class Streaming:
 
 
 class Phrasing:
-    """The texts of the outcome differ from those for motions sent as points."""
+    """The outcome has its own texts, not the default ones for motions sent as points."""
 
     def success_text(self) -> str:
         """Return the sentence for a success; '' = the sentence about points."""

@@ -36,7 +36,7 @@ class SetFeedTarget(GoalCommand):
 
     #: Fraction of the planned speed, 0 to 1.
     fraction: float
-    #: How fast the feed changes [1/s].
+    #: Rate at which the feed changes [1/s].
     rate: float
 
 

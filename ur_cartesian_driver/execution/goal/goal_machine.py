@@ -100,7 +100,7 @@ class GoalMachine:
         self.feeder = feeder
         #: The capabilities of the feeder.
         self.can = Capabilities(feeder)
-        #: The TCP that was set for this goal, if any. If its ``is_restored`` is False when the
+        #: The TCP set for this goal, if any. If its ``is_restored`` is False when the
         #: goal ends, the owner of the sockets restores the original TCP.
         self.temporary_tcp: TemporaryTcp | None = None
         self._monitor = feeder.monitor
@@ -119,7 +119,7 @@ class GoalMachine:
 
     @property
     def job(self) -> MotionJob:
-        """The job that was appended last, or the goal's first job if nothing was appended."""
+        """The last appended job, or the goal's first job if nothing was appended."""
         return self._monitor.job
 
     def start(self, packet: RobotState) -> list[GoalCommand]:
@@ -190,7 +190,7 @@ class GoalMachine:
         return MotionStatus(self._monitor.waypoint(), self.feeder.buffered, self.can.streaming.lag)
 
     def end_time_of(self, records: int) -> float:
-        """Return when the first ``records`` records are planned to end [s]."""
+        """Return the planned end of the first ``records`` records [s]."""
         return self._monitor.records.end_time(records)
 
     def _observe(self, packet: RobotState, now: float) -> list[GoalCommand]:
@@ -307,7 +307,7 @@ class GoalMachine:
         """
         Return whether the robot is prepared for the motion.
 
-        A TCP that was set for the goal must be active, and be at the start of the plan.
+        A TCP set for the goal must be active, and at the start of the plan.
         """
         tcp = self.temporary_tcp
         return (

@@ -47,7 +47,7 @@ class GoalMonitor:
         :param max_plan_deviation: the largest distance [m] and angle [rad] of the controller's
             own target from the plan; 0 = no limit.
         """
-        #: The job that was appended last, or the first job; the records of the whole goal.
+        #: The last appended job, or the first job; the records of the whole goal.
         self.job, self.records = job, WireRecords(job)
         self._start = pose_from_row(job.reference.poses[0])
         self._tracker = PathTracker(job.reference)
@@ -92,7 +92,7 @@ class GoalMonitor:
 
         :param stale_begun: the count of begun motions that the robot reports until it reads START:
             the register keeps the previous goal's count, so the count is trusted once it changes.
-        :param sent: number of records of the goal that were sent before.
+        :param sent: number of records of the goal sent before.
         """
         self._stale_begun, self._awaits_count = stale_begun, True
         self._motions_begun = self._motions_before = self.records.motions_before(sent)
@@ -200,7 +200,7 @@ class GoalMonitor:
         return self._tracker.place() if self._has_begun else None
 
     def buffered(self, sent: int) -> float:
-        """Return the planned time of the records that were sent and lie ahead of the arm [s]."""
+        """Return the planned time of the sent records ahead of the arm [s]."""
         return max(0.0, self.records.end_time(sent) - self._tracker.time())
 
     def records_begun(self) -> int:
@@ -279,7 +279,7 @@ class GoalMonitor:
         return self.script_call()[1] or f'on the way to point {self.waypoint()}'
 
     def contact_clause(self, state: RobotState) -> str:
-        """Return the place where the tool touched, as the beginning of a sentence."""
+        """Return the place of contact, as the beginning of a sentence."""
         x, y, z = state.actual_tcp_pose.position
         place = self._tracker.place()
         return (
@@ -343,7 +343,7 @@ class GoalMonitor:
         return ''
 
     def goal_violation(self, state: RobotState) -> str | None:
-        """Return how far the arm is outside the goal tolerance, as a clause, or None."""
+        """Return a clause if the arm is outside the goal tolerance, else None."""
         desired, press = self._tracker.pose(), self._press()
         if press is not None:
             state = press.stiff_state(desired, state)
@@ -388,7 +388,7 @@ class GoalMonitor:
         return self._speed_check.violation(state.target_tcp_twist, self.scaled_time, self.time())
 
     def _path_violation(self, state: RobotState) -> str | None:
-        """Return how far the arm is outside the path tolerance, as a clause, or None."""
+        """Return a clause if the arm is outside the path tolerance, else None."""
         press = self._press()
         checked = self._path_check or press or self._joint_check.has_path
         if not (checked and self._has_begun):

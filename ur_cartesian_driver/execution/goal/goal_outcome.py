@@ -71,7 +71,7 @@ class GoalOutcome:
         """
         Return the outcome for the client.
 
-        :param tcp: the TCP that was set for the goal, if any.
+        :param tcp: the TCP set for the goal, if any.
         """
         monitor = self._monitor
         has_place = not self.succeeds and len(monitor.job.waypoint)
@@ -92,7 +92,7 @@ class GoalOutcome:
         return self._can.phrasing.success_text() or self._monitor.success_text()
 
     def _failure_text(self) -> str:
-        """Return the sentence of a goal that failed: the cause, and the place."""
+        """Return the sentence for a failed goal: the cause, and the place."""
         location, laws = 'before anything moved', ''
         if self._code is ErrorCode.GOAL_TOLERANCE_VIOLATED:
             location, laws = 'at the last point', self._monitor.law_clause()

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The signal for a goal whose deadline in its present state has passed, and the reason."""
+"""The signal for a goal that has missed the deadline of its state, and the reason."""
 
 from __future__ import annotations
 

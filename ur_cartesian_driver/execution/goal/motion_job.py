@@ -67,7 +67,7 @@ class MotionJob:
     reference: ReferencePath
     #: Expected time from the start of the goal to the end of the motion, at full speed [s].
     duration: float
-    #: When the last point is due [s]; None = the goal gives no times.
+    #: Due time of the last point [s]; None = the goal gives no times.
     due: float | None = None
     #: Delay of the last output after the end of the motion [s]; ``due`` includes it.
     output_delay: float = 0.0
@@ -86,7 +86,7 @@ class MotionJob:
     joint_tolerances: JointTolerances | None = None
     #: Allowed delay of the end [s]; 0 = the default, negative = no limit.
     goal_time_tolerance: float = 0.0
-    #: Whether the robot program reports how many motions it has begun.
+    #: Whether the robot program reports the number of motions that it has begun.
     reports_points_begun: bool = True
     #: Whether speeds are checked against the plan: not for OPTIMIZED moves, whose speeds the robot
     #: chooses, nor for open goals and set-points.
@@ -138,7 +138,7 @@ class MotionJob:
     holds: tuple[Hold, ...] = ()
 
     def __post_init__(self) -> None:
-        """Fill in the columns that are left empty."""
+        """Fill in the empty columns."""
 
         def fill(name: str, value: NDArray[Any]) -> None:
             if not len(getattr(self, name)):
@@ -177,15 +177,15 @@ class MotionJob:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AppendJob:
-    """Records that are appended to an open goal."""
+    """Records appended to an open goal."""
 
     #: The number of this request; the answer carries the same number.
     number: int
-    #: Number of records of the goal that stay; the appended records follow them, and replace any
+    #: Number of kept records of the goal; the appended records follow them, and replace any
     #: later ones.
     records_before: int
     #: The appended records, with times since the start of the goal; the reference path continues
-    #: the records that stay. None = the client closes the goal, which gets no more points.
+    #: the kept records. None = the client closes the goal, which gets no more points.
     job: MotionJob | None
     #: Time at which the new motion leaves the plan of the kept records [s]; None = at their end.
     cut_time: float | None = None

@@ -116,7 +116,7 @@ class OutputGuard:
         self._changed = event.changed
 
     def fault(self) -> str:
-        """Return why the goal cannot go on after a pause, as a clause, or ''."""
+        """Return the reason why the goal cannot go on after a pause, as a clause, or ''."""
         if self._is_held or not self._changed:
             return ''
         lost = [output for output in self._changed if not output.restore]

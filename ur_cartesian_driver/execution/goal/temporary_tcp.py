@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The TCP that is set for a goal that moves another frame, until the original TCP is restored.
+The TCP set for a goal that moves another frame, until the original TCP is restored.
 
-Only the TCP that the robot reports is relied on, never the one that was sent: a paused program
+Only the reported TCP counts, never the one on its way to the robot: a paused program
 reads nothing, an ended program may have restored the TCP by itself, and somebody else may have set
 another TCP, which must not be overwritten.
 """
@@ -16,7 +16,7 @@ from ur_cartesian_driver.execution.goal.goal_transitions import is_at_rest
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
-#: The largest distance [m] and angle [rad] of a reported TCP from the one that was sent: values
+#: The largest distance [m] and angle [rad] of a reported TCP from the sent one: values
 #: on the wire have a resolution of 1e-6.
 TCP_RESOLUTION = 2e-6
 #: Longest time until the robot reports a TCP that a command has set [s]; after that the command
@@ -32,7 +32,7 @@ def same_tcp(a: Pose, b: Pose) -> bool:
 
 
 class TemporaryTcp:
-    """Tracks a TCP that was set for a goal, until the original one is restored."""
+    """Tracks a TCP set for a goal, until the original one is restored."""
 
     def __init__(self, T_flange_original: Pose, T_flange_temporary: Pose) -> None:
         """

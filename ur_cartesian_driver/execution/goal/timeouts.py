@@ -8,17 +8,17 @@ from __future__ import annotations
 #: brakes within a second from full speed, and the program discards the points in flight within
 #: 0.5 s.
 STOP_TIMEOUT = 3.0
-#: How long the robot may take to report a TCP that was set, to confirm the outputs of a goal, or
-#: to get ready for set-points [s]: longer than the time after which a silent RTDE connection is
-#: given up, so that the outcome names the connection if that is the reason.
+#: Longest time for the robot to report a new TCP, to confirm the outputs of a goal, or to get
+#: ready for set-points [s]: longer than the time after which a silent RTDE connection is given up,
+#: so that the outcome names the connection if this is the reason.
 ARMING_TIMEOUT = 1.2
-#: How long the robot program may take to confirm that the outputs of a goal are safe [s]; after
-#: that the driver writes them itself.
+#: Longest time for the robot program to confirm the safe outputs of a goal [s]; after that the
+#: driver writes them itself.
 SAFE_OUTPUTS_TIMEOUT = 0.2
-#: How long after an early CANCELED the program may still begin its first point [s].
+#: Time after an early CANCELED in which the program may still begin its first point [s].
 EARLY_CANCELED_TIMEOUT = 1.0
-#: How long to wait for a deeper reason after the robot program has ended [s]: connections that
-#: die together are reported some cycles apart.
+#: Wait for a deeper reason after the end of the robot program [s]: connections that die together
+#: are reported some cycles apart.
 CAUSE_TIMEOUT = 0.1
 
 #: The clause for a motion for which the robot did not grant its RTDE inputs.

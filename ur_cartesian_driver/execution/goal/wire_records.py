@@ -76,11 +76,11 @@ class WireRecords:
         return self._first_motion + bisect_left(self._motions, record) if record else 0
 
     def end_time(self, records: int) -> float:
-        """Return when the first ``records`` records are planned to end [s]."""
+        """Return the planned end of the first ``records`` records [s]."""
         return self._end_times[records - 1 - self._first] if records > 0 else 0.0
 
     def request_time(self, records: int) -> float:
-        """Return when the robot program asks for the record after the first ``records`` [s]."""
+        """Return the time of the request for the record after the first ``records`` [s]."""
         return self._request_times[records - 1 - self._first] if records > 0 else 0.0
 
     def count_until(self, time: float) -> int:

@@ -74,7 +74,7 @@ class LiveTargets(Steerable, Ageing, Reporting):
         self.generator.set_target(T_base_tcp)
 
     def age(self, now: float) -> list[GoalCommand]:
-        """Drop a target that is too old, end the session after its timeout, warn of a limit."""
+        """Drop a stale target, end the session after its timeout, warn of a limit."""
         generator = self.generator
         if not generator.blocked:
             self._warnings.forget()
@@ -105,7 +105,7 @@ class LiveTargets(Steerable, Ageing, Reporting):
 
     @property
     def report(self) -> tuple[str, ...]:
-        """The lines about targets that were followed or ignored, and about stops."""
+        """The lines about followed and ignored targets, and about stops."""
         taken, dropped = self.freshness.accepted, self.freshness.dropped
         age = f'older than {self.settings.max_age:g} s'
         lines = [f'{counted(taken, "target")} followed']

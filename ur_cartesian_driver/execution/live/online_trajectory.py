@@ -227,7 +227,7 @@ class OnlineTrajectoryGenerator:
 
     def _violation_when_braking(self, linear: Vector3, angular: Vector3, dt: float) -> str:
         """
-        Return why the tool must not move at these velocities, or ''.
+        Return the reason against moving at these velocities, or ''.
 
         Checks the pose where the tool would come to rest if it braked with the full acceleration.
         """
@@ -240,7 +240,7 @@ class OnlineTrajectoryGenerator:
         return self._violation_at_stop(stop)
 
     def _violation_at_stop(self, stop: Pose) -> str:
-        """Return why the tool must not come to rest at a pose, or ''."""
+        """Return the reason against coming to rest at a pose, or ''."""
         flange = stop @ self._T_tcp_flange
         q = track_pose(self._arm, flange, self._q_stop) or track_pose(self._arm, flange, self.q)
         if q is None:
@@ -277,7 +277,7 @@ class _BoundsCheck:
 
     def violation(self, q: Joints, q_now: Joints) -> str:
         """
-        Return why the arm must not come to rest at q [rad], or ''.
+        Return the reason against coming to rest at q [rad], or ''.
 
         An arm that is already too near to a bound may move away from it.
         """

@@ -83,7 +83,7 @@ class Edge(NamedTuple):
     length_squared: float
 
     def nearest(self, point: TrackerPoint, lowest: float, highest: float) -> tuple[float, float]:
-        """Return the fraction of the edge that is nearest to a point, and its distance."""
+        """Return the fraction of the edge nearest to a point, and its distance."""
         # Seven numbers written out take half the time of loops over them.
         px, py, pz, pa, pb, pc, pd = point
         ox, oy, oz, oa, ob, oc, od = self.origin
@@ -411,7 +411,7 @@ class PathTracker:
         """
         Return the nearest position on the edges ``first`` to ``end``, and its distance.
 
-        Of several positions that are equally near, the earliest is returned.
+        Of several equally near positions, the earliest is returned.
 
         :param lowest: smallest fraction of the first edge.
         :param highest: largest fraction of the last edge.

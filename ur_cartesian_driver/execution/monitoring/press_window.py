@@ -71,7 +71,7 @@ class PressWindow:
         """
         Return a pose as it would be if the tool had not given way.
 
-        :param share: the fraction of the yield that is kept.
+        :param share: the fraction of the yield to keep.
         """
         q_base_task = self._axes(planned)
         shift, turn = self._errors(planned, pose)

@@ -49,7 +49,7 @@ class SpeedCheck:
 
     def violation(self, twist: Vector6, elapsed: float, planned: float) -> str | None:
         """
-        Return the bound on speed or duration that is exceeded, as a clause, or None.
+        Return the exceeded bound on speed or duration, as a clause, or None.
 
         :param twist: twist of the controller's own target.
         :param elapsed: time since the start, as the controller's clock ran [s].

@@ -60,7 +60,7 @@ class ToleranceCheck:
 
         :param tolerance: the limits; 0 or negative = no limit. Defaults were filled in before.
         :param T_base_frame: frame of the goal; all errors except orientation are in its axes.
-        :param T_tcp_controlled: the frame that is compared, relative to the TCP.
+        :param T_tcp_controlled: the compared frame, relative to the TCP.
         """
         self._q_frame_base = conjugate(T_base_frame.quaternion)
         self._T_tcp_controlled = None if T_tcp_controlled == IDENTITY else T_tcp_controlled
@@ -149,7 +149,7 @@ def _rate(name: str, unit: str, field: str, first: int) -> ToleranceQuantity:
 
 #: Index of the first of the three axes in twists and accelerations.
 _LINEAR, _ANGULAR = 0, 3
-#: All quantities that have a tolerance; planning refuses limits on values that are not reported.
+#: All quantities that have a tolerance; planning refuses limits on unreported values.
 QUANTITIES: tuple[ToleranceQuantity, ...] = (
     ToleranceQuantity('position', 'm', lambda t: t.position, _position),
     ToleranceQuantity('orientation', 'rad', lambda t: t.orientation, _orientation),

@@ -91,7 +91,7 @@ class FeedRequests(Overridable, Ageing, Reporting):
 
     @property
     def report(self) -> tuple[str, ...]:
-        """The lines about the values that were followed or ignored, and about the delay."""
+        """The lines about followed and ignored values, and about the delay."""
         taken, dropped = self._freshness.accepted, self._freshness.dropped
         lines = [
             f'feed_override: {counted(taken, "value")} followed; the feed went down to '

@@ -83,7 +83,7 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
 
     @property
     def report(self) -> tuple[str, ...]:
-        """The lines about offsets that were followed, ignored or cut, and the largest offset."""
+        """The lines about followed, ignored and cut offsets, and the largest offset."""
         taken, dropped = self._freshness.accepted, self._freshness.dropped
         largest = ', '.join(
             f'{1e3 * value:.2f} mm {name}'

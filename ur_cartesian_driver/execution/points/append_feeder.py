@@ -11,9 +11,9 @@ until it is told their number. Three rules hold whatever is appended:
   a blend; after a spline a braking piece), and the ending is held back. If no more points have
   come by ``margin`` seconds before the program would ask for the next one, the ending is sent, and
   the stream is closed with the number of its records.
-* Records that were sent cannot be replaced, and a program that is cancelled has to read all of
-  them. So only ``horizon`` seconds of motion are sent ahead.
-* Memory does not grow: records that were sent, and the path behind the arm, are forgotten.
+* Sent records cannot be replaced, and a cancelled program has to read all of them. So only
+  ``horizon`` seconds of motion are sent ahead.
+* Memory does not grow: sent records, and the path behind the arm, are forgotten.
 
 Only goals with keep_open have the states RUNNING_OUT and AWAITING_POINTS
 (:mod:`~.goal_transitions`).
@@ -44,9 +44,9 @@ class AppendFeeder(PointFeeder, Appendable):
         self, monitor: GoalMonitor, *, horizon: float, margin: float, timeout: float
     ) -> None:
         """
-        Begin with the records that are known so far; nothing is sent yet.
+        Begin with the records known so far; nothing is sent yet.
 
-        :param horizon: motion time that is sent to the program ahead of the arm [s].
+        :param horizon: motion time sent to the program ahead of the arm [s].
         :param margin: the stream is closed this long before the robot program would ask for a
             missing point [s].
         :param timeout: longest wait at rest for more points [s]; 0 = no limit.
@@ -55,7 +55,7 @@ class AppendFeeder(PointFeeder, Appendable):
         self._horizon, self._margin, self.append_timeout = horizon, margin, timeout
         self._appended = AppendedRecords(monitor)
         self.parts = (self._appended,)
-        #: Number of records of the goal that were sent before the present stream.
+        #: Number of records of the goal sent before the present stream.
         self._stream_first_record = 0
         #: Whether the length of the present stream was sent.
         self._is_stream_end_sent = False
@@ -65,7 +65,7 @@ class AppendFeeder(PointFeeder, Appendable):
     # ---- points that come ---------------------------------------------------------------------
 
     def append(self, append_job: AppendJob, state: GoalState) -> list[GoalCommand]:
-        """Accept all points or none; return the answer, and the records that are due."""
+        """Accept all points or none; return the answer, and the due records."""
         sent = self._window.sent
         answer = self._appended.append(
             append_job, state, sent=sent, sent_until=self.monitor.records.end_time(sent)

@@ -32,7 +32,7 @@ class PointFeeder(Feeder):
         Return START with the first points, or CANCEL.
 
         A goal that ends while its trajectory runs (a connection other than the program's is lost)
-        cancels it, too: points that were sent and not read would run in the next goal.
+        cancels it, too: sent but unread points would run in the next goal.
         """
         was_running = self._is_running
         self._is_running = state in (GoalState.MOVING, GoalState.RUNNING_OUT)
@@ -52,7 +52,7 @@ class PointFeeder(Feeder):
         return [start, *self._release()]
 
     def _sent_points(self) -> int:
-        """Return the number of points of the trajectory that were sent."""
+        """Return the number of sent points of the trajectory."""
         return self._window.sent
 
     def feed(self, event: Event, now: float) -> list[GoalCommand]:
@@ -64,5 +64,5 @@ class PointFeeder(Feeder):
 
     @property
     def buffered(self) -> float:
-        """Planned time of the records that were sent and lie ahead of the arm [s]."""
+        """Planned time of the sent records ahead of the arm [s]."""
         return self.monitor.buffered(self._window.sent)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The bound on records that are on their way to the robot."""
+"""The bound on records on their way to the robot."""
 
 from __future__ import annotations
 

@@ -3,10 +3,10 @@
 """
 The feeder of a keep_open goal that runs through the buffered servo.
 
-The driver makes the set-points. Those already made are final; the rest of the curve, its ending
-included, can still be replaced, with immediate effect. A goal whose set-points reach the ending
-comes to rest (RUNNING_OUT, :mod:`~ur_cartesian_driver.execution.goal.goal_transitions`); points
-that come later continue from that rest.
+The driver makes the set-points. Set-points already made are final; the rest of the curve,
+including its ending, can still be replaced, with immediate effect. A goal whose set-points reach
+the ending comes to rest (RUNNING_OUT,
+:mod:`~ur_cartesian_driver.execution.goal.goal_transitions`); later points continue from that rest.
 """
 
 from __future__ import annotations

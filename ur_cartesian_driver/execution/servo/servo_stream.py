@@ -61,7 +61,7 @@ STALL_DECELERATION = 4.0
 #: If the last sequence number that the robot has read is not below this, ours begin at 1: long
 #: before the register overflows.
 MAX_SEQUENCE = 2**30
-#: Steps of the robot's clock that are negative or longer than this are taken as 0 [s].
+#: Negative steps of the robot's clock, and steps longer than this [s], count as 0.
 MAX_CLOCK_GAP = 1.0
 #: Shortest and longest control step of existing robots [s].
 MIN_STEP, MAX_STEP = 0.002, 0.008
@@ -220,7 +220,7 @@ class ServoStream:
         self.next_hold = inf
         #: Total delay of the motion by such holds, beyond rests of the source [s].
         self.held_time = 0.0
-        #: Time of the motion [s]: time of the source without the rests that were left out.
+        #: Time of the motion [s]: time of the source without the skipped rests.
         self._moved_time = 0.0
         #: Whether LEAVING may end when the program has left; until then the writes go on.
         self.may_leave = True
@@ -246,7 +246,7 @@ class ServoStream:
 
     @property
     def in_flight(self) -> float:
-        """Motion time that was sent and not carried out yet [s]."""
+        """Motion time sent and not carried out yet [s]."""
         return self._state_time - self._read_time + self.buffered
 
     @property

@@ -11,8 +11,8 @@ import numpy as np
 from ur_cartesian_driver.motion.geometry.vectors import Vector6, vector6
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 
-#: Number of set-points of a spline that are computed at a time: in an array each takes a fiftieth
-#: of the time that it takes alone.
+#: Number of set-points of a spline computed at a time: in an array each takes a fiftieth of the
+#: time that it takes alone.
 BATCH = 128
 _TIME_TOLERANCE = 1e-12
 
@@ -47,7 +47,7 @@ class SplineSetpoints:
         """Begin at the start of the spline."""
         #: The curve, without the pieces already passed.
         self.spline = spline
-        #: The time of the set-point that was returned last [s].
+        #: The time of the last returned set-point [s].
         self.time = float(spline.times[0])
         self._step, self._rows, self._row = 0.0, list[Vector6](), 0
         self._current = vector6(spline.at(self.time)[0].tolist())
