@@ -104,11 +104,11 @@ SPLINE_CONSTANTS: dict[str, float] = {
     #: If the arm reaches more than this fraction of the planned speed, the speed slider is assumed
     #: not to shorten the next step.
     'FULL_SPEED': 0.999,
-    #: Smallest fraction of a step that is planned, even if the arm nearly stands still.
+    #: Smallest planned fraction of a step, even if the arm nearly stands still.
     'MIN_FRACTION': 0.01,
     #: A call has taken one step if the arm moved the planned distance, to within this fraction.
     'SAME_STEP': 0.02,
-    #: Fraction of the position error that is corrected in one step.
+    #: Fraction of the position error corrected in one step.
     'CORRECTION': 0.4,
     #: Largest deceleration [rad/s^2] at the end of the last piece, as in the client library.
     'MAX_DECELERATION': 15.0,
@@ -159,7 +159,7 @@ OFFSET_CONSTANTS: dict[str, float] = {
     'TOLERANCE': ARRIVAL_TOLERANCE,
     #: The offset's time runs at a rate that follows the motion's: largest change [1/s].
     'RATE_CHANGE': 10.0,
-    #: A step of the offset's time that is not longer than this [s] does not move the offset.
+    #: A step of the offset's time up to this [s] does not move the offset.
     'MIN_TIME': 1e-6,
     #: The tool is on its path if its offset is not larger than this [m].
     'GONE': 1e-6,
@@ -230,7 +230,7 @@ class ProgramSettings:
     servo_buffer_depth: int = 250
     #: Whether the buffered servo may switch to freedrive.
     allow_freedrive: bool = False
-    #: Whether the program uses the int and double registers from 0 on, not those from 24 on.
+    #: Whether the program uses the int and double registers from 0 on, not from 24 on.
     lower_registers: bool = False
     #: The motion version that the program sets for itself; 0 = none.
     motion_version: int = 0
@@ -408,7 +408,7 @@ def _message_constants() -> Iterator[str]:
 
 
 def _output_constants() -> Iterator[str]:
-    """Yield the constants of safe outputs, and of outputs that are switched along the path."""
+    """Yield the constants of safe outputs, and of outputs switched along the path."""
     yield from _enum('SAFE_OUTPUTS', script_command.SafeOutputsAction)
     # Indices in the list that the robot reads; its length, command, action and token come first.
     yield 'SAFE_DIGITAL = 4'

@@ -140,7 +140,7 @@ class FrameBuffer:
 
         :param size_width: width of the size field [bytes].
         :param min_size: smallest size of a frame [bytes].
-        :param max_size: largest size that is accepted [bytes]; it bounds the memory.
+        :param max_size: largest accepted size [bytes]; it bounds the memory.
         :param what: the name of a frame, for error texts.
         """
         self._width = size_width
@@ -199,7 +199,7 @@ class LineBuffer:
         """
         Start empty.
 
-        :param limit: longest line that is accepted [bytes]; it bounds the memory.
+        :param limit: longest accepted line [bytes]; it bounds the memory.
         """
         self._limit, self._encoding = limit, encoding
         self._rest = b''
@@ -229,7 +229,7 @@ def decode_text(data: bytes, encoding: str = 'utf-8') -> str:
     return data.decode(encoding, 'backslashreplace')
 
 
-#: Longest text from a robot that is shown to people [characters].
+#: Longest text from a robot shown to people [characters].
 _MAX_SHOWN = 400
 
 

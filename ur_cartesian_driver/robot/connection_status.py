@@ -45,7 +45,7 @@ class ConnectionStatus:
     ports: Mapping[str, int] = field(default_factory=dict)
 
     def not_ready(self) -> str:
-        """Return a sentence that says why no goal can run now; empty when a goal can run."""
+        """Return the reason why no goal can run now, as a sentence; empty when a goal can run."""
         if self.state is ConnectionState.READY:
             return ''
         return self.message or f'The connection is {self.state.name}.'
@@ -172,7 +172,7 @@ def required_action(
 
 
 def _needed_to_start(headless_mode: bool, foreign_program: bool) -> str:
-    """Return the sentence that says how to start our program."""
+    """Return the sentence about starting our program."""
     if foreign_program:
         remedy = (
             'call resend_robot_program'

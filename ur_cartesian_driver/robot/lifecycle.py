@@ -54,8 +54,7 @@ class ConnectionEvent(Enum):
 
 S, E = ConnectionState, ConnectionEvent
 
-#: State -> event -> next state. An event that is not in the row of a state leaves it
-#: unchanged.
+#: State -> event -> next state. An event missing in the row of a state leaves the state unchanged.
 TRANSITIONS: Mapping[ConnectionState, Mapping[ConnectionEvent, ConnectionState]] = {
     S.DISCONNECTED: {E.ROBOT_ANSWERED: S.CONNECTING},
     S.CONNECTING: {

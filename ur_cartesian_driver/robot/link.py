@@ -159,7 +159,7 @@ class RobotLink:
 
     @property
     def status(self) -> ConnectionStatus:
-        """The state of the connection, and what to do next before a goal can run."""
+        """The state of the connection, and the next step before a goal can run."""
         return self._status.current
 
     async def run(self) -> None:

@@ -5,11 +5,11 @@ The primary interface: the robot reports its model and errors, and accepts progr
 
 A goal continues while this connection is lost and established again.
 
-The robot decides when a client connects whether the client may send: a connection that was made in
-local control stays read-only after the switch to remote control, and every request on it is
-refused with C210. Nothing else reveals this, so after a refusal the client connects again, and
-sends the refused request once more if it is still wanted. The robot drops connections when it is
-switched back to local control.
+The robot decides when a client connects whether the client may send: a connection made in local
+control stays read-only after the switch to remote control, and every request on it is refused with
+C210. Nothing else reveals this, so after a refusal the client connects again, and sends the
+refused request once more if it is still wanted. The robot drops connections when it is switched
+back to local control.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ READ_ONLY_CODE = 210
 SECONDARY_EXCEPTION = 'SECONDARY_PROGRAM_EXCEPTION'
 #: Beginnings of the text of an exception if the robot could not compile a program.
 COMPILE_ERRORS = ('compile_error_', 'syntax_error_')
-#: Largest age of a request that is repeated [s], so that a much later switch to remote control
+#: Largest age of a repeated request [s], so that a much later switch to remote control
 #: does not carry out an old request.
 REPEAT_TIMEOUT = 1.0
 
@@ -114,7 +114,7 @@ class PrimaryClient:
         return [request for request in requests if now - request.time < REPEAT_TIMEOUT]
 
     def _send_again(self) -> None:
-        """Send the requests refused on the last connection, and those that came since."""
+        """Send the requests refused on the last connection, and later ones."""
         self._is_reconnecting = False
         requests, self._sent, self._to_send = self._recent(self._to_send), [], []
         for request in requests:

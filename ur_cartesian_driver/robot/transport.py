@@ -28,13 +28,13 @@ CONNECT_TIMEOUT = 2.0
 #: Most data that may wait for the other side to read it [bytes]: more than a send window of
 #: points; it bounds the memory.
 MAX_UNSENT = 1 << 20
-#: Most data that is read at once [bytes].
+#: Most data read at once [bytes].
 MAX_READ = 1 << 16
 #: Longest time for a closed connection to send its remaining data [s].
 LINGER_TIMEOUT = 1.0
 #: Largest number of log lines about clients in a period; this period [s].
 MAX_LINES, WARNING_PERIOD = 3, 60.0
-#: Largest number of different failures to connect that are counted separately.
+#: Largest number of different failures to connect, each with a count of its own.
 MAX_FAILURES = 20
 
 #: Remedies if a port cannot be opened.
@@ -151,7 +151,7 @@ class TcpConnection(asyncio.BufferedProtocol):
         """
         Close when the data sent so far has gone out, or after :data:`LINGER_TIMEOUT`.
 
-        :param reason: reason that is passed to ``on_closed``.
+        :param reason: the reason for ``on_closed``.
         """
         self._reason = self._reason or reason
         if self._transport is not None:
@@ -384,7 +384,7 @@ class TcpListener:
         self.warn_limited(text)
 
     def _ended(self, connection: TcpConnection, reason: str) -> None:
-        if connection is self.connection:  # not a connection that was rejected or closed
+        if connection is self.connection:  # not a rejected or closed connection
             self.connection = None
             self._on_closed(reason)
 

@@ -125,7 +125,7 @@ class Body:
         """
         Return the content of a body.
 
-        :param head: fields of the message that are not in the body.
+        :param head: fields of the message outside the body.
         :raises RemoteProtocolError: the body is too short.
         """
         construct: Callable[..., Self] = cls

@@ -81,7 +81,7 @@ class ReportLevel(IntEnum):
 
 #: Longest frame that the manufacturer's library can read [bytes].
 MAX_SENT_FRAME_SIZE = 4091
-#: Longest frame that is accepted [bytes]; a frame with all variables of a program can be long.
+#: Longest accepted frame [bytes]; a frame with all variables of a program can be long.
 MAX_FRAME_SIZE = 1 << 20
 #: Sources of messages: the controller; its motion control.
 SOURCE_CONTROLLER = -2

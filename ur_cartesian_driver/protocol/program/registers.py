@@ -35,7 +35,7 @@ from the program   int         31         set-points lost to a full buffer
 from the program   int         32         version of the program (:data:`PROGRAM_VERSION`)
 from the program   int         33         random number, drawn when the program was rendered
 from the program   int         34         count of connections, changes with each connection
-from the program   int         35         token of the last SET_SAFE_OUTPUTS that was carried out
+from the program   int         35         token of the last SET_SAFE_OUTPUTS carried out
 from the program   int         36         motion version of movej and movel; 0 = unknown
 from the program   int         37         pulses given, see :data:`PULSE_COUNTS`
 =================  ==========  =========  ====================================================

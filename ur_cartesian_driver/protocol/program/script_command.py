@@ -4,7 +4,7 @@
 The script command interface: single commands to the robot program, independent of its motion.
 
 A command is 28 big-endian int32, 112 bytes: word 0 is its number, then come its arguments, then
-zeros. All argument words are scaled by 1,000,000 except those marked raw.
+zeros. All argument words are scaled by 1,000,000, except words marked raw.
 
 ==  =========================  =================================================================
 0   command                    words 1 ..
@@ -98,7 +98,7 @@ COMMAND_WORDS = 28
 COMMAND_SIZE = 4 * COMMAND_WORDS
 _COMMAND = struct.Struct('>28i')
 
-#: A number that is not scaled.
+#: An unscaled number.
 Token: TypeAlias = int
 SafeOutputs: TypeAlias = tuple[SafeOutput, ...]
 

@@ -3,7 +3,7 @@
 """
 Wire dialects: the messages of robot programs of different ages, one row for each dialect.
 
-A program that was saved on a pendant keeps the messages of the library version it came with, and
+A program saved on a pendant keeps the messages of the library version it came with, and
 nothing on the sockets reveals this version. So the dialect is a setting. A message has the same
 number of words and the same size in all dialects; :mod:`~.point_fields` has the layout of today's
 words. All differences are defined here:
@@ -36,7 +36,7 @@ The library discusses a 22nd word, the number of a move (``move_id``, its change
 one more row: a dialect then also has the number of its words, which :mod:`~.trajectory_points` and
 the robot program (``POINT_FIELDS``) take from it. It is not built before the library has it.
 
-Three modules ask a :class:`Dialect` for more than whether the program is our own:
+Three modules use more of a :class:`Dialect` than ``is_own``:
 :mod:`~.trajectory_points` for the points,
 :mod:`~ur_cartesian_driver.robot.program.program_sockets` for the actions, and
 :mod:`~ur_cartesian_driver.planning.request.program_features` for the demands of goals.

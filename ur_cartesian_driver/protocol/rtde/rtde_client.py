@@ -70,7 +70,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import (
 )
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe, RtdeValues
 
-#: Number of unexpected packages that are tolerated in each state of the handshake.
+#: Number of unexpected packages tolerated in each state of the handshake.
 MAX_UNEXPECTED_PACKAGES = 5
 
 

@@ -65,7 +65,7 @@ def _piece(q: Floats, qd: Floats, qdd: Floats, duration: float) -> Spline:
 
 
 def corner_messages(start: Vector6) -> tuple[bytes, bytes]:
-    """Return the bytes of the pieces that are sent before the pause, and of the others."""
+    """Return the bytes of the pieces sent before the pause, and of the others."""
     pieces = corner_pieces(start)
     pieces[-1] = Spline(
         target=pieces[-1].target, velocities=ZERO6, accelerations=ZERO6, duration=PIECE

@@ -71,7 +71,7 @@ def steps(check: str) -> Callable[[MotionSamples], Finding]:
 
 
 def corner_pause(samples: MotionSamples) -> Finding:
-    """Check that the program read the pieces that were sent after a pause."""
+    """Check that the program read the pieces sent after a pause."""
     own = _following(samples)
     paused = float(np.sum(np.diff(samples.time)[samples.runtime_state[1:] == RuntimeState.PAUSED]))
     if not own.any() or not paused:

@@ -40,7 +40,7 @@ MOTION_VERSION_PROGRAM = (
 ).encode()
 #: Error code of a request that the robot refuses because it is in local control.
 LOCAL_CONTROL = 'C210'
-#: RTDE outputs of the pose that is compared with the calibrated kinematics.
+#: RTDE outputs for comparing the reported pose with the calibrated kinematics.
 _POSE_FIELDS = ('actual_q', 'actual_TCP_pose', 'tcp_offset')
 #: Longest waits for the configuration, for the kinematics after it, and for RIGHTS_PROGRAM [s].
 CONFIGURATION_TIMEOUT, GEOMETRY_TIMEOUT, RIGHTS_TIMEOUT = 6.0, 2.0, 3.0

@@ -35,7 +35,7 @@ class Surprise(Exception):
 
 async def motion_refusal(address: RobotAddress) -> str:
     """
-    Return a clause that says why the arm must not be moved now; empty = it may be moved.
+    Return the reason why the arm must not move now, as a clause; empty = it may move.
 
     :raises OSError: the robot does not answer.
     """

@@ -172,7 +172,7 @@ def _is_idle(recorder: RtdeRecorder) -> bool:
 
 
 async def observe_inputs(address: RobotAddress) -> AsyncIterator[Finding]:
-    """Request the inputs without writing them; measure how soon the robot frees them again."""
+    """Request the inputs without writing them; measure the time until the robot frees them."""
     taken = {}
     for purpose, names in INPUT_GROUPS.items():
         try:

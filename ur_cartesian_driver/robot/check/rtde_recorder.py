@@ -19,7 +19,7 @@ from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 
 
 def name_in(kind: type[IntEnum], number: int) -> str:
-    """Return the name of a number that a robot reports; unlisted numbers have one, too."""
+    """Return the name of a number that a robot reports; 'unknown (number)' if it has none."""
     try:
         return kind(number).name
     except ValueError:

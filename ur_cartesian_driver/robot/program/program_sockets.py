@@ -113,7 +113,7 @@ class ProgramSockets:
 
     @property
     def ports(self) -> Mapping[str, int]:
-        """The ports that are open, by the name of their parameter."""
+        """The open ports, by the name of their parameter."""
         return {port.name: port.port for port in (*self._program_ports, self._sender)}
 
     async def open(self, host: str, allowed: frozenset[str]) -> None:
@@ -146,7 +146,7 @@ class ProgramSockets:
 
     def render(self, host: str, version: ControllerVersion) -> None:
         """
-        Render the robot program for the ports that are open.
+        Render the robot program for the open ports.
 
         :param host: the address at which the robot reaches us.
         :raises DriverError: the program cannot be made from the settings.
@@ -177,7 +177,7 @@ class ProgramSockets:
         for port in (*self._program_ports, self._sender):
             port.close()
 
-    # ---- what goes out ------------------------------------------------------------------------
+    # ---- to the robot program -----------------------------------------------------------------
 
     def send_control(
         self, action: TrajectoryAction, count: int, *, takes_offsets: bool = False
@@ -263,7 +263,7 @@ class ProgramSockets:
         if self.connected and self._reverse.connection is not None:
             self._reverse.connection.send(message.encode())
 
-    # ---- what comes in ------------------------------------------------------------------------
+    # ---- from the robot -----------------------------------------------------------------------
 
     def _on_open(self, connection: TcpConnection) -> None:
         if self.connected:

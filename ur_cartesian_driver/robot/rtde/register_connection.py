@@ -92,7 +92,7 @@ class RegisterConnection:
             self._attempt.write_row(values)
 
     def close(self) -> None:
-        """Close after sending what was written."""
+        """Close after sending the written inputs."""
         self._is_open = False
         if self._attempt is not None:
             self._attempt.close()
@@ -137,7 +137,7 @@ class _Attempt(RtdeConnection):
             self._connection.send(self._inputs.pack(values))
 
     def close(self) -> None:
-        """Close after sending what was written."""
+        """Close after sending the written inputs."""
         self._is_wanted = False
         super().close()
 

@@ -23,7 +23,7 @@ from ur_cartesian_driver.robot.transport import dial, ignore, TcpConnection
 ANSWER_TIMEOUT = 2.0
 #: Silence of the stream after which the robot is lost [s].
 SILENCE_TIMEOUT = 1.0
-#: Level of text messages up to which they are warnings or errors.
+#: Text messages up to this level are warnings or errors.
 WARNING_LEVEL = 2
 
 
@@ -41,7 +41,7 @@ class RtdeConnection:
         """
         Prepare a connection.
 
-        :param client: chooses the fields that are streamed and written.
+        :param client: chooses the streamed and the written fields.
         :param on_values: called for each packet with the names and values of its fields, possibly
             before :meth:`open` returns.
         :param silence: the longest pause between two packets [s]; after that the robot is lost.

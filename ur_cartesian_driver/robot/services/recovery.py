@@ -45,7 +45,7 @@ STEP_TIMEOUT = 35.0
 DISCONNECTED_TIMEOUT = 2.0
 #: Time in which the reports of a robot may contradict each other after a change [s].
 SETTLING_TIMEOUT = 0.3
-#: Period of the attempts to unlock [s]; time in which an unlock is too early and is repeated [s].
+#: Period and longest total time of the attempts to unlock, while they come too early [s].
 UNLOCK_RETRY_PERIOD, UNLOCK_TIMEOUT = 0.5, 6.0
 
 #: Dashboard commands of the steps of a recovery; the last command is the step itself.
@@ -89,7 +89,7 @@ class RecoveryRunner:
 
     async def run(self, *, may_unlock: bool) -> ServiceAnswer:
         """
-        Recover until READY, or until a person has to act; the text says what was done.
+        Recover until READY, or until a person has to act; the text lists the steps done.
 
         :param may_unlock: whether a person takes responsibility for unlocking a protective stop.
         """
@@ -219,5 +219,5 @@ class RecoveryRunner:
 
 
 def _report(done: list[str], text: str) -> str:
-    """Return a sentence, followed by the steps that were done."""
+    """Return a sentence, followed by the steps done."""
     return f'{text} Done: {", ".join(done)}.' if done else text

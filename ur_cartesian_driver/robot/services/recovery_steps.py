@@ -5,7 +5,7 @@ The recovery of a stopped robot as tables: from the modes of the robot to the ne
 
 The safety system comes first, then power and brakes, then the program. Each step follows from the
 newest state of the robot, so a step that a person takes meanwhile is not repeated. If a person has
-to act, the recovery ends with a sentence that says what to do.
+to act, the recovery ends with an instruction.
 
 Pure: no socket, no clock.
 """

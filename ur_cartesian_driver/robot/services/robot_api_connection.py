@@ -37,7 +37,7 @@ SLOW_ANSWER_TIMEOUTS: Mapping[str, float] = {
     **dict.fromkeys(('power on', 'brake release', 'restart safety'), 30.0),
     **REPORT_TIMEOUTS,
 }
-#: Longest answer that is read [bytes]; programs have some 100 kB.
+#: Longest accepted answer [bytes]; programs have some 100 kB.
 MAX_ANSWER_SIZE = 1 << 22
 #: Largest number of redirects: paths have moved between versions, and old paths redirect to new.
 MAX_REDIRECTS = 3

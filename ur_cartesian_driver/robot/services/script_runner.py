@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Runs users' scripts on the robot; the driver does not check what they do.
+Runs users' scripts on the robot; the driver does not check their effects.
 
 The controller never confirms that a script has run. A secondary program is assumed to have run if
 the robot reports no error for a while, a primary program if some program has run and ended.
