@@ -277,6 +277,12 @@ def test_a_path(tmp_path):
     assert found.lines.tolist() == [7, 22]
 
 
+def test_directives_of_yaml_shift_no_line(tmp_path):
+    found = imported(tmp_path, f'%YAML 1.1\n---\n{PATH}')
+    assert poses(found).tolist() == poses(imported(tmp_path, PATH)).tolist()
+    assert found.lines.tolist() == [9, 24]
+
+
 def test_an_array_of_poses_whose_orientations_are_not_set(tmp_path):
     found = imported(tmp_path, ARRAY)
     assert poses(found)[:, 0].tolist() == [0.1, 0.2]

@@ -27,6 +27,8 @@ _END_OF_MESSAGE = re.compile(r'^---[ \t]*$', re.MULTILINE)
 _BLANK_LINES = re.compile(r'(?:[ \t]*\n)*')
 #: The notice of a lost message; the hyphens at its end are not on a line of their own.
 _LOST = re.compile(r'^A message was lost!!!\n\ttotal count change:.*\n\ttotal count:.*---$', re.M)
+#: What a writer of YAML may put before the first document.
+_DIRECTIVES = re.compile(r'\A(?:%(?:YAML|TAG)[ \t][^\n]*\n)+(?=---)')
 #: Only YAML 1.1 treats these as ends of lines, which would shift the line numbers.
 _NO_LINE_ENDS = str.maketrans('\x85\u2028\u2029', '   ')
 _FORBIDDEN = re.compile(
@@ -128,6 +130,7 @@ class EchoedMessage:
 def echoed_messages(text: str, remarks: ImportNotes) -> list[EchoedMessage]:
     """Split a text into its messages, without reading them."""
     text = text.replace('\r\n', '\n').replace('\r', '\n').translate(_NO_LINE_ENDS)
+    text = _DIRECTIVES.sub(lambda found: '\n' * found[0].count('\n'), text)
     for lost in _LOST.finditer(text):
         line = text.count('\n', 0, lost.start()) + 1
         remarks.add(line, 'a message', 'ros2 topic echo has lost it')
