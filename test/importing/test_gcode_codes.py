@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.importing import Treatment
-from ur_cartesian_driver.importing.gcode.codes import CODES
+from ur_cartesian_driver.importing.gcode.codes import CODES, TOOLS_OF_PRINTER
 
 #: The tool at (1, 1, 1) before and at (2, 1, 1) after the line of a term, which is the third.
 BEFORE = 'G21 G90 G94\nG1 X1 Y1 Z1 F600\n'
@@ -65,9 +65,9 @@ EFFECTS: dict[str, tuple[str, list[tuple[float, float, float]]]] = {
 #: What is said of these programs.
 EFFECTS_SAID = {
     'P': ['line 3: P of an arc: turns in all, as in LinuxCNC; Marlin adds them to the arc'],
-    'M2': ['line 4: a line: the program ends in line 3 without it'],
-    'M30': ['line 4: a line: the program ends in line 3 without it'],
-    '%': ['line 5: a line: the program ends in line 4 without it'],
+    'M2': ['line 4: not executed: the program ends in line 3'],
+    'M30': ['line 4: not executed: the program ends in line 3'],
+    '%': ['line 5: not executed: the program ends in line 4'],
 }
 #: Modes that are the default, or end a mode that is refused anyway: they change nothing.
 CANCELS = (
@@ -176,7 +176,9 @@ def test_a_row_is_left_out_and_said(tmp_path, topic):
     assert positions(found) == pytest.approx(np.array([HERE, THERE]))
     notes = found.remarks
     for line, name in enumerate(names, start=3):
-        named = line_of(name).split()[0] if name[0] in 'GM' or name in EXAMPLES else name
+        has_own_name = name in ('< >', *TOOLS_OF_PRINTER.values())
+        of_line = name[0] in 'GM' or (name in EXAMPLES and not has_own_name)
+        named = line_of(name).split()[0] if of_line else name
         said = [note for note in notes if line in note.lines and 'contour' not in note.what]
         assert said, name
         assert said[0].what.startswith((named, f'word {named}')), name

@@ -99,12 +99,12 @@ def test_the_end_of_an_endless_main_program_is_said(tmp_path):
     [
         (
             'M98 P1\nM30\n(part)\nO1 (a)\nX1\nM99\nO2\nX5\nM99\n%\n',
-            'lines 8-10: a line: the program ends in line 3 without it',
+            'lines 8-10: not executed: the program ends in line 3',
         ),
         # Two programs in one file, as when files are joined.
         (
             'X1\nM30\n%\n%\nO2\nX9\nM30\n%\n',
-            'lines 6-8: a line: the program ends in line 3 without it',
+            'lines 6-8: not executed: the program ends in line 3',
         ),
     ],
 )

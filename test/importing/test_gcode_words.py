@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The grammar of lines: numbers, comments, and the forms that printers have."""
 
-from gcode_programs import imported, positions, refusal, remarks
+from gcode_programs import imported, positions, refusal, remarks, switched
 import numpy as np
 import pytest
 
@@ -127,7 +127,8 @@ def test_a_number_is_read_as_the_grammar_says(tmp_path, line, x):
         ('M62 P1 G64', 'P could belong to G64 or M62; give it a line of its own'),
         ('M3 S50 M1', 'S could belong to M1 or not; give M1 a line of its own'),
         ('G80 X5', 'coordinates without G0, G1, G2 or G3 since G80'),
-        ('G53', 'G53 needs coordinates'),
+        ('G1 X5 ,R2.', 'has ,R, which is not read: it rounds or chamfers a corner'),
+        ('O<LID> SUB', 'o-word is not read'),
         ('G20 F10', 'F beside G20 is of one unit or the other'),
         ('G1 X2 M104 S200', 'S could belong to M104 or not'),
         ('M80 G0 X10 "a"', 'is no G-code'),
@@ -178,6 +179,8 @@ def test_what_cannot_be_meant_is_one_sentence_with_its_line(tmp_path, line, said
         'M587 S"net" P"G1 X5"',
         'M569 P0.0 S1',
         'M970.3 Q1 A7 B30 C80 H15 K0',
+        'M0 Click to continue',
+        'M1 P5000 Turn the part',
         'M620 S0A',
         'EXCLUDE_OBJECT_DEFINE NAME=x POLYGON=[[1,2],[3,4]]',
         'SET_VELOCITY_LIMIT ACCEL=3000',
@@ -200,7 +203,7 @@ def test_what_stands_behind_the_end_is_said_and_not_read(tmp_path, end):
     text = f'%\n{HERE}{end}\nG1 X9\n(comment)\n\n%\nthis is [no] G-code\n'
     found = imported(tmp_path, text)
     assert positions(found)[-1, 0] == (3.0 if 'X3' in end else 1.0)
-    assert remarks(found) == ['lines 5, 9: a line: the program ends in line 4 without it']
+    assert remarks(found) == ['lines 5, 9: not executed: the program ends in line 4']
 
 
 def test_a_percent_sign_begins_a_program_once(tmp_path):
@@ -228,6 +231,26 @@ def test_lines_under_a_condition_of_a_printer_are_left_out(tmp_path):
     assert refusal(tmp_path, HERE + 'M622 J1\nG1 X5\n') == (
         'line 3: M622 begins a condition, and no M623 ends it.'
     )
+
+
+@pytest.mark.parametrize('line', ['P0 S1', 'N4 P0 S1 L2 D0', 'T1 S1 L0 D0', 't1s1l1'])
+def test_the_tool_is_elsewhere_after_a_printer_has_changed_heads(tmp_path, line):
+    found = imported(tmp_path, f'{HERE}{line}\nG1 Y5\nG1 X7\nG1 Z8\n')
+    assert positions(found) == pytest.approx(np.array([[1, 1, 1], [7, 5, 8]]))
+    assert remarks(found)[0].startswith('line 3: ')
+    assert remarks(found)[0].endswith('where its tools are parked is not known')
+    assert not switched(found)
+
+
+@pytest.mark.parametrize('first', ['O0012 <BRACKET 7>', '<BRACKET-7>', 'O12'])
+def test_a_program_may_have_a_name(tmp_path, first):
+    assert len(positions(imported(tmp_path, f'%\n{first}\n{HERE}G1 X2\nM30\n%\n'))) == 2
+
+
+def test_g53_without_coordinates_holds_for_nothing(tmp_path):
+    found = imported(tmp_path, f'{HERE}G53\nG1 X2\n')
+    assert positions(found) == pytest.approx(np.array([[1, 1, 1], [2, 1, 1]]))
+    assert remarks(found) == ['line 3: G53: it holds for its line, which has no coordinates']
 
 
 def test_coordinates_before_any_motion_code_are_a_travel(tmp_path):

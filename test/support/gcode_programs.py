@@ -93,6 +93,11 @@ EXAMPLES = {
     '$J': '$J=G91 X5',
     'M98 P"': 'M98 P"/macros/a.g"',
     'W': 'W5',
+    ',R': 'G1 X5 ,R2',
+    ',C': 'G1 X5 ,C2.5',
+    '< >': '<PART-A>',
+    'T S L': 'T1 S1 L0 D0',
+    'P S': 'P0 S1',
     'G80 W': 'G80 X5 Y6 W30 H40',
     'G80 H': 'G80 H40 X5 Y6',
 }

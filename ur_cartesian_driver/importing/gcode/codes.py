@@ -93,6 +93,9 @@ _HARMLESS = (
     *('BED_MESH_CLEAR', 'TEMPERATURE_WAIT', 'UPDATE_DELAYED_GCODE'),
 )
 
+#: The rows of the lines with which a printer with several heads takes one, and parks it.
+TOOLS_OF_PRINTER = {'T': 'T S L', 'P': 'P S'}
+
 _MOTION = (
     _honoured('motion', '', 'G0', 'G1', 'G2', 'G3', group='motion', stage=Stage.MOTION),
     _honoured('motion', '', 'G80', 'X', 'Y', 'Z', 'I', 'J', 'K', 'R', 'P', 'F'),
@@ -130,6 +133,7 @@ _MOTION = (
     _refused('motion', f'{_CYCLE}; or inches: write G20', 'G70'),
     _refused('motion', f'{_CYCLE}; or millimetres: write G21', 'G71'),
     _refused('motion', _THREAD, 'G33', 'G33.1', 'G35', 'G36'),
+    _refused('motion', 'it rounds or chamfers a corner; let the CAM write arcs', ',R', ',C'),
     _refused('motion', _THREAD, 'G32 X', 'G32 Z', 'G34 X', 'G34 Z'),
     _refused(
         'motion',
@@ -231,8 +235,10 @@ _PROGRAM = (
     _honoured('program', '', 'M99', words='PLQ', stage=Stage.END),
     _honoured('program', '', 'O', words='O'),
     _honoured('program', '', '%', 'N', '( )', ';', '*'),
+    _left_out('program', 'the name of a program', '< >'),
     _left_out('program', 'a line that is skipped on request', '/'),
-    _left_out('program', _NO_WAIT, 'M0', 'M1', 'M60', words='PS'),
+    _left_out('program', _NO_WAIT, 'M0', 'M1', words='PS', alone=True),
+    _left_out('program', _NO_WAIT, 'M60', words='PS'),
     _left_out('program', _NO_WAIT, 'M66', words='PELQ'),
     _left_out(
         'program', 'the robot has overrides of its own', *_numbers('M', (48, 53)), words='P'
@@ -258,6 +264,13 @@ _PRINTERS = (
         moves_away=True,
     ),
     _left_out('printers', _PRINTER, 'G29.1', 'G29.2', 'G29.4', 'G392', words='XYZFPS'),
+    _left_out(
+        'printers',
+        'where its tools are parked is not known',
+        *TOOLS_OF_PRINTER.values(),
+        stage=Stage.OFFSET,
+        moves_away=True,
+    ),
     _left_out('printers', OTHER_FILE, 'M98 P"', stage=Stage.OFFSET, moves_away=True),
     _left_out(
         'printers', 'whether its condition holds is not known', 'M622', alone=True, moves_away=True

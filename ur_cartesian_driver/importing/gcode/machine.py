@@ -111,7 +111,7 @@ class GcodeMachine:
         self._outputs.finish()
         for line in self._sequence.never_executed():
             self._into.remarks.add(
-                line, 'a line', f'the program ends in line {self._sequence.end_line} without it'
+                line, 'not executed', f'the program ends in line {self._sequence.end_line}'
             )
         for line in self._powered_travels if not self._path.coordinates.is_named('Z') else ():
             self._into.remarks.add(
@@ -241,8 +241,6 @@ class GcodeMachine:
                 others &= _OF_MOTION
             if code != 'G96':  # its S is that of a spindle
                 self._check_shared(code, values, rows, has_motion=has_motion)
-            if row.name == 'G53' and not values:
-                raise self._fail('G53 needs coordinates on its line')
             if others and (row.alone or row.name == 'other M-codes'):
                 raise self._fail(
                     f'{min(others)} could belong to {code} or not; give {code} a line of its own'
@@ -276,6 +274,9 @@ class GcodeMachine:
         """Carry out a code with its own words."""
         if row.name in _DO:
             _DO[row.name](self, code, own)
+        elif row.name == 'G53' and not own:
+            self._omit(code, 'it holds for its line, which has no coordinates')
+            return
         elif row.treatment is Treatment.LEFT_OUT:
             self._leave_out(code, row, own)
         if row.moves_away:

@@ -14,7 +14,12 @@ from functools import lru_cache
 import re
 from typing import NamedTuple
 
-from ur_cartesian_driver.importing.gcode.codes import code_named, CODES, OTHER_FILE
+from ur_cartesian_driver.importing.gcode.codes import (
+    code_named,
+    CODES,
+    OTHER_FILE,
+    TOOLS_OF_PRINTER,
+)
 from ur_cartesian_driver.importing.imported_path import BrokenFile
 from ur_cartesian_driver.importing.text_file import quoted
 
@@ -39,6 +44,10 @@ _M_CODE = re.compile(r'(?:N-?[0-9]+)?M([0-9]+(?:\.[0-9]+)?)')
 _QUOTED = re.compile(r'"[^"]*"')
 _NAME = re.compile(r'\s*([A-Za-z_]{2}\w*)')
 _PROGRAM_NUMBER = re.compile(r'[O:]([0-9]{1,8})')
+# Fanuc's names of programs, behind a number or in place of it.
+_PROGRAM_NAME = re.compile(r'<[^<>]+>$')
+# A CNC has T1 S500, too: without an L it is not a printer's.
+_TOOL_OF_PRINTER = re.compile(r'(?:T[0-9]+S[01]L[0-2]|P[0-9]+S[01](?:L[0-2])?)(?:D[01])?')
 
 
 class Block(NamedTuple):
@@ -86,6 +95,8 @@ def _block(number: int, line: str, text: str) -> Block:
         if (name := _printer_code(text)) is not None:
             return Block([name], {})
         text = _LINE_NUMBER.sub('', text, count=1) if text[0] == 'N' else text
+    if text[:1] in ('T', 'P') and _TOOL_OF_PRINTER.fullmatch(text):
+        return Block([TOOLS_OF_PRINTER[text[0]]], {})
     if _BLOCK.fullmatch(text) is None or text[0] == 'O':
         return _odd_block(number, line, text)
     # Without a blank before it, the E of an extruder could also be an exponent.
@@ -141,7 +152,10 @@ def _odd_block(number: int, line: str, text: str) -> Block:
         return Block([text], {})
     if first == '$':
         return Block([text[:2] if text[:2] in CODES else '$'], {})
-    if first in 'O:':
+    if first in 'O:<':
+        text = _PROGRAM_NAME.sub('', text)
+        if not text:
+            return Block(['< >'], {})
         found = _PROGRAM_NUMBER.fullmatch(text)
         return Block(['O'], {'O': float(found[1])}) if found else Block(['o-word'], {})
     named = _NAME.match(line)
@@ -153,7 +167,7 @@ def _odd_block(number: int, line: str, text: str) -> Block:
     without = _BARE_LETTER.sub('', text)
     if bare and not named and text[:3] != 'M98' and _BLOCK.fullmatch(without):
         return _block(number, line, without)._replace(bare=bare)
-    for sign in '#[=':
+    for sign in ('#', '[', '=', ',R', ',C'):
         if sign in text:
             raise BrokenFile(
                 number, f'{_shown(line)} has {sign}, which is not read: {CODES[sign].reason}'
