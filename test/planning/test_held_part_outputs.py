@@ -30,8 +30,6 @@ from ur_cartesian_driver.motion.plan.primitive import PulseLaw, SpeedLaw
 from ur_cartesian_driver.planning import plan
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 
-pytest.importorskip('pinocchio')
-
 TCP = Pose((0.02, -0.03, 0.12))
 STATE = state_at_rest(ARM, Q, TCP)
 T_FLANGE_PART = origin_pose(PART).matrix()

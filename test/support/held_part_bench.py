@@ -16,6 +16,7 @@ from held_part_goals import frame_and_urdf, origin_pose
 import numpy as np
 from plain_clients import RtdeRecorder
 from process_output import is_on, SAFE_OUTPUTS, switch
+import pytest
 from recorded_goal import SETUP
 from robot_cell import CYCLE, RTDE
 from virtual_network import HOST
@@ -39,6 +40,9 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 
 SPLINE, SERVO = ExecutionMode.SPLINE, ExecutionMode.SERVO
 PRIMITIVES = ExecutionMode.PRIMITIVES
+
+pytest.importorskip('pinocchio')
+
 ARM = Arm(robot_model('ur5e'))
 OPTIONS = PlanningOptions(self_collision='off')
 Q = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
