@@ -214,13 +214,17 @@ def test_the_measured_joints_lead_to_the_measured_pose(make_bench, calibrated):
     from ur_cartesian_driver.sim.calibration import random_calibration
 
     bench = make_bench(geometry=random_calibration(robot_model('ur5e'), 3) if calibrated else None)
-    bench.controller.motion.T_flange_tcp = Pose((0.0, 0.02, 0.1))
-    add(bench, 'offset pose x 0.01', 'offset pose rz 0.02')
-    bench.step(2)
-    motion, q = bench.controller.motion, read(bench, 'actual_q')
-    T_base_tcp = bench.controller.arm.forward(q) @ motion.T_flange_tcp
-    assert T_base_tcp.distance_to(Pose.from_rotation_vector(read(bench, 'actual_TCP_pose'))) < 1e-9
-    assert 0.0 < dist(q, read(bench, 'target_q')) < 0.1
+    add(bench, 'offset pose x 0.01', 'offset pose rx 0.02')
+    motion = bench.controller.motion
+    for motion.T_flange_tcp in (Pose((0.0, 0.02, 0.1)), Pose((0.0, 0.0, 0.3))):
+        bench.step(2)
+        q, pose = (
+            read(bench, 'actual_q'),
+            Pose.from_rotation_vector(read(bench, 'actual_TCP_pose')),
+        )
+        T_base_tcp = bench.controller.arm.forward(q) @ motion.T_flange_tcp
+        assert T_base_tcp.distance_to(pose) < 1e-9
+        assert 0.0 < dist(q, read(bench, 'target_q')) < 0.1
 
 
 def test_the_measured_joint_speeds_lead_to_the_measured_twist(bench):

@@ -54,7 +54,8 @@ class ActualMotion:
         self.acceleration_error: Vector6 = ZERO6
         #: The integral of the deviation of the acceleration.
         self._drift: Vector6 = ZERO6
-        self._solved: tuple[object, object, Vector6] | None = None
+        #: The joints of the last deviated pose, and what they were solved for.
+        self._solved: tuple[tuple[Vector6, Vector6, Pose], Vector6] | None = None
 
     def step(self) -> None:
         """Follow the target for a cycle."""
@@ -101,9 +102,10 @@ class ActualMotion:
         deviation = self._pose
         if deviation is None:
             return self._undisturbed.q
-        if self._solved is None or self._solved[:2] != (self._undisturbed.q, deviation):
-            self._solved = (self._undisturbed.q, deviation, self._solve(deviation))
-        return self._solved[2]
+        key = (self._undisturbed.q, deviation, self._motion.T_flange_tcp)
+        if self._solved is None or self._solved[0] != key:
+            self._solved = (key, self._solve(deviation))
+        return self._solved[1]
 
     @property
     def tcp_twist(self) -> Vector6:
