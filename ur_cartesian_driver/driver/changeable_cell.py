@@ -84,7 +84,7 @@ class ChangeableCell(ABC):
         If the rest of a running goal would now touch a body, the goal soon ends as COLLISION. A
         live session ends as PREEMPTED; the next target begins another one.
 
-        :param bodies: bodies to add; they replace bodies of the same names. A :class:`.Cell`
+        :param bodies: bodies to add; they replace bodies of the same names. A ``Cell``
             brings its clearance for these bodies and its pairs that may touch.
         :param remove: names of bodies to remove first.
         :param attach: names of bodies that the tool picks up at their present poses.

@@ -103,6 +103,7 @@ class InteractiveMotions(ABC):
         :param T_base_tcp: the pose that the active TCP should reach, in the robot's base.
         :param age: how old the target is [s].
         :raises InvalidGoal: the target is malformed, or too far away.
+        :raises NotAvailable: the cell has a mesh, and pinocchio is not installed.
         :raises RobotNotReady: the robot cannot accept a motion now, or one is running.
         """
         state, cell = self._state_for('follow live targets'), self.options.cell

@@ -21,8 +21,9 @@ class RobotServices(ABC):
     Service calls to the robot.
 
     Methods wait for the answer: at most 40 s, :meth:`recover` 120 s, :meth:`run_script` 40 s more
-    than its ``timeout``. :meth:`call` and :meth:`watch_contact` return a future at once. A refusal
-    is an answer, too. A value that cannot be sent raises
+    than its ``timeout``; :meth:`dashboard` 220 s for a flight report, 640 s for a support file.
+    :meth:`call` and :meth:`watch_contact` return a future at once. A refusal is an answer, too. A
+    value that cannot be sent raises
     :class:`~ur_cartesian_driver.motion.errors.LocalProtocolError`.
     """
 

@@ -13,8 +13,7 @@ too long. An error has the fields ``message`` and ``details``; the answer to an 
 has ``detail``.
 
 Paths, bodies and first versions come from Universal Robots' client library 2.14
-(``dashboard_client_implementation_x.cpp``); this library and other clients
-list the statuses.
+(``dashboard_client_implementation_x.cpp``); the statuses come from this library and other clients.
 """
 
 from __future__ import annotations

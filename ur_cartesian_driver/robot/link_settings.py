@@ -155,7 +155,7 @@ class LinkSettings:
 
     @property
     def other_program(self) -> str:
-        """Clause that says which program runs instead of ours."""
+        """A clause that names the program in place of ours."""
         return f'wire_dialect says that another one, {self.wire_dialect}, runs'
 
     def _check_dialect(self) -> None:
