@@ -3,10 +3,10 @@
 """
 The curves of the robot's motions: lines, arcs and joint lines.
 
-A curve maps ``u`` in [0, 1] to poses of the TCP in the robot's base, with ``u`` proportional to
-the leading quantity of the motion (length of a line or an arc, travel of the joints). Each curve
-leads from waypoint to waypoint. :mod:`~.blended_path` holds the curves of a goal in columns, and
-adds the blends between them.
+A curve maps ``u`` in [0, 1] to poses of the tool in the frame of the path, which is the robot's
+base or moves with a held part. ``u`` is proportional to the leading quantity of the motion (length
+of a line or an arc, travel of the joints). Each curve leads from waypoint to waypoint.
+:mod:`~.blended_path` holds the curves of a goal in columns, and adds the blends between them.
 """
 
 from __future__ import annotations
@@ -249,8 +249,9 @@ def goal_arcs(
     """
     Return the rows of CIRCULAR segments that make arcs, their arcs, and the faults of the others.
 
-    :param start: (n, 7) the pose in base at which each segment begins; ``end``: the target. Where
-        arcs are FIXED, ends and the starts after them are turned as the arcs arrive, in place.
+    :param start: (n, 7) the pose in the frame of the path at which each segment begins; ``end``:
+        the target. Ends of FIXED arcs, and the starts after them, are turned as the arcs arrive,
+        in place.
     """
     rows = np.flatnonzero(segments.types == int(SegmentType.CIRCULAR))
     if not len(rows):

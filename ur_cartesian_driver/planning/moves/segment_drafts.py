@@ -56,9 +56,9 @@ class SegmentDrafts:
     """
     The segments from a waypoint on, one per row, while their curves and joints are being found.
 
-    :param targets: poses of all waypoints in base (n, 7).
+    :param targets: poses of all waypoints in the frame of the path (n, 7).
     :param begin: index of the first waypoint with a motion.
-    :param start: pose of the tool in base.
+    :param start: pose of the tool in the frame of the path.
     :param remarks: list to which remarks on ignored or changed fields are appended.
     :raises InvalidGoal: the points define no line or arc, or the first blend is too large.
     """
@@ -99,7 +99,7 @@ class SegmentDrafts:
         return len(self.kinds)
 
     def target(self, row: int) -> Pose:
-        """Return the pose of a waypoint in base."""
+        """Return the pose of a waypoint in the frame of the path."""
         return pose_from_row(self.targets[row])
 
     def _find_blends(self) -> None:

@@ -59,7 +59,7 @@ class JointPath:
     piece: Indices
     #: (n,) curve parameter on this piece.
     t: Floats
-    #: (n, 7) TCP poses in base.
+    #: (n, 7) poses of the tool in the frame of the path.
     poses: Floats
     #: (n, 6) joint positions [rad].
     q: Floats

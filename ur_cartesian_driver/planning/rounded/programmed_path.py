@@ -83,8 +83,8 @@ def programmed_sections(
     """
     Return the sections of a goal's path, one from each stop to the next.
 
-    :param targets: (n, 7) the poses of the goal's points in base.
-    :param start: pose of the tool in base at the beginning.
+    :param targets: (n, 7) the poses of the goal's points in the frame of the path.
+    :param start: pose of the tool in this frame at the beginning.
     :param corners: (n, 2) allowed deviations of the path at each point [m], [rad]; 0 = a stop.
     :param stops: further points at which the arm stops.
     :raises InvalidGoal: a segment defines no arc.

@@ -133,8 +133,8 @@ def plan_rounded_path(
     """
     Return the motion along a goal's lines and arcs with rounded corners.
 
-    :param targets: (n, 7) the poses of the goal's points in base.
-    :param start: pose of the tool in base at the beginning, where the arm is at rest.
+    :param targets: (n, 7) the poses of the goal's points in the frame of the path.
+    :param start: pose of the tool in this frame at the beginning, where the arm is at rest.
     :param q_start: joint positions at the beginning [rad].
     :param stops: points at which the arm stops in addition to those without corner_deviation.
     :raises GoalRefused: the arm cannot follow the path, or the joints not closely enough.

@@ -96,7 +96,7 @@ class ToolLimits:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CurveSamples:
-    """The derivatives of the tool by s, in base, at m places of a rounded path."""
+    """Derivatives of the tool with respect to s, in the frame of the path, at m places."""
 
     s: Floats
     #: (m, 3) first derivative of the position.
@@ -117,7 +117,7 @@ class CurveSamples:
 
 
 def tool_rows(rows: PathRows) -> tuple[Floats, Floats, Floats]:
-    """Return poses (m, 7), turns per unit of s (m, 3) and their derivatives (m, 3) in base."""
+    """Return poses (m, 7), turns per unit of s (m, 3) and the derivatives of these (m, 3)."""
     quaternions = rows.x[:, 3:]
     if not rows.d1[:, 3:].any() and not rows.d2[:, 3:].any():
         none = np.zeros((len(quaternions), 3))
@@ -182,7 +182,7 @@ class SectionLaw:
         self._fastest = FastestLaw(s, self._limits())
         #: Factor by which limits are tightened at each place if the averaged law exceeds them.
         self._tightened = np.ones(len(s))
-        #: The last law, as its squares (m,), and its :meth:`excess` (m,).
+        #: The squares (m,) of the last law, and its :meth:`excess` (m,).
         self._measured = np.full(len(s), np.nan), np.zeros(len(s))
         self.law = self._fitted()
         #: Places, about :data:`_ANCHOR_TIME` apart, at which a grid of pieces begins anew.

@@ -44,8 +44,8 @@ _BLOCK = 1024
 
 
 #: A quantity along a spline: name of the tool or joint to which it belongs, values (m,), limit,
-#: power of time (1 for speeds, 2 for accelerations), unit, name of the limit, and why the tool is
-#: slow where the limit holds.
+#: power of time (1 for speeds, 2 for accelerations), unit, name of the limit, and the cause of a
+#: slow tool where the limit holds.
 _Quantity: TypeAlias = tuple[str, Floats, float, int, str, str, SlowCause]
 
 
@@ -123,7 +123,7 @@ def stretch_remark(factor: float, limit: SpeedLimit, duration: float) -> str:
 class Rates(NamedTuple):
     """The rates of tool and joints at m places of a spline, each (m, 6)."""
 
-    #: Twists of the TCP in base, and its accelerations.
+    #: Twists and accelerations of the tool in the frame of the path.
     twists: Floats
     accelerations: Floats
     #: Joint velocities [rad/s] and accelerations [rad/s^2].

@@ -77,7 +77,7 @@ class SplinePath:
     points: Int32s
     #: (m,) the fraction of this segment at each sample.
     fractions: Floats
-    #: (m, 7) poses of the TCP in base.
+    #: (m, 7) poses of the tool in the frame of the path.
     poses: Floats
     #: (m, 6) joint positions [rad].
     q: Floats
@@ -292,7 +292,7 @@ def sample_density(
     chord_error: float = ARC_CHORD_ERROR,
 ) -> Floats:
     """
-    Return the samples a second (m,) that follow the tool closely enough at m times.
+    Return the samples per second (m,) that follow the tool closely enough at m times.
 
     :param acceleration: of the tool, or the part of it that bends the path [m/s^2].
     :param chord_error: greatest distance of chords between samples from the path [m].

@@ -33,10 +33,10 @@ _MIN_DISTANCE = 1e-9
 
 def tool_points(goal: GoalTable, start: ToolPoints) -> ToolPoints:
     """
-    Return the start, followed by the points of a checked goal, in base.
+    Return the start, followed by the points of a checked goal, in the frame of the path.
 
     :param goal: the goal, whose waypoints come after the start.
-    :param start: the tool in base at the start, one row.
+    :param start: the tool in the frame of the path at the start, one row.
     """
     given, start = goal.waypoints, _in_frame(start, goal.T_base_frame.inverse())
     if goal.replace_horizon and not given.accelerations.any():

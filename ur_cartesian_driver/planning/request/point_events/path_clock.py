@@ -50,7 +50,7 @@ class PathClock:
         self._speeds = _speeds(self._steps, np.diff(self._times), inf if is_spline else _DENSE)
 
     def pose(self, time: float) -> Pose:
-        """Return the pose of the TCP at a time [s]."""
+        """Return the pose of the tool at a time [s]."""
         k, part = self._piece(time)
         return pose_from_row(self._poses[k]).interpolate(pose_from_row(self._poses[k + 1]), part)
 
