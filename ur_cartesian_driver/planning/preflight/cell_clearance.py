@@ -201,7 +201,7 @@ class CellClearance:
 
         :param q: (n, 6) [rad], in order of time.
         :param q_start: the start configuration; pairs that are too close there may separate.
-        :param closest: whether to search the closest pair, too, which takes longer.
+        :param closest: whether to search for the closest pair, too, which takes longer.
         """
         search = _Search(self.bodies, closest)
         before = np.array([q_start])
@@ -377,7 +377,7 @@ class _Search:
             return
         k = int(np.argmin(distances))
         before = inf if self.closest is None else self.closest.distance
-        # A distance that is enough may be only a lower bound.
+        # A distance of at least ``_enough`` may be a mere lower bound.
         if distances[k] < min(before, self._enough(column)):
             self.closest = Place(offset + float(places[k]), column, float(distances[k]))
 

@@ -181,7 +181,7 @@ class Clearance:
 
         :param q: (n, 6) [rad], all configurations of a goal, in order of time.
         :param q_start: the start configuration; pairs that are too close there may separate.
-        :param closest: whether to search the closest pair in the cell, too, which takes longer.
+        :param closest: whether to search for the closest pair in the cell, which takes longer.
         """
         #: The first violation that is refused (True), and the first with only a warning (False).
         found: dict[bool, Violation] = {}
@@ -340,7 +340,7 @@ def clearances(
     :param tool_tips: the active TCP first.
     :param part_changes: the bodies that the tool takes or puts down along the path.
     :param displaced: (n, 6) joints displaced by an offset [rad], to check in place of the path's.
-    :param closest: whether to search the closest pair in the cell, too, which takes longer.
+    :param closest: whether to search for the closest pair in the cell, which takes longer.
     :raises CollisionPredicted: there is a violation for which the goal is refused.
     """
     checked = path.q if displaced is None else displaced
@@ -400,7 +400,7 @@ def _is_receding(values: Floats, reached: Floats) -> tuple[Floats, Flags]:
 
 
 class _SelfCollisionChecker:
-    """The links of the arm, and the tool, against each other."""
+    """The check of the links of the arm, and of the tool, against each other."""
 
     def __init__(
         self, bodies: CollisionBodies, T_flange_tcp: Pose, options: PlanningOptions
@@ -494,7 +494,7 @@ def self_collision_remark(name: str, options: PlanningOptions) -> str:
 
 
 class _PlaneChecker:
-    """The TCP, the tool and all links but the base, against the workspace planes."""
+    """The check of the TCP, the tool and all links but the base against the workspace planes."""
 
     def __init__(
         self, bodies: CollisionBodies, arm: Arm, T_flange_tcp: Pose, planes: Sequence[Plane]

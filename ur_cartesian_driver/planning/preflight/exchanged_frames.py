@@ -3,7 +3,7 @@
 """
 Find goals in which the frames of part and tool are probably exchanged.
 
-Exchanged frames give another valid path, so nothing proves a mistake. But people begin a path near
+Exchanged frames give another valid path, so nothing proves a mistake. But paths usually begin near
 the arm. So a mistake is reported if the path as given begins far from the arm, and would begin
 near it with the frames exchanged.
 """

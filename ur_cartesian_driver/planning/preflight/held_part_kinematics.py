@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The kinematics of an arm that leads a held part along a tool that stands in the cell.
+The kinematics of an arm that leads a held part along a tool that is fixed in the cell.
 
 The path is given as poses of the tool in the frame on the part. The position p of the tool is
 fixed in base. At p, the part has the velocity v, the turn rate w and the acceleration a, in its

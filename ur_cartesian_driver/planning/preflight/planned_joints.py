@@ -147,7 +147,7 @@ def solved_joints(
     """
     Return the joints (n, 6) [rad] along a part of the reference path.
 
-    :param path: the part, whose samples may be different ones.
+    :param path: the part, which may have samples of its own.
     :param moves: the joint moves of the reference path.
     :param start: the joints before the first sample [rad].
     :raises GoalRefused: a pose has no solution.

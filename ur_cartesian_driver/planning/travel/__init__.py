@@ -1,3 +1,3 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Travels: ways of the arm through the air, found between two configurations."""
+"""Travels: paths of the arm through the air, found between two configurations."""

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The space of the joints of one arm with one tool, in which a travel is searched."""
+"""The joint space of one arm with one tool, for the search for a travel."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class ArmSpace:
         across, along = np.abs(model.geometry.a), np.abs(model.geometry.d)
         beyond = np.cumsum((across + along)[::-1])[::-1] - along
         length = float(np.linalg.norm(kinematics.T_flange_tcp.position))
-        #: Greatest motion of the arm by each joint, (6,) [m/rad].
+        #: Greatest displacement of the arm by each joint, (6,) [m/rad].
         self.weights: Floats = np.maximum(beyond + length, _MIN_WEIGHT)
 
     def free(self, q: Floats) -> Flags:

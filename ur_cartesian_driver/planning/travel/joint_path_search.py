@@ -1,14 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Search a joint path from a configuration to one of several others, and shorten it.
+Search for a joint path from a configuration to one of several others, and shorten it.
 
 The straight joint motion is tried first. Then two trees of configurations grow towards each other
 (RRT-Connect: J. Kuffner and S. LaValle, "RRT-Connect: an efficient approach to single-query path
-planning", ICRA 2000), one from the start, one from all goals. Which motions are free is decided
-by a :class:`JointSpace`, so the search knows neither arm nor obstacles. The number of samples
-bounds the search, not the time, and a seed draws them: the same question has the same answer on
-every machine.
+planning", ICRA 2000), one from the start, one from all goals. A :class:`JointSpace` decides which
+motions are free, so the search knows neither arm nor obstacles. The number of samples bounds the
+search, not the time, and a seed draws the samples: the same question has the same answer on every
+machine.
 
 Proving that a motion is free takes much longer than checking places on it. So trees grow by
 motions that seem free, and a connection from the start to a goal is proved when it is found
@@ -47,7 +47,7 @@ class JointSpace(Protocol):
 
     @property
     def weights(self) -> Floats:
-        """Motion of the arm by each joint, (6,) [m/rad]."""
+        """Displacement of the arm by each joint, (6,) [m/rad]."""
 
     def free(self, q: Floats) -> Flags:
         """Return whether the arm touches nothing in each configuration (n, 6) [rad]."""
@@ -214,7 +214,7 @@ def _grow(
 
 
 def _connected(tree: _Tree, q: Floats) -> int:
-    """Grow a tree to a configuration; return its node there, -1 if the way is not free."""
+    """Grow a tree to a configuration; return its node there, -1 if a step is not free."""
     node, arrives = tree.nearest(q), False
     while node >= 0 and not arrives:
         node, arrives = tree.grow(node, q)

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Find a transfer: the way from one configuration of an arm to one of several others.
+Find a transfer: a path from one configuration of an arm to one of several others.
 
 The tool is retracted along its axis z, the joints move through free space, and the tool
 approaches along its axis z. Each of the three parts begins and ends at rest or in a blend; the
@@ -23,7 +23,7 @@ from ur_cartesian_driver.planning.preflight.clearance import Violation
 from ur_cartesian_driver.planning.travel.arm_space import ArmSpace
 from ur_cartesian_driver.planning.travel.joint_path_search import search_joint_path
 
-#: The largest retract and approach [m]; more must be millimetres by mistake.
+#: The largest retract and approach [m]; larger numbers must be millimetres by mistake.
 MAX_RETRACT = 1.0
 #: The fractions of a length that are tried if it may be shortened.
 _SHORTER = (1.0, 0.4, 0.0)
@@ -45,7 +45,7 @@ class TransferSettings:
     approach: float = 0.05
     #: The number of samples after which a search gives up.
     max_samples: int = 2000
-    #: Another seed finds another way; the same seed finds the same way again.
+    #: Another seed finds another path; the same seed finds the same path again.
     seed: int = 0
     #: Whether retract and approach may be shortened, down to none, if they are not possible.
     shorten: bool = False
@@ -66,7 +66,7 @@ class TransferSettings:
 
 @dataclass(frozen=True, slots=True)
 class Transfer:
-    """A way through the air, from the end of the retract to the beginning of the approach."""
+    """A path through the air, from the end of the retract to the beginning of the approach."""
 
     #: (k, 6) [rad]; between two rows the joints move straight.
     waypoints: Floats
@@ -90,8 +90,8 @@ def find_transfer(
 
     :param goals: at least one, the preferred one first.
     :param where: the beginning of a refusal, such as ``The travel to point 0``.
-    :raises CollisionPredicted: the arm touches something at the start, in all goals, at the
-        beginning or the end of the way, or no way was found.
+    :raises CollisionPredicted: the arm touches something at the start, on the retract, or in each
+        goal or on its approach; or no path was found.
     :raises Unreachable: the arm cannot follow the line of the retract or of the approach.
     """
     if (touching := space.touching(q_start)) is not None:

@@ -63,7 +63,7 @@ def plan_with_travel(
     Return the plan of a goal, which begins with a travel if the direct way is refused.
 
     :param plan: plans the goal from a state, and ignores ``allow_travel``.
-    :raises GoalRefused: the goal is refused, or no way to it was found.
+    :raises GoalRefused: the goal is refused, or no travel to it was found.
     """
     try:
         return plan(goal, state, arm, options)
@@ -183,9 +183,9 @@ class _Travel:
 
     def _travel(self, found: Transfer) -> Plan | None:
         """
-        Return the plan of the way through the air, with the largest blends that pass.
+        Return the plan of the path through the air, with the largest blends that pass.
 
-        :returns: None if the arm stands at the end of the travel.
+        :returns: None if the arm is at the end of the travel already.
         """
         stops = list(self._stops(found))
         if not stops:
