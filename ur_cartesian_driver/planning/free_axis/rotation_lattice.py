@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Search the rotation about a free axis along a path by dynamic programming over a lattice.
+Search for the rotation about a free axis along a path by dynamic programming over a lattice.
 
 A *layer* is a place at which the rotation can be chosen, and its *nodes* are rotations. An *edge*
 connects nodes of two layers; along an edge, the rotation changes linearly, as on a line of the

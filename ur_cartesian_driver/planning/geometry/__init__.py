@@ -1,3 +1,3 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Curves, blends, splines, samples and speed profiles: geometry without goals."""
+"""The geometry of paths: curves, blends, splines and samples."""

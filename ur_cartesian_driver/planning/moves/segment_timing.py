@@ -70,7 +70,7 @@ class SegmentTimings:
     The speeds with which segments meet their times within the limits; columns (n,).
 
     :param running: the first segment as it was planned before, if it has already been sent.
-    :param stops: the waypoints at which the robot program does something else.
+    :param stops: the waypoints at which the robot program does more than move the arm.
     :raises TooFast: a time needs more speed or acceleration than the limits allow.
     :raises InvalidGoal: a speed is too low for the wire, or a blend is too small.
     """

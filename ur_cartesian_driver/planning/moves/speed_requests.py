@@ -83,7 +83,7 @@ class SpeedRequests:
     """
     The requested speeds and times of moves, in the lengths that the robot uses; columns (n,).
 
-    :param stops: (n,) whether the program does something else at the end of each segment.
+    :param stops: (n,) whether the program does more than move the arm at the end of each segment.
     :param running: the first segment as it was planned before, if it has already been sent.
     :raises InvalidGoal: a CIRCULAR or PROCESS segment on which the turn leads has a time, but the
         robot's speed on such segments is not known.

@@ -43,7 +43,7 @@ _SPLINES = 'set execution to SPLINE or SERVO, with times or a corner_deviation'
 
 def check_held_part(goal: GoalTable, options: PlanningOptions) -> None:
     """
-    Refuse motions on a held part that the moves of the controller cannot lead.
+    Refuse motions of a held part that the controller's moves cannot execute.
 
     :raises NotAvailable: a goal of PRIMITIVES has joint motions, arcs that turn the part, travels,
         or offsets.

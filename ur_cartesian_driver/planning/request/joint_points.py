@@ -4,8 +4,8 @@
 Points that give joint positions in place of a pose: every number of their pose is NaN.
 
 Only the planner knows the calibrated arm and the tool, so it computes these poses, and all later
-stages see an ordinary goal. A joint move to such a point is sent as joint positions: near a
-singularity, where robots stand at rest more often than not, no pose selects them reliably.
+stages see an ordinary goal. A joint move to such a point is sent as joint positions, because near
+a singularity, where robots rest more often than not, no pose selects joint positions reliably.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def check_for_arm(goal: Goal, T_flange_tcp: Pose, arm: Arm, options: PlanningOpt
 
 
 def _check_calibration(goal: GoalTable, by_joints: Flags, options: PlanningOptions) -> None:
-    """Refuse points whose pose is needed if the calibration is unknown."""
+    """Refuse joint points whose pose is needed, if the calibration is unknown."""
     is_sent = IS_JOINT_MOVE[goal.motions.types]
     for i in rows_where(by_joints & ~is_sent)[:1]:
         if not options.calibration_known:

@@ -280,7 +280,7 @@ def adapt_primitive(
 
 
 def explain_poses_only(options: PlanningOptions) -> str:
-    """Return the reason for arcs as poses only, to follow ``because``; '' = there is none."""
+    """Return the reason to send arcs as poses only, to follow ``because``; '' = none."""
     if not options.calibration_known:
         return 'the calibration of this robot is unknown'
     if MotionType.MOVEC_JOINT not in options.dialect.motion_types:

@@ -23,7 +23,7 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.spline.spline_limits import may_near_limits
 
-#: Distance of the few configurations, in s [m].
+#: Distance in s between the few configurations [m].
 _STEP = 0.004
 #: Greatest speed and turn rate, then accelerations, of the tool along a path.
 Peaks: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
@@ -31,7 +31,7 @@ Peaks: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointDerivatives:
-    """Derivatives by s of k joints at m places."""
+    """Derivatives of k joints with respect to s at m places."""
 
     #: (m, k) the first derivative; k = 0 if no joint comes near a limit, or if the arm cannot
     #: follow the whole path, which a later check of the plan refuses.
@@ -54,11 +54,11 @@ def joint_derivatives(
     options: PlanningOptions,
 ) -> JointDerivatives:
     """
-    Return the derivatives of the joints along a path by s.
+    Return the derivatives of the joints with respect to s along a path.
 
     :param s: (m,) the places.
     :param poses: (m, 7) the poses of the tool there.
-    :param derivatives: (m, 6) first and second derivatives of the tool by s.
+    :param derivatives: (m, 6) first and second derivatives of the tool with respect to s.
     :param peaks: see :func:`~ur_cartesian_driver.planning.spline.spline_limits.may_near_limits`.
     """
     arm = kinematics.arm

@@ -4,8 +4,8 @@
 A polyline of poses with rounded corners, in closed form.
 
 The polyline x(s) is in R^7: positions and unit quaternions. It turns the tool so little per chord
-that the chord between two quaternions can be taken for their arc. A value of s is a *place*. At
-the vertex j, the derivative of x(s) jumps by d_j. Averaging with the kernel
+that the chord between two quaternions replaces their arc. A value of s is a *place*. At the vertex
+j, the derivative of x(s) jumps by d_j. Averaging with the kernel
 k(u) = 15/16 (1 - u^2)^2 over a width w_j on both sides turns a single corner into
 
     x(s) + d_j w_j E((s - s_j) / w_j),    E(u) = G(u) - max(u, 0),    G'' = k.
@@ -57,7 +57,7 @@ _PAIRS = 1_000_000
 
 
 class PathRows(NamedTuple):
-    """A curve in R^7 at m places, and its first three derivatives by s; (m, 7) each."""
+    """A curve in R^7 at m places, and three derivatives with respect to s; (m, 7) each."""
 
     x: Floats
     d1: Floats
@@ -78,7 +78,7 @@ class Polyline:
 
     @property
     def slopes(self) -> Floats:
-        """(n - 1, 7) the derivative by s on each chord."""
+        """(n - 1, 7) the derivative with respect to s on each chord."""
         slopes: Floats = np.diff(self.rows, axis=0) / np.diff(self.s)[:, None]
         return slopes
 
@@ -168,7 +168,7 @@ class RoundedPath:
     # ---- widths -------------------------------------------------------------------------------
 
     def _choose(self, max_width: float) -> Floats:
-        """Return widths with which the deviation at each corner about reaches its bound."""
+        """Return widths for which the deviation at each corner nearly reaches its bound."""
         s, places = self.polyline.s, self._places
         largest = np.minimum(np.minimum(places - s[0], s[-1] - places), max_width)
         alone = self._bounds / np.maximum(PEAK * _sizes(self._jumps), 1e-12)

@@ -124,7 +124,7 @@ class _SectionSpeeds:
     #: (m,) planned and requested speed of the tool [m/s].
     speed: Singles
     asked: Singles
-    #: (m, 3) derivative of the position by s.
+    #: (m, 3) derivative of the position with respect to s.
     directions: Singles
     #: (m,) the greatest ds/dt that limits allow, and the number of this limit among ``names``.
     cap: Singles

@@ -30,9 +30,9 @@ class GoalRest:
     stopped: float
     #: Places of the points of the resumed goal.
     places: Sequence[float]
-    #: Function that returns the time from a place to ``begin`` [s]; inf if it is not known, which
-    #: is refused for an offset > 0. Its other arguments are the name and value of the time offset
-    #: of an event at the place.
+    #: Function that returns the time from a place to ``begin`` [s]; inf = unknown. Its other
+    #: arguments are the name and value of the time offset of an event at the place; it refuses an
+    #: offset > 0 if the time is unknown.
     time_since: Callable[[float, str, float], float]
     #: Function that returns the distance from one place to another along the path [m].
     distance: Callable[[float, float], float]

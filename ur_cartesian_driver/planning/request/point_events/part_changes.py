@@ -28,7 +28,7 @@ class PartChanges(PointEvent[PartChange]):
     field = 'part_changes'
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Refuse bodies that are not in the cell, or not where they are taken from."""
+        """Refuse unknown bodies, attaching an attached body, and releasing a free one."""
         check_part_changes(goal, options.cell)
 
     def left(self, events: Sequence[PartChange], rest: GoalRest) -> Sequence[PartChange]:

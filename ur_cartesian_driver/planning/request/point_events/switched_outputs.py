@@ -45,7 +45,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
             )
         for field, waypoint in self.places(goal):
             check_point(field, waypoint, goal)
-        # The path to the last point of an open spline does not change any more.
+        # The path to the last point of an open spline no longer changes.
         if goal.keep_open and (goal.replace_horizon or not mode.traits.is_spline):
             for i, command in enumerate(goal.io_commands):
                 _check_open(f'{self.field}[{i}]', command)
