@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Appendable goals in a cell in virtual time, and producers of their points."""
+"""Appendable goals for a cell in virtual time, and producers of their points."""
 
 from collections.abc import Callable, Iterable
 from math import cos, pi, sin
@@ -44,7 +44,7 @@ def circle(
     radius: float = 0.05,
     round_in: float = 4.0,
 ) -> list[Waypoint]:
-    """Points with times and twists on a circle that begins at the tool, at rest and faster."""
+    """Points with times and twists on a circle that begins at the tool, from rest and faster."""
     rate = 2.0 * pi / round_in
     points = []
     for k in range(first, first + count):
@@ -69,7 +69,7 @@ def circle(
 
 
 class AppendMotion:
-    """An appendable goal that runs, and the client that appends to it."""
+    """A running appendable goal, and the client that appends to it."""
 
     def __init__(self, cell: RobotCell, goal: Goal, **options: Any) -> None:
         self._cell, self._owner = cell, cell.owner
@@ -106,7 +106,7 @@ class AppendMotion:
 
     @property
     def ahead(self) -> int:
-        """Number of points that the arm has not reached."""
+        """The number of points that the arm has not reached."""
         return self.points - (self.progress.waypoint if self.motion.progress else 0)
 
     async def append(
@@ -135,7 +135,7 @@ class AppendMotion:
             return end.value
 
     async def until(self, condition: Callable[[], object], bound: float = 30.0) -> bool:
-        """Wait for a condition, or the end of the goal; return whether it has come."""
+        """Wait for a condition or the end of the goal; return whether the condition holds."""
         await self._cell.until(lambda: condition() or self.outcome, bound)
         return self.outcome is None
 
@@ -145,14 +145,14 @@ class AppendMotion:
 
 
 def clear_network_log(cell: RobotCell) -> None:
-    """Clear what the network in memory keeps for tests."""
+    """Clear the records that the network in memory keeps for tests."""
     for end in cell.loop.ends:
         end.received.clear()
         end.peer.received.clear()
 
 
 def retained_sizes(cell: RobotCell) -> dict[str, int]:
-    """Return the sizes of what the robot loop keeps for the running goal."""
+    """Return the sizes of the objects that the robot loop keeps for the running goal."""
     loop = cell.loop_task.get_coro().cr_frame.f_locals['self']
     motion = loop._motion
     monitor = motion._machine.feeder.monitor

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Files of a format that are cut, mixed, or changed in single characters, and what may follow."""
+"""Files of a format that are cut, mixed or changed in single characters, and their import."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -9,12 +9,12 @@ import re
 
 from ur_cartesian_driver.importing import BrokenFile, import_file, ImportedGoal, ImportOptions
 
-#: Characters that mean something in one format or another, and some that mean nothing in any.
+#: Characters with a meaning in one format or another, and some without a meaning in any.
 _CHARACTERS = '0123456789.,;:-+eE \t\n"\'()[]{}#%=/*_<>&|!xyzGMNFSTO\0\x0c\x85\u2028\u00b0\u20ac'
 _WORD = re.compile(r'[A-Za-z_]\w*|[-+]?\d+\.?\d*')
-#: What a sentence names the place by.
+#: Matches the place that a sentence names.
 _PLACE = re.compile(r'^(line|row|packet|point|entity) \w+: ')
-#: Faults of a whole file, which no line is to blame for.
+#: Matches faults of a whole file, which have no line.
 _WHOLE_FILE = re.compile(
     r'^(there is no point|the file is empty|the file is no recording|the file is damaged|'
     r'this is a binary file|the file begins as|'
@@ -26,7 +26,7 @@ def broken(files: Sequence[str], random: Random, together: int = 1) -> str:
     """
     Return one of the files with one to four faults.
 
-    :param together: so many lines are moved and left out together.
+    :param together: the number of lines that are moved or left out together.
     """
     text = random.choice(files)
     for _ in range(random.randint(1, 4)):
@@ -38,7 +38,7 @@ def broken(files: Sequence[str], random: Random, together: int = 1) -> str:
             text = text[:at]
         elif fault == 1:  # the middle is missing
             text = text[:at] + text[min(len(text), at + random.randint(1, 80)) :]
-        elif fault == 2:  # the tail of another
+        elif fault == 2:  # the tail of another file
             other = random.choice(files)
             text = text[:at] + other[random.randrange(len(other)) :]
         elif fault in (3, 4):  # a line at another place, or missing
@@ -60,7 +60,7 @@ def broken(files: Sequence[str], random: Random, together: int = 1) -> str:
 def broken_texts(
     files: Sequence[str], count: int, random: Random, together: int = 1
 ) -> Iterator[str]:
-    """Return so many broken files."""
+    """Return ``count`` broken files."""
     return (broken(files, random, together) for _ in range(count))
 
 

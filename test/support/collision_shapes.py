@@ -12,7 +12,7 @@ Floats = Floats
 
 
 def body_surfaces(bodies: CollisionBodies, q: Floats, n: int = 24) -> list[Floats]:
-    """Points (m, 3) on the rims of each body, at joints (6,) [rad]: it is their convex hull."""
+    """Points (m, 3) on the rims of each body at joints (6,) [rad]; the body is their hull."""
     start, vector, axis = (each[:, :, 0] for each in bodies._skeletons(bodies._lines(q[None])))
     angle = np.linspace(0.0, 2.0 * np.pi, n, endpoint=False)[:, None]
     surfaces = []
@@ -30,15 +30,15 @@ def body_surfaces(bodies: CollisionBodies, q: Floats, n: int = 24) -> list[Float
 
 def beyond_bodies(bodies: CollisionBodies, q: Floats, link: Link, points: Floats) -> Floats:
     """
-    Return how far points (n, 3) [m] in base lie outside each body of a link at joints (6,) [rad].
+    Return distances of points (n, 3) [m] in base from each body of a link at joints (6,) [rad].
 
-    Exact where they are inside, an upper bound where they are not.
+    A distance is below 0 and exact inside of the body, and an upper bound outside of it.
     """
     start, vector, axis = (each[:, :, 0] for each in bodies._skeletons(bodies._lines(q[None])))
     outside = []
     for k in np.flatnonzero(np.array(bodies.links) == link):
         p, v, u = start[:, k], vector[:, k], axis[:, k]
-        # Of a cylinder that moves across its axis the nearest place, else the middle of the axis.
+        # The nearest place of a cylinder that moves across its axis, else the middle of the axis.
         nearest = np.clip((points - p) @ v / max(float(v @ v), 1e-300), 0.0, 1.0)
         ways = []
         for t in (nearest, np.full(len(points), 0.5)):

@@ -7,15 +7,15 @@ Plan random goals with the planner of an older checkout and with this one, and c
     python test/support/compare_planners.py /tmp/before [-n GOALS] [-s SEED] [--case FAMILY:NUMBER]
 
 The older package is copied under another name, and goals are pickled by the one and read by the
-other, so both run in one process. Compared are class, code and text of refusals; else report,
-joints, primitives, outputs and reference path (1e-9), times and what follows from them (points
-are fitted to their times within 1e-7 s). Exit status 1, and a line for each difference, if there
-are any.
+other, so both run in one process. For refusals, class, code and text are compared; for plans,
+report, joints, primitives, outputs and reference path (1e-9), times and values that depend on them
+(points are fitted to their times within 1e-7 s). If there are differences, each gets a line, and
+the exit status is 1.
 
 Families: the strategies of ``test_random_goals`` (``fuzz``), ``random_goals``, ``mixed_goals``;
 ``long``: many points of all kinds close together, with blends that just fit; ``spline``.
 
-Differences that are intended do not count (:data:`REPAIRS`, :data:`INTENDED`, :func:`distinct`).
+Intended differences do not count (:data:`REPAIRS`, :data:`INTENDED`, :func:`distinct`).
 """
 
 import argparse
@@ -53,17 +53,17 @@ REPAIRS = (
         'drafts[n].blend_before = drafts[n].blend_after = None\n',
     ),
 )
-#: Lines of reports that only one of both may have: a speed that rounding alone lowers is remarked
-#: no longer; inner points at which the arm stops are listed.
+#: Lines that only one of both reports may have: a speed that rounding alone lowers has no remark
+#: any more; inner points at which the arm stops are listed.
 INTENDED = re.compile(r'slowed from (\S+) to \1 |: the arm stops there, because there is no blend')
-#: Where a margin is equally tight at several places, rounding decides which of them is named.
+#: If a margin is equally tight at several places, rounding decides which of them is named.
 PLACE = re.compile(r' at \d+ %')
-#: Between which shapes a clearance was measured was not said before.
+#: Older reports do not name the shapes between which a clearance was measured.
 SHAPES = re.compile(r' \((cylinders|meshes of the \w+)\)')
-#: By the last name of a field; else 1e-9 (relative to values above 1).
+#: Tolerances by the last name of a field; for others 1e-9 (relative to values above 1).
 TOLERANCES = {
     **dict.fromkeys(('durations', 'duration'), 1e-7),
-    # That of some milliseconds in a blend; of others times hardly depend.
+    # Moves of some milliseconds in a blend; the times of others hardly depend on these.
     **dict.fromkeys(('velocities', 'velocity'), 1e-5),
     **dict.fromkeys(('accelerations', 'acceleration', 'blend_entries'), 1e-5),
 }
@@ -71,7 +71,7 @@ SHARES = {'fuzz': 0.35, 'mixed': 0.3, 'random': 0.15, 'long': 0.15, 'spline': 0.
 
 
 def copy_before(checkout, folder):
-    """Copy the package of a checkout under its other name."""
+    """Copy the package of a checkout under another name, :data:`OLD`."""
     package = folder / OLD
     shutil.copytree(Path(checkout) / PACKAGE, package, ignore=shutil.ignore_patterns('*.pyc'))
     for module in package.rglob('*.py'):
@@ -84,7 +84,7 @@ def copy_before(checkout, folder):
 
 class _ByName(pickle.Pickler):
     def reducer_override(self, thing):
-        """Reduce a dataclass to its fields by name: the older one may have fewer."""
+        """Reduce a dataclass to its fields by name: the older class may have fewer."""
         if not is_dataclass(thing) or isinstance(thing, type):
             return NotImplemented
         return made, (
@@ -95,7 +95,7 @@ class _ByName(pickle.Pickler):
 
 class _Renaming(pickle.Unpickler):
     def find_class(self, module, name):
-        """Return the class of the older package, `unknown` if it has none."""
+        """Return the class of the older package, or `unknown` if it has none."""
         try:
             return super().find_class(re.sub(rf'^{PACKAGE}\b', OLD, module), name)
         except (AttributeError, ModuleNotFoundError):
@@ -103,14 +103,14 @@ class _Renaming(pickle.Unpickler):
 
 
 def unknown(*values):
-    """Stand for a class that the older package has not."""
+    """Stand for a class that the older package lacks."""
 
 
 def made(kind, values):
-    """Return an object with those of the values that its class has a field for."""
+    """Return an object with the values that its class has fields for."""
     if kind is unknown:
         return None
-    if kind.__name__ == 'Dialect':  # whichever fields its row has
+    if kind.__name__ == 'Dialect':  # the row of the older table, whatever its fields
         return import_module(kind.__module__).DIALECTS[values['name']]
     thing = object.__new__(kind)
     for each in fields(kind):
@@ -119,7 +119,7 @@ def made(kind, values):
 
 
 def as_before(thing):
-    """Return an object as one of the older package; what that does not know is left out."""
+    """Return an object as one of the older package, without values that package lacks."""
     pickled = BytesIO()
     _ByName(pickled).dump(thing)
     return _Renaming(BytesIO(pickled.getvalue())).load()
@@ -135,7 +135,7 @@ def state_of(arm, q, tool):
 
 
 def drawn_options(rng, chosen):
-    """Return options, some of them drawn."""
+    """Return options, some of them drawn at random."""
     chosen = {'self_collision': 'off', **chosen}
     if rng.random() < 0.3:
         chosen['on_posture_change'] = 'movej'
@@ -149,7 +149,7 @@ def drawn_options(rng, chosen):
 
 
 def fuzz_goals(n, first):
-    """Return goals of the strategies of the tests, sound and absurd."""
+    """Return sound and absurd goals, by the strategies of the tests."""
     sys.path.insert(0, str(Path(__file__).parents[1] / 'planning'))
     fuzz, cells = import_module('test_random_goals'), import_module('conftest')
     found = []
@@ -282,13 +282,13 @@ def described(error):
 
 
 def field_of(thing, name):
-    """Return a field; the rows of segments without a pose on an arc have any number there."""
+    """Return a field; of ``vias``, only rows with a via, because others have any number."""
     value = getattr(thing, name)
     return value[thing.has_via] if name == 'vias' else value
 
 
 def difference(a, b, path):
-    """Return where two values differ; '' = nowhere."""
+    """Return the first difference of two values, with its place; '' = they are equal."""
     if is_dataclass(a):
         if type(a).__name__ != type(b).__name__:
             return f'{path}: {type(a).__name__}, {type(b).__name__}'
@@ -329,7 +329,7 @@ def distinct(reference):
 
 
 def compare(old, new):
-    """Return where two outcomes differ; '' = nowhere."""
+    """Return the first difference of two outcomes; '' = they are equal."""
     if isinstance(old, Exception) or isinstance(new, Exception):
         a, b = (described(one) if isinstance(one, Exception) else 'planned' for one in (old, new))
         return '' if a == b else f'\n    {a}\n    {b}'
@@ -347,7 +347,7 @@ def compare(old, new):
     names = ('rows', 'start', 'duration', 'T_flange_active', 'T_flange_tcp', 'T_tcp_controlled')
     for name in (*names, 'execution', 'goal'):
         a, b = getattr(old, name), getattr(new, name)
-        if name == 'rows':  # their lines are compared above; primitives may be columns or objects
+        if name == 'rows':  # reports are compared above; primitives may be columns or objects
             a, b = (
                 replace(rows, report_lines=(), notes={}, primitives=tuple(rows.primitives))
                 for rows in (a, b)

@@ -8,7 +8,7 @@ from math import degrees
 import numpy as np
 from scipy.spatial import cKDTree
 
-#: Largest distance of curves from the lines between their points, and of points on lines [m].
+#: Largest distance of curves from the lines between their points, and between these points [m].
 SAG, SPACING = 5e-7, 2e-3
 
 
@@ -43,7 +43,7 @@ def arc_points(a, via, b):
 
 
 def arc_count(angle: float, radius: float) -> int:
-    """Return how many points an arc [degrees, m] needs; an ellipse, with its larger radius."""
+    """Return the number of points for an arc [degrees, m]; an ellipse has its larger radius."""
     return 2 + int(angle / min(1.0, degrees((8.0 * SAG / max(radius, 1e-9)) ** 0.5)))
 
 
@@ -64,14 +64,14 @@ def distances(points: np.ndarray, curves: Sequence[np.ndarray], enough: float = 
         along = np.einsum('nkj,nkj->nk', points[rest, None] - a, d)
         foot = a + np.clip(along / np.where(square > 0, square, 1), 0, 1)[..., None] * d
         found[rest] = np.linalg.norm(points[rest, None] - foot, axis=2).min(axis=1)
-        # All others have their middles farther away than the last one.
+        # The middles of all other lines are farther away than the last one.
         is_known = (found[rest] <= enough) | (found[rest] <= apart[:, -1] - 0.5 * longest)
         rest = rest[~is_known] if k < len(starts) else rest[:0]
     return found
 
 
 def samples(curves: Iterable[np.ndarray]) -> np.ndarray:
-    """Return points on polylines, no farther apart than the spacing."""
+    """Return points on polylines, at most ``SPACING`` apart."""
     return np.vstack([_dense(curve) for curve in curves])
 
 
@@ -85,9 +85,9 @@ def _dense(curve):
 
 def places_along(curve: np.ndarray, positions: np.ndarray, reach: float):
     """
-    Return for each position (n, 3) the side of a polyline that it is on, and its distance [m].
+    Return, for each position (n, 3), its side of a polyline and its distance from the side [m].
 
-    :param reach: two positions skip no side that is longer than this [m].
+    :param reach: from one position to the next, no longer stretch of sides is skipped [m].
     """
     side, found = 0, []
     a, along = curve[:-1], np.diff(curve, axis=0)

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A server in place of the Robot API, which knows nothing of our code.
+A server in place of the Robot API, which shares no code with the package.
 
-It is Python's own, and answers as the manufacturer's client library and its tests have it.
+It is Python's own server, and its answers follow the manufacturer's client library and its tests.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Answer: TypeAlias = Any
 
 class DocumentedRobot(http.server.ThreadingHTTPServer):
     """
-    Answers each request as it was told to, and keeps the requests.
+    Gives the prescribed answer to each request, and keeps the requests.
 
     :param answers: (method, path below API) -> answer, or one answer to all requests.
     """
@@ -84,7 +84,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
 def documented_robot(
     answers: Mapping[tuple[str, str], Answer] | Answer,
 ) -> Iterator[DocumentedRobot]:
-    """Serve these answers in a thread."""
+    """Serve answers in a thread."""
     with DocumentedRobot(answers) as server:
         thread = threading.Thread(target=server.serve_forever, args=(0.01,))
         thread.start()

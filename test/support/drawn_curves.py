@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Curves that ezdxf's drawing front end draws for a file: which are seen, and where they lie.
+The visible curves of a file, and their points, as ezdxf's drawing front end draws them.
 
 The front end approximates arcs and splines by cubic Bézier curves. Here the curves are sampled by
-ezdxf's own evaluation of the entities that it decides to draw, also of those in blocks.
+ezdxf's own evaluation of the entities that it decides to draw, including entities in blocks.
 """
 
 from io import StringIO
@@ -20,7 +20,7 @@ from ezdxf.entities import Insert
 import numpy as np
 
 logging.getLogger('ezdxf').setLevel(logging.CRITICAL)
-#: What has no path.
+#: Entities without a path.
 OTHERS = (
     *('POINT', 'HATCH', 'MPOLYGON', 'MESH', 'WIPEOUT', 'MTEXT', 'OLE2FRAME', 'IMAGE', 'TEXT'),
     *('ATTRIB', 'ATTDEF', 'XLINE', 'RAY', '3DFACE', 'SOLID', 'TRACE'),
@@ -28,7 +28,7 @@ OTHERS = (
 
 
 class _Nowhere:
-    """A pipeline that draws nothing; the front end is asked for its decisions only."""
+    """A pipeline that draws nothing: only the decisions of the front end are needed."""
 
     def __getattr__(self, name):
         return lambda *arguments, **options: None
@@ -38,7 +38,7 @@ AbstractPipeline.register(_Nowhere)
 
 
 class DrawnCurves(UniversalFrontend):
-    """Collects the curves of a drawing, whose unit [m] says how dense their points are."""
+    """Collects the curves of a drawing; its unit [m] determines the density of their points."""
 
     def __init__(self, doc, unit):
         super().__init__(
@@ -67,7 +67,7 @@ class DrawnCurves(UniversalFrontend):
             if entity.is_polygon_mesh or entity.is_poly_face_mesh:
                 return
             if entity.is_2d_polyline and not entity.dxf.hasattr('elevation') and len(entity):
-                entity.dxf.elevation = (0, 0, entity[0].dxf.location.z)  # as the front end
+                entity.dxf.elevation = (0, 0, entity[0].dxf.location.z)  # as in the front end
         for part in entity.virtual_entities():
             self.curves.append(curve_points(part, self.unit))
 
@@ -98,8 +98,8 @@ def spline_points(tool, unit):
     """
     Return points on a spline.
 
-    It lies between those knots where its basis functions add up to 1. ezdxf draws the other spans
-    too, of a spline whose first or last knots differ; there the curve leaves its control points.
+    A spline lies between the knots at which its basis functions add up to 1. If its first or last
+    knots differ, ezdxf also draws the other spans, in which the curve leaves its control points.
     """
     knots = np.array(tool.knots())
     first, last = knots[tool.degree], knots[tool.count]

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Drawings in short: group codes and values in a row, `LINE 8 0 10 0 20 0 11 10 21 0`."""
+"""Drawings in a short form: group codes and values, `LINE 8 0 10 0 20 0 11 10 21 0`."""
 
 from collections.abc import Iterable, Mapping
 
@@ -21,7 +21,7 @@ def drawing(
     """
     Return the text of a drawing.
 
-    :param blocks: by their heads, `B 10 0 20 0`, which begin with the name.
+    :param blocks: entities by the heads of their blocks, such as `B 10 0 20 0` of the block B.
     """
     parts = ['0 SECTION 2 HEADER']
     if version:
@@ -40,19 +40,19 @@ def drawing(
 
 
 def imported(folder, text: str | bytes, **options):
-    """Return the goal of a drawing; without other options its points are all that it has."""
+    """Import a drawing; without options the goal has only the points of the drawing."""
     file = folder / 'part.dxf'
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
     return import_file(file, ImportOptions(**options))
 
 
 def millimetres(found) -> np.ndarray:
-    """Return the points (n, 3) of a goal."""
+    """Return the points (n, 3) of a goal [mm]."""
     return 1e3 * np.array(found.goal.waypoints.poses)[:, :3]
 
 
 def vias(found) -> np.ndarray:
-    """Return the points on arcs (n, 3)."""
+    """Return the points on arcs (n, 3) [mm]."""
     has = np.array(found.goal.segments.has_via)
     return 1e3 * np.array(found.goal.segments.vias)[has, :3]
 
@@ -63,7 +63,7 @@ def remarks(found) -> str:
 
 
 def line_of(text: str, entity: str, count: int = 1) -> int:
-    """Return the line of the code 0 of the entity that is the so manyth of its kind."""
+    """Return the line of the code 0 that begins the ``count``-th entity of a kind."""
     lines = text.splitlines()
     found = [i for i in range(1, len(lines), 2) if lines[i] == entity and lines[i - 1] == '0']
     return found[count - 1]

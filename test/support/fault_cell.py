@@ -41,7 +41,7 @@ PORTS = {
 
 
 async def inject_cause(cell: RobotCell, cause: str):
-    """Inject a fault: one of the simulator's, or one of its network, clients and owner."""
+    """Inject a fault of the simulator, or of its network, clients or owner."""
     kind, _, what = cause.partition(' ')
     if cause == 'crash':
         await cell.crash_robot()
@@ -78,7 +78,7 @@ async def inject_cause(cell: RobotCell, cause: str):
 
 
 def setpoint_connections(cell: RobotCell):
-    """Return the client ends of the connections on which set-points are written."""
+    """Return the client ends of the connections that carry set-points."""
     return [
         end
         for end in cell.loop.open_ends(robot_cell.RTDE)
@@ -96,7 +96,7 @@ async def take_inputs():
 
 
 async def end_faults(cell: RobotCell):
-    """End the faults that last, and close dead connections that still block the robot."""
+    """End the lasting faults, and close dead connections that still block the robot."""
     cell.robot.clear_faults()
     while cell.other_clients:
         cell.other_clients.pop().close()
@@ -120,7 +120,7 @@ PENDANT = {
 
 
 async def command(cell: RobotCell, name: str):
-    """Give a command by the dashboard, or in local control at the pendant."""
+    """Give a command by the dashboard or, in local control, at the pendant."""
     if cell.robot.controller.takes_scripts:
         await cell.dashboard(name)
     else:
@@ -152,12 +152,12 @@ async def perform(cell: RobotCell, step: str):
             await cell.until(lambda: controller.programs.state in PLAYABLE_STATES)
             await command(cell, 'play')
         case 'resend':
-            # What runs on the robot is known from the newest packet.
+            # The newest packet tells which program runs on the robot.
             await cell.sleep(cell.max_packet_gap)
             connected = cell.count_connected_programs()
             cell.resend()
             if cell.is_ready():
-                # It may replace the one that is connected within a cycle.
+                # It may replace the connected program within a cycle.
                 await cell.until(
                     lambda: not cell.is_ready() or cell.count_connected_programs() > connected
                 )
@@ -167,7 +167,7 @@ async def perform(cell: RobotCell, step: str):
             await cell.reboot_robot()
             await cell.until(lambda: cell.status.state is ConnectionState.CONNECTED, 5.0)
         case 'wait for the robot':
-            # States that are old leave the driver CONNECTED, until it gives their connection up.
+            # With old states the driver stays CONNECTED until it gives up their connection.
             await cell.until(
                 lambda: (
                     cell.status.state is ConnectionState.CONNECTED
@@ -197,7 +197,7 @@ async def recover(cell: RobotCell, steps):
 
 
 def has_other_program_ended(cell: RobotCell, row: Row) -> bool:
-    """Tell whether the motion of another client, if it is the fault, has begun and ended."""
+    """Return whether the motion of another client, if it is the fault, has begun and ended."""
     programs = cell.robot.controller.programs
     return not row.cause[0].startswith(FOREIGN_MOTION) or (
         programs.name == FOREIGN_MOTION and not programs.running
@@ -225,7 +225,7 @@ async def run_scenario(cell: RobotCell, row: Row, phase: str, kind=BlendGoal):
     if row.waits:
         await check_waiting_goal(cell, goal, row, phase, context)
     elif phase == 'settling' and row.code is ErrorCode.SUCCESSFUL:
-        await end_faults(cell)  # what kept it from settling
+        await end_faults(cell)  # they kept it from settling
     await cell.until(
         lambda: goal.motion.outcome, row.result_within if not row.waits else 2.0, context
     )
@@ -238,7 +238,7 @@ async def run_scenario(cell: RobotCell, row: Row, phase: str, kind=BlendGoal):
         context,
     )
     goal.record_end()
-    # An arm that sets out after the last packet has moved unseen.
+    # If the arm sets out after the last packet, nobody has seen its motion.
     is_unseen = phase == 'arming' and outcome.code is ErrorCode.CONNECTION_LOST
     if not (phase in BEFORE or is_unseen or row.cause[0].startswith(FOREIGN_MOTION)):
         goal.check_place(context)
@@ -278,7 +278,7 @@ async def check_waiting_goal(cell, goal, row, phase, context):
 
 
 async def return_home(cell, home, context):
-    """Run the next goal, back to where the arm was before."""
+    """Run the next goal, back to the former place of the arm."""
     x, y, z = (
         a - b for a, b in zip(home, cell.memory.read().actual_tcp_pose.position, strict=True)
     )

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The goals of the fault matrix, and how each is brought to a phase.
+The goals of the fault matrix, and the ways to bring each of them to a phase.
 
 A phase is recognised by messages on the wire, by the points that the robot program has begun and
-by the position of the tool; never by the time that it should take.
+by the position of the tool; never by an expected time.
 """
 
 from dataclasses import replace
@@ -61,16 +61,16 @@ SIDE, BLEND = 0.05, 0.015
 #: [m/s], and time for settling [s].
 PATH_TOLERANCE, GOAL_TOLERANCE, TWIST_TOLERANCE, SETTLING = 0.004, 0.001, 0.3, 1.4
 
-#: The output of a process, which is on while a goal runs and off when it does not go on [pin].
+#: The output of a process [pin], on while a goal runs and off when the goal does not go on.
 PROCESS = 5
 SAFE_OUTPUTS = (
     SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=PROCESS, value=0.0, restore=True),
 )
-#: A tool that is farther from where it was has begun [m].
+#: A motion has begun when the tool is farther than this from its start [m].
 BEGUN = 0.001
-#: How long it may take until a robot that was out of reach is written to [s].
+#: Longest time until the driver writes to a robot that was out of reach [s].
 REACHED_WITHIN = 1.0
-#: No goal takes longer to a phase [s]: imperfect arms creep, and delayed threads begin late.
+#: Longest time of a goal to a phase [s]: imperfect arms creep, and delayed threads begin late.
 PHASE_WITHIN = 5.0
 
 ARM = Arm(robot_model('ur5e'))
@@ -115,21 +115,21 @@ class FaultGoal:
         self._results, self._results_before = end.peer.received, len(end.peer.received)
         self.motion: CellMotion | None = None
 
-    #: The arm, for a goal whose path may give way.
+    #: The arm, for a goal whose path can give way.
     arm: ArmSetup | None = None
     #: Whether its process has an output that has to be safe.
     has_process = True
-    #: Whether the arm was in place already in a pause: the output is restored if the goal goes on
-    #: after the pause, and stays off if it ended in it.
+    #: Whether the arm was in place already during a pause: the output is restored if the goal goes
+    #: on after the pause, and stays off if the goal ended in the pause.
     may_end_in_pause = False
 
     def send(self):
-        """Send it to the robot loop, with the output of its process switched on."""
+        """Send the goal to the robot loop, with the output of its process switched on."""
         self.switch_process(True)
         self.send_motion()
 
     def send_motion(self):
-        """Send it to the robot loop."""
+        """Send the goal to the robot loop."""
         self.motion = self.cell.owner.start(self.plan, arm=self.arm)
 
     def switch_process(self, on):
@@ -137,13 +137,13 @@ class FaultGoal:
         self.cell.robot.controller.io.digital_out.standard[PROCESS] = on
 
     def is_process_on(self):
-        """Return the output of the process, as the controller has it."""
+        """Return whether the controller has switched the output of the process on."""
         return self.cell.robot.controller.io.digital_out.standard[PROCESS]
 
     async def check_process(self, context):
         """Check the output of the process after the end of a goal: off unless it succeeded."""
         code = self.motion.outcome.code
-        if not self.has_process or code is ErrorCode.ROBOT_NOT_READY:  # it has not begun
+        if not self.has_process or code is ErrorCode.ROBOT_NOT_READY:  # no process has begun
             return
         if self.may_end_in_pause:
             return
@@ -153,21 +153,21 @@ class FaultGoal:
         )
 
     def check_place(self, context):
-        """Check that a goal that did not succeed says where it was stopped, if it has moved."""
+        """Check that a failed goal reports the place of its stop, if the arm has moved."""
         tool, outcome = self.cell.robot.controller.motion.T_base_tcp.position, self.motion.outcome
         if dist(tool, self.start) > BEGUN and not outcome.succeeded:
             assert outcome.stopped, context
 
     def plan_from(self, start: StartState):
-        """Return the plan, cached: the arm begins at the same pose each time."""
+        """Return the plan; it is cached, because the arm begins at the same pose each time."""
         raise NotImplementedError
 
     def is_in(self, phase: str) -> bool:
-        """Tell whether the goal has reached a phase."""
+        """Return whether the goal has reached a phase."""
         raise NotImplementedError
 
     async def bring_to(self, phase: str):
-        """Bring the goal to a phase; phases before it is sent need nothing."""
+        """Bring the goal to a phase; phases before the sending of the goal need nothing."""
         if phase in BEFORE:
             return
         if phase == 'settling':
@@ -192,14 +192,14 @@ class FaultGoal:
         """Send the points of the goal that come after the fault."""
 
     def is_over(self):
-        """Tell whether the robot has nothing more to do for it, besides being at rest."""
+        """Return whether the robot has nothing left to do for the goal, besides coming to rest."""
         return True
 
     def record_end(self):
-        """Record what later checks compare, when the goal has ended and the arm is at rest."""
+        """Record values for later checks, when the goal has ended and the arm is at rest."""
 
     def check_result(self, row, phase):
-        """Check, after the recovery, what this execution mode leaves behind."""
+        """Check the effects of this execution mode, after the recovery."""
 
     def points_begun(self):
         """Return the number of points that the robot program has begun."""
@@ -211,20 +211,20 @@ class FaultGoal:
         return x - self.start[0], y - self.start[1]
 
     def was_action_sent(self, action):
-        """Tell whether a trajectory action was sent for this goal."""
+        """Return whether a trajectory action was sent for this goal."""
         return any(
             message.mode is ControlMode.FORWARD and message.payload[0] == action
             for message in self.cell.control_messages(self._messages_before)
         )
 
     def was_mode_sent(self, mode):
-        """Tell whether a control mode was requested for this goal."""
+        """Return whether a control mode was requested for this goal."""
         return any(
             message.mode is mode for message in self.cell.control_messages(self._messages_before)
         )
 
     def has_result(self):
-        """Tell whether the robot program has reported the end."""
+        """Return whether the robot program has reported the end."""
         return len(self._results) > self._results_before
 
 
@@ -284,7 +284,7 @@ def half_circle_state(time):
     """
     Return position, velocity and acceleration (x, y) relative to the start, from rest to rest.
 
-    The angle is pi (10 s^3 - 15 s^4 + 6 s^5), s the fraction of the time that has passed.
+    The angle is pi (10 s^3 - 15 s^4 + 6 s^5); s is the elapsed fraction of the time.
     """
     s = time / HALF_CIRCLE
     angle = pi * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
@@ -330,7 +330,7 @@ def half_circle(start, execution):
 
 
 class SplineGoal(FaultGoal):
-    """A half circle, as splines that the robot program interpolates."""
+    """A half circle, as splines that the robot program interpolates (SPLINE)."""
 
     execution = ExecutionMode.SPLINE
 
@@ -352,7 +352,7 @@ class SplineGoal(FaultGoal):
 
 
 class ServoGoal(SplineGoal):
-    """The same half circle, as set-points through RTDE that the robot program buffers."""
+    """A half circle, as set-points through RTDE that the robot program buffers (SERVO)."""
 
     execution = ExecutionMode.SERVO
 
@@ -370,7 +370,7 @@ class ServoGoal(SplineGoal):
         assert not self.cell.at_rest()
 
 
-#: How long the arm of a goal that waits for it is held off its path [s].
+#: How long the arm is held off its path, for a goal that waits for the arm [s].
 PUSHED = 0.85
 
 
@@ -385,7 +385,7 @@ def patient_half_circle(start):
 
 
 class WaitingGoal(ServoGoal):
-    """The same half circle, which waits for its arm."""
+    """A half circle that waits for its arm."""
 
     _pushed_until = 0.0
 
@@ -403,7 +403,7 @@ class WaitingGoal(ServoGoal):
         return self._pushed_until and self.cell.at_rest()
 
 
-#: How far the path of a goal gives way [m].
+#: Sideways distance by which the path of a goal gives way [m].
 SIDEWAYS = 0.002
 
 
@@ -418,7 +418,7 @@ def displaced_half_circle(start):
 
 
 class OffsetGoal(ServoGoal):
-    """The same half circle, beside which the tool moves because an offset came once."""
+    """A half circle; the tool moves beside it, because an offset came once."""
 
     arm = ArmSetup.of(ARM)
 
@@ -451,7 +451,7 @@ def displaced_line(start):
 
 
 class OffsetMoveGoal(FaultGoal):
-    """A line by the controller, beside which the tool moves because an offset came once."""
+    """A line by the controller; the tool moves beside it, because an offset came once."""
 
     def plan_from(self, start):
         return displaced_line(start)
@@ -476,7 +476,7 @@ def fed_half_circle(start, execution):
 
 
 class FedGoal(SplineGoal):
-    """The same half circle, slowed because its signal has ended."""
+    """A half circle, slowed because its feed signal has ended."""
 
     def plan_from(self, start):
         return fed_half_circle(start, self.execution)
@@ -487,7 +487,7 @@ class FedGoal(SplineGoal):
 
 
 class FedServoGoal(FedGoal, ServoGoal):
-    """The same as set-points."""
+    """A half circle as set-points, slowed because its feed signal has ended."""
 
     execution = ExecutionMode.SERVO
 
@@ -497,7 +497,7 @@ class FedServoGoal(FedGoal, ServoGoal):
 AT_CORNER, AFTER_END, DELAY = 2, 3, 0.6
 #: The current of an analog output at 0 [A].
 IDLE_CURRENT = 0.004
-#: A goal that ends within this time ended because the robot program stopped at once [s].
+#: If a goal ends within this time, the robot program stopped at once [s].
 IMMEDIATE_END = 0.3
 
 
@@ -537,7 +537,7 @@ class OutputGoal(BlendGoal):
             case 'before the time':
                 return (
                     self.points_begun() == 3
-                    and self.tool_offset()[1] < 1e-3  # planned from a measured pose
+                    and self.tool_offset()[1] < 1e-3  # the plan begins at a measured pose
                     and self.cell.at_rest()
                 )
         raise AssertionError(phase)
@@ -561,7 +561,7 @@ class OutputGoal(BlendGoal):
         """
         Check that all outputs switched, or that none was switched on, and none after the end.
 
-        A paused program switches off what waits for it as soon as it goes on.
+        A paused program switches off the outputs that wait for it as soon as it goes on.
         """
         now, here = self._outputs(self.cell), (row.fault, phase)
         if row.code is ErrorCode.SUCCESSFUL:
@@ -586,7 +586,7 @@ PULSED, AHEAD = 4, 2
 
 @lru_cache
 def pulse_plan(start):
-    """Return the plan around the square with pulses, and a lead to a place on the last side."""
+    """Return the plan around the square with pulses, and with a lead on the last side."""
     train = PulseTrain(
         first_waypoint=0,
         last_waypoint=2,
@@ -636,14 +636,14 @@ class PulseGoal(BlendGoal):
         )
 
     def check_result(self, row, phase):
-        """Check that all pulses came, or none after the end; and the output with the lead."""
+        """Check that all pulses came, or none after the end; check the output with the lead."""
         succeeded, here = row.code is ErrorCode.SUCCESSFUL, (row.fault, phase)
         assert self._outputs[AHEAD] == (succeeded or self._ahead_at_end), here
         assert not self._outputs[PULSED], here
         if succeeded:
             (law,) = [one for one in self.plan.instructions if isinstance(one, PulseLaw)]
             assert (self._count() - self._count_before) % PULSE_COUNTS == law.count, here
-        else:  # a program that starts anew counts from 0
+        else:  # a restarted program counts from 0
             assert self._count() in (self._count_at_end, 0), here
             assert not self._ahead_at_end or row.result_within > IMMEDIATE_END, here
 
@@ -653,7 +653,7 @@ class PulseGoal(BlendGoal):
 
 @lru_cache
 def rounded_output_plan(start, values, execution):
-    """Return the same around rounded corners."""
+    """Return the plan with two outputs around rounded corners."""
     made = output_plan(start, values).goal
     goal = Goal(
         waypoints=tuple(Waypoint(pose=point.pose) for point in made.waypoints),
@@ -671,7 +671,7 @@ def rounded_output_plan(start, values, execution):
 
 
 class RoundedGoal(OutputGoal):
-    """Three sides of a square with rounded corners and the same outputs."""
+    """Three sides of a square with rounded corners and outputs."""
 
     execution = ExecutionMode.SPLINE
 
@@ -693,7 +693,7 @@ class RoundedGoal(OutputGoal):
 
 @lru_cache
 def held_part_plan(start, values):
-    """Return the same motion of the flange, as a path on a part before a tool that stands."""
+    """Return a plan of the same flange motion, as a path on a held part before a fixed tool."""
     goal = rounded_output_plan(start, values, ExecutionMode.SPLINE).goal
     flange = start.state.actual_tcp_pose @ start.state.T_flange_tcp.inverse()
     to_flange = start.state.T_flange_tcp.inverse()
@@ -706,21 +706,21 @@ def held_part_plan(start, values):
 
 
 class HeldPartGoal(RoundedGoal):
-    """The same, on a part in the hand."""
+    """The motion of a rounded goal, as a path on a part in the hand."""
 
     def plan_from(self, start):
         return held_part_plan(start, tuple(not value for value in self._before))
 
 
 class ServoOutputGoal(RoundedGoal):
-    """The same by set-points."""
+    """The rounded goal by set-points."""
 
     execution = ExecutionMode.SERVO
     cancel = ServoGoal.cancel
 
 
-#: How long the arm rests in a corner, and how long after the fault an input comes for which it
-#: waits in another one [s]; the number of that input.
+#: Rest of the arm in a corner [s]; time from the fault to an input for which the arm waits in
+#: another corner [s]; the number of this input.
 REST, COMES_AFTER, AWAITED = 0.8, 0.4, 6
 
 
@@ -889,7 +889,8 @@ class PressGoal(BlendGoal):
         return self.points_begun() == 4 and self._contact.wrench[2] > 10.0
 
     def is_over(self):
-        # A paused program that nobody may stop keeps it; the safety system holds the arm.
+        # A paused program that nobody may stop keeps the press mode; the safety system holds the
+        # arm.
         paused = self.cell.robot.controller.programs.state is RuntimeState.PAUSED
         return paused or self._contact.force_mode is None
 
@@ -916,7 +917,7 @@ def rest_of_half_circle(start, execution, *, from_rest):
 
 @lru_cache
 def new_tail_of_half_circle(start):
-    """Return the append plan of the last two points, of which one replaces that which is known."""
+    """Return the append plan of the last two points; the first of them replaces a known one."""
     part, appended = half_circle_to_append(start, ExecutionMode.SERVO)
     known = half_circle_goal(start.state, ExecutionMode.SERVO).waypoints[2:3]
     tail = replace(appended, waypoints=(*known, *appended.waypoints), replace_from_point=2)
@@ -948,7 +949,7 @@ class AppendGoal(SplineGoal):
         return [self.plan.reference, self._rest('moving').plan.reference]
 
     def _rest(self, phase):
-        """Return the append plan of what comes after the fault."""
+        """Return the append plan of the points after the fault."""
         return rest_of_half_circle(
             self._beginning,
             self.execution,
@@ -967,7 +968,7 @@ class AppendGoal(SplineGoal):
 
 
 class ReplacedTailGoal(AppendGoal, ServoGoal):
-    """The same as set-points; what comes while the arm moves replaces the last known point."""
+    """The same as set-points; points sent during the motion replace the last known one."""
 
     execution = ExecutionMode.SERVO
 
@@ -991,7 +992,7 @@ class FreedriveGoal(FaultGoal):
     has_process = False
 
     def check_place(self, context):
-        """It has no path."""
+        """Check nothing, because freedrive has no path."""
 
     def send_motion(self):
         self.motion = self.cell.owner.run(b'', stationary_job(self.plan), freedrive=True)
@@ -1000,7 +1001,7 @@ class FreedriveGoal(FaultGoal):
         return self._is_freedrive_active() and self.motion.progress
 
     def is_over(self):
-        # A paused program cannot end it; the safety system holds the arm.
+        # A paused program cannot end freedrive; the safety system holds the arm.
         paused = self.cell.robot.controller.programs.state is RuntimeState.PAUSED
         return paused or not self._is_freedrive_active()
 

@@ -3,9 +3,9 @@
 """
 The fault matrix of the other execution modes: their phases, and the faults that may differ.
 
-Each fault is a row of :mod:`fault_table`, with what this execution mode changes about it. What
-cannot differ, because it is decided before the execution mode matters (idle, planning), or
-happens to interfaces that none of them uses, is not run again.
+Each fault is a row of :mod:`fault_table`, with the changes of an execution mode. Faults are not
+run again if their outcome cannot differ: it is decided before the execution mode matters (idle,
+planning), or no execution mode uses the affected interface.
 """
 
 from collections.abc import Iterable
@@ -23,7 +23,7 @@ E, S = ErrorCode, ConnectionState
 
 @dataclass(frozen=True, kw_only=True)
 class Mode:
-    """A execution mode under faults."""
+    """An execution mode under faults."""
 
     #: Name of its goals in tests and on the page.
     name: str
@@ -35,11 +35,11 @@ class Mode:
     continued: tuple[Row, ...]
     #: Settings of the driver beyond the usual ones.
     settings: dict[str, Any] = field(default_factory=dict)
-    #: Times of a goal that the fault does not disturb [s].
+    #: Longest times to the result and to rest of a goal that the fault does not disturb [s].
     undisturbed: float
 
 
-#: Faults that meet what every execution mode has of its own: program, points, packets, stops.
+#: Faults of the parts that each execution mode has of its own: program, points, packets, stops.
 FAULTS = (
     'protective stop',
     'emergency stop',
@@ -60,7 +60,7 @@ FAULTS = (
     'the pose is measured 6 mm off',
     'the node is silent',
 )
-#: Those that may differ where something is done at points or along the path.
+#: Faults whose outcome may differ if something is done at points or along the path.
 WITH_POINTS = tuple(
     name
     for name in FAULTS
@@ -86,7 +86,7 @@ ON_THE_PENDANT = (
     'the network cable is cut',
 )
 
-#: With on_robot_stop: continue.
+#: Faults that are run with on_robot_stop: continue.
 CONTINUES = ('protective stop',)
 
 
@@ -98,7 +98,7 @@ def select_rows(
     changes: dict[str, dict[str, dict[str, Any]]],
 ) -> tuple[Row, ...]:
     """
-    Return rows of a table for the phases of a execution mode.
+    Return rows of a table for the phases of an execution mode.
 
     :param names: faults, in this order.
     :param undisturbed: time of a goal that a fault does not disturb [s].
@@ -138,7 +138,7 @@ def _with_times(row: Row, undisturbed: float) -> Row:
 
 
 def _times(row: Row, undisturbed: float, differing: dict[str, Any]) -> dict[str, Any]:
-    """Return the differences with the times of a goal that is not disturbed."""
+    """Return the differences; an undisturbed goal also gets its own times."""
     if row.code is not E.SUCCESSFUL or row.waits:
         return differing
     return differing | {'result_within': undisturbed, 'rest_within': undisturbed}
@@ -159,10 +159,10 @@ def _mode(
     pendant_changes: dict[str, dict[str, dict[str, Any]]] | None = None,
 ) -> Mode:
     """
-    Return a execution mode.
+    Return an execution mode.
 
     :param once: a phase, and further faults that are tested in this phase only.
-    :param pendant_changes: changes of the rows of the pendant, if they differ.
+    :param pendant_changes: changes of the pendant's rows; None = the same changes.
     """
     return Mode(
         name=name,
@@ -203,7 +203,7 @@ SPLINE = _mode(
     },
 )
 
-#: Faults of the connection of the set-points.
+#: Faults of the connection that carries the set-points.
 SETPOINTS = (
     Row(
         fault='the connection of the set-points is cut',
@@ -269,10 +269,10 @@ _NO_SETPOINTS = {
     'steps': ('wait until the fault ends', 'resend'),
 }
 
-#: States from before the cut may come first, which are old.
+#: Old states from before the cut may come first.
 _PLUGGED_IN = ('wait until the fault ends', 'wait for the robot')
 
-#: Whether the last point is reached before a timeout would be a matter of milliseconds.
+#: The last point is left out: whether it is reached before a timeout is a matter of milliseconds.
 _NEVER_LATE = {'': {'phases': ('entering', 'between points', 'cancelling')}}
 
 SERVO = _mode(
@@ -467,7 +467,7 @@ AT_A_POINT = _mode(
         'waiting for an input': 'the arm rests at the second point, the input has not come',
     },
     3.0,
-    # Nothing tells that the end was lost: the arm stands there for two seconds.
+    # Nothing shows that the end was lost: the arm stands there for two seconds.
     {
         fault: {'': {'result_within': 5.0, 'rest_within': 3.0}}
         for fault in ("the program's answers are lost", 'the trajectory socket is half-open')
@@ -537,7 +537,7 @@ SERVO_OUTPUTS = _mode(
         **{
             fault: {
                 '': {'result_within': 6.0, 'rest_within': 3.0},
-                # The registers tell, too, that the program has left the set-points.
+                # The registers also show that the program has left the set-points.
                 'cancelling': {'state_after': S.READY},
             }
             for fault in ("the program's answers are lost", 'the trajectory socket is half-open')

@@ -59,7 +59,7 @@ class Row:
     travel: float = 0.0
     #: The only phases that are tested; empty = all.
     phases: tuple[str, ...] = ()
-    #: Fields that differ in some phases: phase -> field -> value.
+    #: Other values of fields in some phases: phase -> field -> value.
     differs: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def at(self, phase: str) -> 'Row':
@@ -82,7 +82,7 @@ POWER_UP = ('power on', 'release the brakes')
 
 
 def _safety(fault: str, cause: str, code: ErrorCode, *steps: str, play: bool = True) -> Row:
-    """Return the row of a stop by the safety system; ``play``: it pauses the program."""
+    """Return the row of a stop by the safety system; ``play``: the stop pauses the program."""
     before = {'code': E.ROBOT_NOT_READY} | ({'steps': (*steps, 'play')} if play else {})
     return Row(
         fault=fault,
@@ -116,7 +116,7 @@ def _hangs_up(fault: str, cause: str) -> Row:
     )
 
 
-#: The program that resumes reads that its goal has ended.
+#: When the program resumes, it reads that its goal has ended.
 UNSEEN_STOP = Row(
     fault='protective stop that the driver does not see',
     cause=('drop rtde for 0.3 s', 'protective_stop'),
@@ -127,7 +127,7 @@ UNSEEN_STOP = Row(
     differs=REFUSED,
 )
 
-#: During a goal that is refused; without one the program ends.
+#: During a goal this is refused; without a goal the program ends.
 HANDED_BACK = Row(
     fault='a client hands the control back (`~/hand_back_control`)',
     cause=('hand back',),
@@ -145,7 +145,7 @@ HANDED_BACK = Row(
     },
 )
 
-#: The driver's own thread finds it, some tens of milliseconds after the call.
+#: The driver's own thread finds the collision, some tens of milliseconds after the call.
 IN_THE_WAY = Row(
     fault='a body of the cell comes into the way of what is left (`~/change_cell`)',
     cause=('body in the way',),
@@ -156,7 +156,7 @@ IN_THE_WAY = Row(
     differs={'cancelling': {'code': E.CANCELLED}},
 )
 
-#: States come ever later; so does the one that shows the arm at rest.
+#: States come ever later, and so does the state that shows the arm at rest.
 CONGESTED = Row(
     fault='RTDE carries less data than needed',
     cause=('throttle rtde 20000',),
@@ -412,7 +412,7 @@ HEADLESS = (
         fault='the trajectory socket is half-open',
         cause=('freeze trajectory',),
         code=E.EXECUTION_FAILED,
-        # An arm that brakes off its path is told to stop, and has 3 s to answer.
+        # If the arm brakes off its path, the driver tells it to stop, and it has 3 s to answer.
         result_within=3.6,
         rest_within=1.2,
         state_after=S.CONNECTED,
@@ -425,7 +425,7 @@ HEADLESS = (
     replace(
         _harmless('the script command socket is half-open', 'freeze script command'),
         steps=('resend',),
-        # Outputs that have to be safe are given and confirmed there.
+        # Here the safe values of outputs are sent and confirmed.
         differs=_in(BEFORE, code=E.ROBOT_NOT_READY, result_within=1.7, rest_within=1.7)
         | _in(('cancelling',), code=E.CANCELLED, result_within=0.9, rest_within=0.7),
     ),
@@ -473,7 +473,7 @@ HEADLESS = (
 )
 
 
-#: With ``on_robot_stop: continue``: the robot resumes the goal by itself.
+#: Rows with ``on_robot_stop: continue``: the robot resumes the goal by itself.
 CONTINUED = tuple(
     Row(
         fault=fault,
@@ -503,8 +503,8 @@ def _paused_by(fault: str, cause: str, code: ErrorCode, *steps: str) -> Row:
     """
     Return the row of a stop that pauses a program on the pendant.
 
-    The interface takes no 'stop program', so a play resumes the old motion until the
-    program reads the message that ends it; after that it has to be played again.
+    The interface takes no 'stop program', so a play resumes the old motion until the program reads
+    the message that ends the motion; then the program has to be played again.
     """
     return Row(
         fault=fault,

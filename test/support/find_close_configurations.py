@@ -1,15 +1,15 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Find configurations in which an arm touches itself or nearly does, by libraries of others.
+Find configurations in which an arm touches itself or nearly does, by third-party libraries.
 
     pip install pin example-robot-data airo-models trimesh pycollada python-fcl
     python test/support/find_close_configurations.py > test/kinematics/golden/mesh_distances.json
 
 Pinocchio places the meshes by the robot descriptions in the packages, from ``base``; FCL measures
-them. For each model and pair of links: joints [rad] and distance [m] of configurations that touch
-and of the nearest of those that do not. The base of the e-Series is the drawn one with its cable
-connector, as far as it is above the mounting surface.
+their distances. The output has, for each model and pair of links, joints [rad] and distance [m] of
+touching configurations, and of the closest ones that do not touch. The base of an e-Series arm is
+the drawn base with its cable connector, above the mounting surface.
 """
 
 import json
@@ -26,16 +26,16 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats
 Floats = Floats
 #: Joints [rad] and distance [m].
 Row = list[float]
-#: Numbers of random configurations: measured, kept for each pair, and approached from.
+#: Numbers of random configurations: measured, kept for each pair, and starts of approaches.
 TRIED, KEPT, STARTS = 250, 6, 8
-#: Steps of an approach, and how far the joints turn in one [rad].
+#: Number of steps of an approach, and typical turn of a joint in one step [rad].
 STEPS, STEP = 80, 0.15
-#: Pairs that the driver leaves out, or of which it compares the connector only.
+#: Pairs that the driver leaves out, or for which it checks only the connector.
 LEFT_OUT = (('FOREARM', 'WRIST_2'), ('WRIST_1', 'WRIST_3'), ('BASE', 'UPPER_ARM'))
 
 
 class MeshJudge:
-    """The links of one model as FCL sees them."""
+    """The links of one model as FCL's objects."""
 
     def __init__(self, name: str) -> None:
         """Load description and meshes."""
@@ -94,7 +94,7 @@ class MeshJudge:
 
 
 def close_configurations(name: str, rng: np.random.Generator) -> dict[str, list[Row]]:
-    """Return configurations of each pair that touch, and the closest of the others."""
+    """Return, for each pair, touching configurations and the closest other ones."""
     judge, names = MeshJudge(name), [link.name for link in ARM_LINKS]
     pairs = [(a, b) for i, a in enumerate(names) for b in names[i + 2 :] if (a, b) not in LEFT_OUT]
     found: dict[tuple[str, str], list[Row]] = {pair: [] for pair in pairs}
@@ -111,7 +111,7 @@ def close_configurations(name: str, rng: np.random.Generator) -> dict[str, list[
             clear.append(nearest)
             touching += hit
         clear.sort(key=lambda row: row[-1])
-        # Those that were approached touch least.
+        # Configurations from approaches are last, and overlap least.
         rows[:] = [[*row[:6], round(row[6], 6)] for row in touching[-KEPT:] + clear[:KEPT]]
     return {' '.join(pair): rows for pair, rows in found.items()}
 
@@ -119,7 +119,7 @@ def close_configurations(name: str, rng: np.random.Generator) -> dict[str, list[
 def approach(
     judge: MeshJudge, pair: tuple[str, str], row: Row, rng: np.random.Generator
 ) -> tuple[Row, list[Row]]:
-    """Return the last of ever closer configurations that does not touch, and those that do."""
+    """Approach step by step; return the closest configuration apart, and touching ones."""
     for _ in range(STEPS):
         q = np.round(row[:6] + rng.normal(0.0, STEP, 6), 4)
         judge.place(q)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Forward kinematics independent of the package: the matrices of the textbook."""
+"""Forward kinematics independent of the package, by textbook matrices."""
 
 from math import cos, sin
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 def dh_matrix(theta, d, a, alpha):
-    """The textbook matrix of one link in the distal convention."""
+    """Return the textbook matrix of one link in the distal convention."""
     ct, st, ca, sa = cos(theta), sin(theta), cos(alpha), sin(alpha)
     return np.array(
         [
@@ -21,7 +21,7 @@ def dh_matrix(theta, d, a, alpha):
 
 
 def dh_forward(geometry, q):
-    """The product of the link matrices."""
+    """Return the product of the link matrices."""
     T = np.eye(4)
     for i in range(6):
         T = T @ dh_matrix(
@@ -31,7 +31,7 @@ def dh_forward(geometry, q):
 
 
 def pose_matrix(pose):
-    """The matrix of a position and a unit quaternion x y z w."""
+    """Return the matrix of a position and a unit quaternion x y z w."""
     x, y, z, w = pose.quaternion
     T = np.eye(4)
     T[:3, :3] = [
@@ -45,9 +45,9 @@ def pose_matrix(pose):
 
 def dh_frames(geometry, q):
     """
-    Return the frames of the base and behind each joint, (n, 7, 4, 4), of configurations (n, 6).
+    Return the frames of the base and behind each joint, (n, 7, 4, 4), for configurations (n, 6).
 
-    The last one is the flange.
+    The last frame is the flange.
     """
     q = np.atleast_2d(q)
     frames = np.tile(np.eye(4), (len(q), 7, 1, 1))
@@ -75,7 +75,7 @@ def turn(axis, angle):
 
 
 def origin_matrix(row):
-    """The matrix of a URDF's origin: x, y, z, roll, pitch, yaw."""
+    """Return the matrix of a URDF's origin: x, y, z, roll, pitch, yaw."""
     *xyz, roll, pitch, yaw = row
     T = turn('z', yaw) @ turn('y', pitch) @ turn('x', roll)
     T[:3, 3] = xyz
@@ -83,7 +83,7 @@ def origin_matrix(row):
 
 
 def chain_of_origins(rows, q):
-    """The flange (n, 4, 4) at joints (n, 6), each of which turns about z of its origin."""
+    """Return the flange (n, 4, 4) at joints (n, 6), each of which turns about its origin's z."""
     T = np.eye(4)
     for row, angles in zip(rows, np.transpose(q), strict=True):
         T = T @ origin_matrix(row) @ turn('z', angles)

@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Random paths with a free axis that have a solution.
+Random paths with a free axis that are known to have a solution.
 
 They are made backwards: a smooth motion of the joints of a nominal arm, which keeps 10 degrees (at
 the shoulder 5 cm) from limits and singularities and does not collide, gives the poses of the tool.
-Then each pose is turned about the axis by a random angle: nothing of that solution is left but the
-axis.
+Then each pose is turned about the axis by a random angle, so that only the axis is left of that
+solution.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 OPTIONS = PlanningOptions(max_tool_speed=0.0, max_approach_distance=0.0)
 MODELS = ('ur3e', 'ur5e', 'ur10e', 'ur20', 'ur5')
 MARGIN, SHOULDER_MARGIN = pi / 18.0, 0.05
-#: Configurations from point to point.
+#: Number of configurations from point to point.
 _STEPS = 20
 
 
@@ -44,9 +44,9 @@ class FreePath:
 
     arm: Arm
     state: RobotState
-    #: Its poses are scrambled.
+    #: The goal, whose poses are turned about the axis.
     goal: Goal
-    #: The poses of the solution, and by which angle each was turned [rad].
+    #: The poses of the solution, and the angle by which each was turned [rad].
     solution: tuple[Pose, ...]
     turns: tuple[float, ...]
 
@@ -119,7 +119,7 @@ def _is_sound(arm: Arm, tool: Pose, q: np.ndarray) -> bool:
 
 
 def _has_sound_steps(poses: list[Pose]) -> bool:
-    """Tell whether lines between points stay beside the motion of the joints."""
+    """Return whether lines between points stay near the motion of the joints."""
     pairs = list(pairwise(poses))
     distances = [a.distance_to(b) for a, b in pairs]
     return (

@@ -18,7 +18,7 @@ from ur_cartesian_driver.importing import (
 from ur_cartesian_driver.importing.gcode.codes import CODES
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 
-#: Words beside a code that is left out, where its own name is not enough.
+#: Words that a left-out code needs beside it.
 WORDS = {
     'G4': 'P2 X3',
     'G64 Q': '0.2 P0.1',
@@ -73,7 +73,7 @@ WORDS = {
     'M73 Q': '0 S10',
     'M73 R': '3',
 }
-#: What stands for a row that is no code.
+#: Lines for rows that are no codes.
 EXAMPLES = {
     'other M-codes': 'M88',
     'other names with _': 'QUAD_GANTRY_LEVEL',
@@ -118,7 +118,7 @@ def imported(folder: Path, text: str, *outputs: str, **options: Any) -> Imported
     """
     Import a program.
 
-    :param outputs: as the option --output-of takes them.
+    :param outputs: values of the option --output-of.
     """
     file = folder / 'part.nc'
     file.write_text(text, encoding='utf-8', newline='')
@@ -143,7 +143,7 @@ def switched(found: ImportedGoal) -> list[tuple[int, int, float]]:
 
 
 def refusal(folder: Path, text: str, *outputs: str, **options: Any) -> str:
-    """Return the sentence with which a program is refused."""
+    """Return the sentence that refuses a program."""
     with pytest.raises(BrokenFile) as caught:
         imported(folder, text, *outputs, **options)
     return str(caught.value)

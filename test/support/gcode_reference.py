@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A reference for the moves of RS274/NGC, written from NIST IR 6556 and nothing of ours.
+A reference for the moves of RS274/NGC, written from NIST IR 6556 without code of the package.
 
 It knows lines and arcs, planes, units, distance modes and comments; a program with anything else
-is none of its business (`OutOfScope`).
+is `OutOfScope`.
 """
 
 from collections.abc import Iterator
@@ -22,21 +22,21 @@ _Modes = dict[str, Any]
 _NO_MOTION = {'G40', 'G49', 'G54', 'G61', 'G64', 'G94', 'M3', 'M4', 'M5', 'M7', 'M8', 'M9'}
 _PLANES = {'G17': 'XYZ', 'G18': 'ZXY', 'G19': 'YZX'}
 _OFFSET_OF = dict(zip('XYZ', 'IJK', strict=True))
-#: Points of an arc are so dense that its chords are as near as this [mm].
+#: Largest distance of an arc from the chords between its points [mm].
 _SAG = 1e-3
 
 
 class OutOfScope(Exception):
-    """The program has something that the reference does not know."""
+    """The program has words that the reference does not know."""
 
 
 @dataclass(frozen=True)
 class Move:
-    """A move of one line; nan where nobody has said where the tool was."""
+    """A move of one line; nan if the program has not determined a position."""
 
     line: int
     is_rapid: bool
-    #: (n, 3) of a polyline as near as `_SAG` [mm]; the first is the start, the last the end.
+    #: (n, 3) points of a polyline within `_SAG` [mm], from the start to the end.
     curve: Floats
 
 
@@ -106,7 +106,7 @@ def _words(line: str) -> Iterator[tuple[str, float]]:
 
 
 def _set_modes(codes: list[str], mode: _Modes) -> bool:
-    """Set the modes that codes of one line ask for; return whether they end the program."""
+    """Set the modes by the codes of one line; return whether these end the program."""
     groups = {
         'motion': {'G0', 'G1', 'G2', 'G3'},
         'plane': set(_PLANES),
@@ -146,7 +146,7 @@ def _move(number: int, values: dict[str, float], place: dict[str, float], mode: 
 
 
 def _arc(start: Floats, end: Floats, values: dict[str, float], mode: _Modes) -> Floats:
-    """Return the arc by turning the first radius; in the plane as complex numbers."""
+    """Return the arc by turning the first radius; positions in the plane are complex numbers."""
     first, second, third = tuple(_PLANES[mode['plane']])
     i, j, k = ('XYZ'.index(axis) for axis in (first, second, third))
     a, b = complex(start[i], start[j]), complex(end[i], end[j])

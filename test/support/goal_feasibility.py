@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Whether a refusal is right: a slow planner of the tests' own follows the path and finds out.
+Judges refusals: a slow planner of the tests' own follows the path and checks the reason.
 
-It samples each line, arc and joint move, follows it with Newton's method, and looks at ranges,
-singularities and speeds. Refusals for rules are judged by that rule, written anew.
+It samples each line, arc and joint move, follows it with Newton's method, and checks ranges,
+singularities and speeds. A refusal by a rule is judged by the same rule, written anew.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ import numpy as np
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType
 
-#: Samples are at most this far apart [m], [rad]; near a singularity they are halved so often.
+#: Largest distance of samples [m], [rad], and how often it can be halved near a singularity.
 STEP, STEP_TURN, HALVINGS = 2e-3, 0.02, 8
-#: A step turns no joint farther [rad], or it has jumped to another solution.
+#: If a step turns a joint farther than this [rad], it has jumped to another solution.
 MAX_JUMP = 0.4
-#: Both sides of a bound may be right this near to it.
+#: Relative distance from a bound within which both verdicts count as right.
 NEAR = 0.02
 _JOINT = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
-#: The peak of a timed move over its mean speed: thirds; and of a line that mostly turns.
+#: Peak speed of a timed move (thirds), and of a line that mostly turns, over its mean speed.
 PEAK, PEAK_OF_TURN = 1.5, 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Refused:
-    """A goal that was refused, and for whom."""
+    """A refused goal, with the arm and the options for which it was refused."""
 
     goal: Goal
     q: tuple[float, ...]
@@ -76,12 +76,12 @@ class Refused:
 
 @dataclass(frozen=True)
 class Piece:
-    """A segment as the slow planner follows it: configurations at fractions."""
+    """A segment as followed by the slow planner: configurations at fractions."""
 
     curve: Any
     u: np.ndarray
     q: np.ndarray
-    #: Why it cannot be followed to its end; empty = it can.
+    #: The reason why the arm cannot follow to the end; empty = it can.
     stopped: str
 
 
@@ -113,7 +113,7 @@ def follow(refused: Refused, last: int) -> list[Piece]:
 
 
 def _joint_target(refused: Refused, i: int, q: np.ndarray) -> np.ndarray | None:
-    """Return the configuration of a joint move: nearest to the arm, or to a posture."""
+    """Return the target of a joint move: the configuration nearest to the arm, or to a posture."""
     posture = refused.goal.waypoints[i].posture
     wanted, weight = q.copy(), np.ones(6)
     for name, value in zip(posture.names, posture.values, strict=True):
@@ -123,7 +123,7 @@ def _joint_target(refused: Refused, i: int, q: np.ndarray) -> np.ndarray | None:
     rng = np.random.default_rng(0)
     for found in refused.arm.all_solutions(targets(refused.goal)[i], rng):
         turned = found + 2.0 * np.pi * np.round((wanted - found) / (2.0 * np.pi))
-        for k in range(6):  # as near as the range allows
+        for k in range(6):  # turn it into the range
             while turned[k] > refused.arm.high[k] + 1e-6:
                 turned[k] -= 2.0 * np.pi
             while turned[k] < refused.arm.low[k] - 1e-6:
@@ -163,9 +163,9 @@ def _follow_straight(refused: Refused, curve: Any, q: np.ndarray) -> Piece:
 
 def _is_singular(refused: Refused, q: np.ndarray) -> bool:
     """
-    Tell whether a configuration is nearer to a singularity than allowed.
+    Return whether a configuration is nearer to a singularity than allowed.
 
-    Of calibrated arms, whose axes do not meet, some milliradians are a matter of definition.
+    The axes of calibrated arms do not meet, so some milliradians are a matter of definition.
     """
     options = refused.options
     margins = np.array(
@@ -179,7 +179,7 @@ def _is_singular(refused: Refused, q: np.ndarray) -> bool:
 
 
 def is_right(refused: Refused) -> tuple[str, str]:
-    """Return the kind of a refusal, and why it is wrong; empty = it is right, or nearly so."""
+    """Return the kind of a refusal, and the reason why it is wrong; empty = it is about right."""
     for name, pattern, check in RULES:
         if re.search(pattern, refused.text):
             return name, check(refused)
@@ -187,7 +187,7 @@ def is_right(refused: Refused) -> tuple[str, str]:
 
 
 def remedied(goal: Goal, index: int, text: str) -> Goal | None:
-    """Return a goal that was too fast with the time that its refusal asks for."""
+    """Return a goal that was too fast, with the time that its refusal asks for."""
     if found := re.search(r'give it at least ([\d.]+) s', text):
         before = goal.waypoints[index - 1].time if index else 0.0
         more = float(found[1]) - (goal.waypoints[index].time - before)
@@ -203,7 +203,7 @@ def remedied(goal: Goal, index: int, text: str) -> Goal | None:
     return None
 
 
-# -- rules: each returns why the refusal is wrong -------------------------------------------------
+# -- rules: each returns the reason why the refusal is wrong --------------------------------------
 
 
 def _distance(refused: Refused) -> str:
@@ -270,7 +270,7 @@ def _arc(refused: Refused) -> str:
         return ''
     if not arc.fixed:
         return f'the via is {height} m above its chord'
-    # Round the three points to micrometres and see where the tool arrives.
+    # Round the three points to micrometres, and compare the orientations at the end.
     rng, worst = np.random.default_rng(0), 0.0
     for _ in range(300):
         shaken = np.array([arc.start, arc.via, arc.target])
@@ -312,7 +312,7 @@ def _geometry(refused: Refused) -> str:
 
 
 def _spline_geometry(refused: Refused) -> str:
-    """Follow the straight lines between the points, and the curve where its twists are known."""
+    """Follow the curve, if all its twists and accelerations are known."""
     found = spline_motion(refused)
     return '' if found is None or found.stopped else 'the arm can follow'
 
@@ -328,7 +328,7 @@ class SplineMotion:
 
 
 def spline_motion(refused: Refused) -> SplineMotion | None:
-    """Return the motion on a spline; None where the driver chooses twists or accelerations."""
+    """Return the motion on a spline; None if the driver chooses twists or accelerations."""
     goal, arm = refused.goal, refused.arm
     base = targets(goal)
     start = arm.tool(np.array(refused.q))[0]
@@ -445,7 +445,7 @@ def _spline_speed(refused: Refused) -> str:
 
 
 def _runs(motion: SplineMotion) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield times, joints and places between the points: accelerations may jump there."""
+    """Yield times, joints and places between points, at which accelerations may jump."""
     ends = np.flatnonzero(np.diff(motion.t) <= 0.0) + 1
     for rows in np.split(np.arange(len(motion.t)), ends):
         if len(rows) > 4:
@@ -453,7 +453,7 @@ def _runs(motion: SplineMotion) -> Iterator[tuple[np.ndarray, np.ndarray, np.nda
 
 
 def shortest_times(refused: Refused, i: int, piece: Piece) -> tuple[float, float]:
-    """Return the least time of a segment by the driver's profile, and by any: with stops."""
+    """Return the least time of a segment, with stops, by the driver's profile and by any."""
     options, curve = refused.options, piece.curve
     kind = refused.segment(i).type
     step = np.diff(piece.u)
@@ -484,7 +484,7 @@ def shortest_times(refused: Refused, i: int, piece: Piece) -> tuple[float, float
     peak = PEAK_OF_TURN if leads else PEAK
     by_profile = max(peak * slowest, sqrt(4.5 / bound))
     speed = 1.0 / max(slowest, 1e-9)
-    # A short one never reaches its speed.
+    # A short segment never reaches its speed.
     least = 2.0 / sqrt(bound) if speed**2 > bound else slowest + speed / bound
     if kind in (SegmentType.PROCESS, SegmentType.CIRCULAR):
         by_profile = least
@@ -493,10 +493,10 @@ def shortest_times(refused: Refused, i: int, piece: Piece) -> tuple[float, float
 
 def _shortest_time_of_arc(refused: Refused, point: int, i: int, length: float) -> float:
     """
-    Return how long a segment lasts outside of its blends at the speed of the arc at a point [s].
+    Return the time of a segment without its blends, at the speed in the blend at a point [s].
 
     PROCESS passes a blend on an arc that touches both legs where the blend begins and ends, at
-    an unchanged speed v, and v^2 over its radius is bounded (doc/preflight.md).
+    an unchanged speed v. The bound applies to v^2 over the radius of the arc (doc/preflight.md).
     """
     legs = _curve(refused, point), _curve(refused, point + 1)
     arriving, leaving = (
@@ -520,7 +520,7 @@ def _time(refused: Refused) -> str:
         least = _shortest_time_of_arc(refused, int(found[1]), i, pieces[i].curve.length)
         return '' if time < least * (1.0 + NEAR) else f'the arc needs no more than {least:.3f} s'
     by_profile, least = shortest_times(refused, i, pieces[i])
-    # With blends it takes no longer.
+    # With blends the segment takes no longer.
     if time < by_profile * (1.0 + NEAR):
         return ''
     return f'{time:.3f} s are more than {by_profile:.3f} s ({least:.3f} s at least)'

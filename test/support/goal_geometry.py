@@ -1,10 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The paths that a goal asks for, and the inverse kinematics of an arm: the tests' own idea of both.
+The paths of a goal and the inverse kinematics of an arm, in the tests' own implementation.
 
-Written with matrices, from the descriptions of the fields and the manufacturer's of its motions;
-nothing here is shared with planner, driver or simulator. Slow, and simple.
+It uses matrices, and follows the descriptions of the goal's fields and the manufacturer's
+description of its motions. It shares nothing with planner, driver or simulator; it is slow and
+simple.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 
 from ur_cartesian_driver.motion.goal.goal import ArcMode, Goal, SegmentType
 
-#: A turn counts as much as its arc at this radius [m], where poses are compared by one number.
+#: When one number compares poses, a turn counts as much as its arc at this radius [m].
 ARM = 0.1
 
 
@@ -79,7 +80,7 @@ class Line:
         return poses
 
     def fractions(self, poses):
-        """Return where poses are nearest."""
+        """Return the fractions of the line that are nearest to poses."""
         if self.length > ARM * self.angle:
             way = self.end[:3, 3] - self.start[:3, 3]
             u = (poses[:, :3, 3] - self.start[:3, 3]) @ way / self.length**2
@@ -152,7 +153,7 @@ class Arc:
         return poses
 
     def fractions(self, poses):
-        """Return where poses are nearest."""
+        """Return the fractions of the arc that are nearest to poses."""
         center, axis, sweep = self._circle
         angles = self._angles(center, axis, poses[:, :3, 3])
         beyond = angles > sweep

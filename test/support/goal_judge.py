@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Judge from outside what an arm did with a goal: RTDE's joints against the tests' own geometry.
+Judge an arm's motion for a goal from outside: RTDE's joints against the tests' own geometry.
 
 Every bound is a promise of the documents, or the resolution of wire and cycle.
 """
@@ -25,41 +25,42 @@ from ur_cartesian_driver.motion.goal.goal import ArcMode, Goal, SegmentType
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.motion.plan.primitive import MoveJ
 
-#: Speeds may be exceeded by this share.
+#: Fraction by which bounds of speeds may be exceeded.
 OVER = 0.02
-#: A point is reached within this [m], a turn at ARM: micrometres on the wire, three axes.
+#: A point is reached within this [m], and a turn within this at ARM: the wire has micrometres.
 REACH = 5e-6
-#: So near is a line or an arc followed [m], [rad].
+#: Largest distance from a line or an arc [m], [rad].
 PATH, PATH_TURN = 2e-5, 3e-4
-#: A move may stop at a point and go on between two packets: bounds on its acceleration, plain and
-#: optimized [m/s^2], and on its distance from the point [m].
+#: A move may stop at a point and go on between two packets: bounds of its acceleration, plain and
+#: optimized [m/s^2], and of its distance from the point [m].
 TURNING, OPTIMIZED_TURNING = 5.0, 12.0
 NEARBY = 0.002
-#: No joint turns farther [rad].
+#: Largest angle to which a joint turns [rad].
 FULL_TURN = 6.2832
-#: An arc with FIXED orientation may arrive this far off [rad].
+#: Largest orientation error at the end of an arc with FIXED orientation [rad].
 FIXED_TURN = 0.006
 #: Spline: the tolerance of its joints [m].
 SPLINE = 5e-5
-#: SERVO: how long it lags [s], how far it may leave the path until the goal ends [m], and its end.
+#: SERVO: its lag [s], its largest distance from the path until the goal ends [m], and at its end.
 SERVO_LAG, SERVO_PATH, SERVO_END = 0.2, 2.1e-3, 3e-4
-#: Times are kept within so many cycles and this share ...
+#: Times are kept within this number of cycles and this fraction ...
 CYCLES, SHARE = 3.0, 0.002
-#: ... a spline that brakes hard at its end needs some more to come to rest ...
+#: ... a spline that brakes hard at its end needs more cycles to come to rest ...
 SPLINE_CYCLES = 8.0
 #: ... and the first motion of a program loses 80 ms, recorded on real arms [s].
 START_RAMP = 0.09
-#: A blended point is passed in the middle of its blend, which is not quite where the tool is
-#: nearest to it: times may be off by this share of the time in that blend.
+#: A blended point is passed in the middle of its blend, which is not quite the place nearest to
+#: it: times may be off by this fraction of the time in the blend.
 BLEND_SHARE = 0.25
-#: A SERVO goal ends where its acceleration takes servoj more than max_plan_deviation off its path,
-#: by lookahead^2 / 2 - 1 / gain times its acceleration (doc/servo.md). Counted by this name.
+#: A SERVO goal ends if its acceleration takes servoj more than max_plan_deviation off its path.
+#: The deviation is lookahead^2 / 2 - 1 / gain times the acceleration (doc/servo.md). Such ends are
+#: counted by this name.
 SERVO_DEVIATES = 'known, SERVO ends where it accelerates too much for servoj'
 SERVO_DEVIATION = 0.0008
 KNOWN = (SERVO_DEVIATES,)
-#: The arm rests no farther from its target [rad]: static errors, noise and resolution.
+#: Largest distance of the resting arm from its target [rad]: static errors, noise, resolution.
 STATIC = 1e-3
-#: The outputs switch within so many cycles of the way of the tool, and this [m].
+#: Outputs switch within this number of cycles of the tool's way, and this distance [m].
 OUTPUT_CYCLES, OUTPUT_PLACE = 4, 1e-3
 _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 _JOINT = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
@@ -69,9 +70,9 @@ _JOINT = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 class Promise:
     """The driver's promises for an accepted goal, in numbers."""
 
-    #: How it is executed.
+    #: The mode of execution.
     execution: ExecutionMode
-    #: Time of the whole motion [s], and when the tool is at each point [s].
+    #: Time of the whole motion [s], and the time at which the tool is at each point [s].
     duration: float
     point_times: dict[int, float]
     #: Joint positions at the end [rad].
@@ -86,7 +87,7 @@ class Promise:
 
 
 def promise_of(made: Plan) -> Promise:
-    """Return what a plan promises."""
+    """Return the promises of a plan."""
     goal, radii = made.goal, [0.0] * len(made.goal.waypoints)
     times: dict[int, float] = {}
     for point, at in zip(made.reference.point.tolist(), made.reference.time.tolist(), strict=True):
@@ -118,7 +119,7 @@ def promise_of(made: Plan) -> Promise:
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """A goal, what was promised, and the record of what happened."""
+    """A goal, the driver's promise, and the record of the motion."""
 
     goal: Goal
     promise: Promise
@@ -126,13 +127,13 @@ class Run:
     joint_speeds: tuple[float, ...]
     max_tool_speed: float
     cycle: float
-    #: The arm before: joints [rad]; when the goal was sent, on the controller's clock [s].
+    #: Joints of the arm before [rad]; time on the controller's clock when the goal was sent [s].
     q: tuple[float, ...]
     sent: float
     rows: list[RtdeRow]
-    #: Whether it is on the first path of its program, which sets out slowly.
+    #: Whether the path is the first one of its program, which sets out slowly.
     is_first: bool
-    #: How much later things may come where time is real and the computer busy [s].
+    #: Extra time for all events, if time is real and the computer busy [s].
     late: float = 0.0
     succeeded: bool
     outcome: str
@@ -140,12 +141,12 @@ class Run:
 
 @dataclass
 class _Passage:
-    """When the tool is at a point: rows of arrival and departure."""
+    """The passage of the tool at a point: rows of arrival and departure."""
 
     arrive: int
     depart: int
     q: np.ndarray
-    #: Whether one of these rows is at the point, or it was between two packets.
+    #: Whether one of these rows is at the point; if not, the passage was between two packets.
     seen: bool
 
 
@@ -170,11 +171,11 @@ class Judge:
         goal = self.run.goal
         self.targets = targets(goal)
         self.is_timed = any(point.time for point in goal.waypoints)
-        # A first point where the arm stands is no sign of the start.
+        # If the first point is at the arm's place, it does not show the start.
         start = self.run.arm.tool(np.array(self.run.q))[0]
         distance, turn = poses_apart(start, self.targets[0])
         self.start = start
-        # An arm that is not ideal stands beside its target: it has another way to the first point.
+        # An imperfect arm stands beside its target, so its way to the first point differs.
         aside, _ = poses_apart(self.run.arm.tool(self.actual[0])[0], start)
         first = self.run.promise.point_times.get(0, 0.0)
         self.more = float(aside / max(distance, aside, 1e-9)) * first
@@ -182,7 +183,7 @@ class Judge:
         self.zero = self.run.sent if self.waits else self.t[self.begin]
 
     def _servo_deviation(self) -> float:
-        """Return how far its acceleration, over 50 ms, may take servoj off its path [m]."""
+        """Return the deviation of servoj by the acceleration over 50 ms, at most [m]."""
         n = max(1, round(0.05 / self.run.cycle))
         if len(self.p) <= 2 * n:
             return 0.0
@@ -191,7 +192,7 @@ class Judge:
         return 2.0 * SERVO_DEVIATION * peak  # jumps of the acceleration are smoothed here
 
     def _servo_deviates(self) -> bool:
-        """Tell whether an acceleration explains that a SERVO goal has ended."""
+        """Return whether an acceleration explains the end of a SERVO goal."""
         found = re.search(r'left the plan by ([\d.]+) m', self.run.outcome)
         is_servo = self.run.promise.execution == ExecutionMode.SERVO
         return bool(is_servo and found and self._servo_deviation() > float(found[1]))
@@ -240,7 +241,7 @@ class Judge:
                 'tool speed',
                 f'{speed[at]:.4f} m/s at {self.t[at] - self.zero:.3f} s, {bound:g} allowed',
             )
-        # As measured: over 0.1 s, in which noise counts little.
+        # The measured speed, over 0.1 s, so that noise counts little.
         n = max(1, round(0.1 / run.cycle))
         if bound > 0.0 and len(self.t) > n:
             p = run.arm.tool(self.actual)[:, :3, 3]
@@ -279,7 +280,7 @@ class Judge:
             self.say('promised joints', f'{off:.5f} rad off')
         posture = goal.waypoints[last].posture
         if goal.segments and goal.segments[last].arc_mode == ArcMode.FIXED:
-            return  # which does not arrive at the pose of the point, unless by chance
+            return  # such an arc does not end at the pose of the point, unless by chance
         if max(map(abs, posture.values), default=0.0) > FULL_TURN:
             return  # no such solution: another one is the nearest
         for name, value in zip(posture.names, posture.values, strict=True):
@@ -317,7 +318,7 @@ class Judge:
                 )
 
     def _times_in_blends(self, passages: list[_Passage]) -> list[float]:
-        """Return how long the tool is nearer to the points than their blends are wide [s]."""
+        """Return the times that the tool spends within the blend radii of the points [s]."""
         times = []
         for passage, target, radius in zip(
             passages, self.targets, self.run.promise.radii, strict=False
@@ -364,7 +365,7 @@ class Judge:
         return found
 
     def _between_packets(self, i: int, row: int, d: np.ndarray) -> float:
-        """Return how far from a point at which it stops the nearest packets may be [m]."""
+        """Return the largest distance of the nearest packets from a point with a stop [m]."""
         near = d < NEARBY
         gaps = np.diff(self.t[row:])[near[1:] & near[:-1]]
         braking = OPTIMIZED_TURNING if self._has_optimized(i + 2) else TURNING
@@ -423,7 +424,7 @@ class Judge:
         """
         Compare rows with the path to a point.
 
-        :param turn_before: how far off the orientation may be with which it begins [rad].
+        :param turn_before: largest error of the orientation at the beginning [rad].
         """
         poses = self.tool[rows]
         bound, turn_bound = PATH, PATH_TURN + turn_before
@@ -457,7 +458,7 @@ class Judge:
         if run.promise.execution == ExecutionMode.SERVO:
             self._servo()
             return
-        # When it begins is known to a cycle: the time that fits all points best counts.
+        # Its beginning is known to a cycle: the time that fits all points best counts.
         times = np.array([point.time for point in goal.waypoints])
         shifts = np.arange(-2.0, 2.01, 0.25) * run.cycle
         if self.waits:
@@ -485,7 +486,7 @@ class Judge:
         found = self._cubic()
         if found is None:
             return
-        # It begins where the arm is measured, which may stand beside its target.
+        # It begins at the measured place of the arm, which may stand beside its target.
         measured = run.arm.tool(self.actual[:1])[0]
         aside, _ = poses_apart(measured, self.start)
         off = self._beside(found)
@@ -493,7 +494,7 @@ class Judge:
             self.say('spline path', f'{1e3 * off:.4f} mm off')
 
     def _beside(self, cubic: tuple[np.ndarray, np.ndarray, np.ndarray]) -> float:
-        """Return how far the tool is beside a cubic at most [m]: from chords of its samples."""
+        """Return the tool's largest distance from a cubic [m], by chords of its samples."""
         places = _hermite(np.linspace(0.0, cubic[0][-1], 3000), *cubic)
         a, way = places[:-1], np.diff(places, axis=0)
         size = np.maximum((way**2).sum(axis=1), 1e-30)
@@ -504,7 +505,7 @@ class Judge:
         return off
 
     def _cubic(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Return times, positions and velocities of a spline that is a cubic, and known."""
+        """Return times, positions and velocities of a spline; None unless it is a known cubic."""
         goal = self.run.goal
         if any(any(point.acceleration) for point in goal.waypoints) or not all(
             isfinite(value) for point in goal.waypoints for value in point.twist
@@ -518,7 +519,7 @@ class Judge:
         return knots[first:], places[first:], twists[first:]
 
     def _servo(self) -> None:
-        """The tool follows the spline, and passes each point within the lag of its time."""
+        """Check that the tool follows the spline, and passes each point within the lag."""
         goal = self.run.goal
         for i, (point, target) in enumerate(zip(goal.waypoints, self.targets, strict=True)):
             at = self.t - self.zero - point.time
@@ -528,7 +529,7 @@ class Judge:
             if not len(rows):
                 continue
             distance, turn = poses_apart(self.tool[rows], target)
-            # Where the arm turns back, servoj does so before the point.
+            # If the arm turns back at a point, servoj does so before the point.
             bound = max(SERVO_PATH, self._servo_deviation())
             if distance.min() > bound or turn.min() > bound / ARM:
                 self.say(
@@ -565,7 +566,7 @@ class Judge:
 
 
 def _interpolate(at, t, x):
-    """Return values of a cubic through the four samples around times."""
+    """Return values at times, by a cubic through the four samples around each time."""
     i = np.clip(np.searchsorted(t, at) - 2, 0, max(len(t) - 4, 0))
     result = np.zeros(len(at))
     for a in range(min(4, len(t))):

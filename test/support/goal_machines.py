@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Machines of goals, composed as the driver does it, with settings of their own."""
+"""Goal machines, composed as in the driver, with settings of their own."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def point_machine(
     resume_after_stop: bool = False,
     max_state_age: float = 0.0,
 ) -> GoalMachine:
-    """Return the machine of a goal whose points are all known."""
+    """Return the machine of a goal with all its points."""
     return GoalMachine(
         PointFeeder(GoalMonitor(job, max_plan_deviation)),
         feedback_period=feedback_period,

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A part with a path on it before a fixed tool, in virtual time, and where the tool was on the part.
+A part with a path on it before a fixed tool, in virtual time, and the tool's places on the part.
 
-RTDE's target joints are turned into poses of the fixed tool on the part by pinocchio, on a URDF
-that is written here; the path on the part is made of numbers alone.
+Pinocchio turns RTDE's target joints into poses of the fixed tool on the part, by a URDF that is
+written here; the path on the part is made of numbers alone.
 """
 
 from dataclasses import dataclass
@@ -48,13 +48,13 @@ OPTIONS = PlanningOptions(self_collision='off')
 Q = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
 PART = (0.03, -0.02, 0.1, 0.3, -0.2, 0.5)
 DEVIATION, SPEED, ON, OFF = 5e-4, 0.04, 0, 3
-#: How far the tool may be beside the set-points [m]: servoj's filter cuts corners.
+#: Largest distance of the tool from the set-points [m]: servoj's filter cuts corners.
 BESIDE = {PRIMITIVES: 2e-5, SPLINE: 2e-5, SERVO: 1e-3}
-#: Where the path leads from its start on the part [m], and how the tool is turned there [rad].
+#: The corners of the path on the part, from its start [m], and the turns of the tool there [rad].
 OFFSETS = np.array([[0.03, 0, 0], [0.03, 0.03, 0], [0.06, 0.03, 0.01], [0.06, 0, 0.01], [0, 0, 0]])
 TURNS = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.4), (0.0, 0.1, 0.4), (0.0, 0.0, 0.2), (0.0, 0.0, 0.0)]
 NO_TURNS = [(0.0,) * 3] * len(TURNS)
-#: How close the path and its places are followed: RTDE says it once in a cycle [m].
+#: Largest distance from the path and its places [m]: RTDE reports once in a cycle.
 CLOSE = SPEED * CYCLE + 2e-4
 START = Pose((0.04, 0.02, -0.01), quaternion_from_rotation_vector((2.8, 0.3, 0.2)))
 
@@ -64,7 +64,7 @@ FRAME, URDF = frame_and_urdf(ARM, origin_pose(PART), ARM.forward(Q) @ origin_pos
 
 def edges(execution=SPLINE, **fields):
     """
-    Return the edges of a part, with a turn from corner to corner, and an output along them.
+    Return a goal along the edges of a part, with turns between corners and an output on the way.
 
     The controller's own lines (PRIMITIVES) have no turns, and stops in place of rounded corners.
     """
@@ -98,7 +98,7 @@ def programmed():
 
 @dataclass
 class Bench:
-    """The robot, and the readings of it."""
+    """The robot, and its readings."""
 
     cell: Any
 
@@ -138,7 +138,7 @@ class Bench:
 
 
 def check(bench, execution):
-    """See that the tool was on the path on the part, all of it, and the output on along it."""
+    """Check that the tool was on the whole path on the part, with the output on along it."""
     places, on = bench.readings()
     path = programmed()
     assert distances(places, [path]).max() < DEVIATION + BESIDE[execution]
@@ -153,7 +153,7 @@ def check(bench, execution):
 
 
 def is_covered(corners, places, beside):
-    """Tell whether the tool was everywhere on a path, but near its corners (n, 3)."""
+    """Return whether the tool was everywhere on a path, except near its corners (n, 3)."""
     parts = np.linspace(0.0, 1.0, 100)[2:-2, None]
     wanted = np.vstack([a + parts * (b - a) for a, b in pairwise(corners)])
     off = np.linalg.norm(wanted[:, None] - places, axis=2).min(axis=1)

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Random paths on random parts that an arm holds before a fixed tool, and what their plans do.
+Random paths on random parts that an arm holds before a fixed tool, and measures of their plans.
 
-What they do is measured by pinocchio on a URDF of arm, part and tool: by nothing of ours.
+Pinocchio measures the motion on a URDF of arm, part and tool, without any code of the package.
 """
 
 from dataclasses import dataclass, replace
@@ -33,7 +33,7 @@ OVER = 0.02
 
 @dataclass
 class HeldCase(RoundedCase):
-    """A goal on a held part; ``state`` is the arm's, and its pose that of the tool on the part."""
+    """A goal on a held part; the pose of the arm's ``state`` is the tool's pose on the part."""
 
     frame: MovingFrame
     urdf: UrdfArm
@@ -52,8 +52,8 @@ def held_case(random, path_of, arm=None):
     """
     Return a random part in a random hand before a random tool, with a path on the part.
 
-    :param path_of: returns the goal of a path: of the generator, and the pose where it begins.
-    :param arm: the arm; None = a random one, too.
+    :param path_of: takes the generator and the start pose of a path, and returns its goal.
+    :param arm: the arm; None = a random arm.
     """
     rng = np.random.default_rng(random.randrange(2**32))
     model = robot_model(rng.choice(MODELS))
@@ -65,7 +65,7 @@ def held_case(random, path_of, arm=None):
         tuple(rng.uniform(-0.12, 0.12, 3).tolist()),
         quaternion_from_roll_pitch_yaw(*rng.uniform(-1.5, 1.5, 3).tolist()),
     )
-    # The tool stands where the path begins; its origin in the URDF comes from numbers alone.
+    # The tool stands at the start of the path; its origin in the URDF comes from numbers alone.
     T_base_tool = arm.forward(q) @ origin_pose(part) @ at
     frame, urdf = frame_and_urdf(arm, origin_pose(part), T_base_tool)
     goal = replace(path_of(random, at), moving_frame=frame, controlled_frame='tool')
@@ -159,7 +159,7 @@ def turned_by(a, b):
 
 @dataclass
 class Held:
-    """What a plan does on the part, in samples, and how near each is to a limit."""
+    """The motion of a plan on the part, in samples, with fractions of its limits."""
 
     #: (n, 4, 4) the tool on the part; (n,) its speed there [m/s].
     tool: np.ndarray
@@ -175,7 +175,7 @@ class Held:
 
     @property
     def near_limits(self):
-        """(n,) the greatest of these."""
+        """The largest of these fractions (n,)."""
         return np.maximum.reduce(
             [
                 self.joint_speed,
@@ -189,20 +189,20 @@ class Held:
 
 
 def measure(case, made, options):
-    """Return what a plan does, by pinocchio."""
+    """Return the motion of a plan, by pinocchio."""
     t = np.arange(0.0, made.duration, STEP)
     return measured(case, made.joint_spline.rows(t), options)
 
 
 def measure_trace(case, q, cycle, options):
-    """Return what the target joints (n, 6) of all cycles do; rates are their differences."""
+    """Return the motion of the target joints (n, 6) of all cycles; rates are differences."""
     qd = np.gradient(q, cycle, axis=0)
     return measured(case, (q, qd, np.gradient(qd, cycle, axis=0)), options, cycle)
 
 
 def measured(case, joints, options, step=STEP):
     """
-    Return what joints do on the part.
+    Return the motion on the part for a motion of the joints.
 
     :param joints: positions, speeds and accelerations (n, 6) each, a step [s] apart.
     """
@@ -243,7 +243,7 @@ def _turn_accelerations(R, step):
 
 
 def off_path(case, seen):
-    """Return how far the tool is beside the programmed path on the part (n,) [m]."""
+    """Return the distances (n,) of the tool from the programmed path on the part [m]."""
     path = programmed(case)
     points = seen.tool[:, :3, 3]
     if len(path) < 2:

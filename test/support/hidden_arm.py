@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Recordings of arms whose laws are drawn at random, to be found from their packets alone.
+Recordings of arms with random laws, which estimators have to find from the packets alone.
 
 Nothing here is shared with the estimators or with the simulator: laws are piecewise linear rates
 and speeds that are integrated, the arm is stepped in time, and the joints are an invented smooth
@@ -23,7 +23,7 @@ from ur_cartesian_driver.identification.recorded_calls import MotionCommand
 STOPPING, STOPPED, PLAYING, PAUSING, PAUSED = range(5)
 NORMAL, PROTECTIVE_STOP = 1, 3
 RESOLUTION = 2.0 * pi / 2**17
-#: Substeps of a cycle in which the arm is stepped.
+#: Number of substeps of the arm in a cycle.
 SUBSTEPS = 4
 
 
@@ -103,7 +103,7 @@ def speed_steps(length: float, a: float, v: float) -> Steps:
 
 
 def smooth_steps(length: float, a: float, v: float) -> Steps:
-    """Ramps of a sine: a law that the estimators do not know."""
+    """Return sine ramps, a law that the estimators do not know."""
     ramp = 1.5 * v / a
     whole = length / v + ramp
     shares = np.linspace(0.0, 1.0, 41)
@@ -114,7 +114,7 @@ def smooth_steps(length: float, a: float, v: float) -> Steps:
 
 @dataclass
 class Program:
-    """Moves one after the other, in the time of their path; then the recording of an arm."""
+    """Consecutive moves in the time of their path, and their recording by an arm."""
 
     laws: Laws
     random: Random
@@ -133,7 +133,7 @@ class Program:
         self.commands.append(MotionCommand(name='movej', a=a, v=v, t=t))
 
     def movel(self, way, turn, a=None, v=None, t=None):
-        """Move by a way (3,) and turn to a rotation vector along the present axis."""
+        """Move by a vector (3,) and turn to a rotation vector along the present axis."""
         start, end = self.y.copy(), np.concatenate([self.y[:3] + way, turn])
         laws = self.laws
         asked = a or laws.timed_linear_acceleration, v or laws.timed_linear_speed
@@ -164,7 +164,7 @@ class Program:
         """
         Return the packets of the program, from before its start until the arm has rested.
 
-        :param ending: 'stop', 'pause' or 'protective'; ``at``: time of it since the start [s].
+        :param ending: 'stop', 'pause' or 'protective'; ``at``: its time since the start [s].
         """
         laws, before = self.laws, 0.4 + self.random.uniform(0.0, 0.002)
         knots = [(0.0, 0.0), (laws.start_time, 1.0)]
@@ -254,7 +254,7 @@ def quaternions(r):
 
 
 def rounding_noise(generator, shape, correlation):
-    """Return noise as small as on recorded targets, each packet like the one before it."""
+    """Return noise as small as on recorded targets; consecutive packets are correlated."""
     white = 5e-8 * generator.standard_normal(shape)
     noise = white.copy()
     for i in range(1, len(noise)):
@@ -263,7 +263,7 @@ def rounding_noise(generator, shape, correlation):
 
 
 def step_arm(laws, q, step, generator):
-    """Return where joints are (n, 6) that follow targets (n, 6), both in substeps."""
+    """Return the positions (n, 6) of joints that follow targets (n, 6), both in substeps."""
     first = generator.uniform(-1.0, 1.0, 6) * laws.static_error
     lagging, drag, direction = q[0].copy(), first, np.zeros(6)
     bend, bend_speed, before = np.zeros(6), np.zeros(6), np.zeros(6)
@@ -273,7 +273,7 @@ def step_arm(laws, q, step, generator):
     speeds = np.diff(q, axis=0, prepend=q[:1]) / step
     found = np.empty_like(q)
     for i, (target, qd) in enumerate(zip(q, speeds, strict=True)):
-        # Exactly, for a target that runs evenly within the step.
+        # This is exact for a target with a constant speed within the step.
         behind = qd * laws.lag
         lagging = target - behind + (lagging - (target - qd * step) + behind) * follow
         fast = np.abs(qd) > 1e-3

@@ -18,7 +18,7 @@ class JointTrace:
         self.cell, self.rows = cell, []
 
     async def until(self, condition, bound):
-        """Record until a condition holds; fail when it does not within a bound [s]."""
+        """Record until a condition holds; fail if it does not hold within a bound [s]."""
         end = self.cell.loop.time() + bound
         while not condition():
             assert self.cell.loop.time() < end, self.cell.owner.log
@@ -36,7 +36,7 @@ class JointTrace:
         return max(abs(v) for row in speeds for v in row), max(changes)
 
     def max_path_deviation(self, goal):
-        """Return how far the tool was off the planned paths of a goal [m]."""
+        """Return the largest distance of the tool from the planned paths of a goal [m]."""
         flange = ARM.forward_rows(np.array(self.rows))
         tool = np.array(
             [(pose_from_row(row) @ goal.plan.T_flange_active).position for row in flange]

@@ -29,7 +29,7 @@ class JointTrajectoryPoint:
 
 @dataclass
 class JointTrajectory:
-    """As trajectory_msgs/JointTrajectory, and MultiDOFJointTrajectory as far as it matters."""
+    """As trajectory_msgs/JointTrajectory, and as far as needed MultiDOFJointTrajectory."""
 
     header: Header = field(default_factory=Header)
     joint_names: list[str] = field(default_factory=list)
@@ -116,7 +116,7 @@ class StandInHandle:
 
 
 class StandInServer:
-    """As the action server, which sends the result of a goal when that has ended."""
+    """As the action server, which sends the result of a goal when the goal has ended."""
 
     def finish(self, handle: StandInHandle, callback: Callable[[StandInHandle], Any]) -> None:
         handle.result = callback(handle)

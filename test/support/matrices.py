@@ -9,7 +9,7 @@ from ur_cartesian_driver.motion.geometry.pose import normalize, Pose, Quaternion
 
 
 def pose_from_matrix(matrix: Floats | Sequence[Sequence[float]]) -> Pose:
-    """The pose of a homogeneous (4, 4) or (3, 4) matrix with a proper rotation."""
+    """Return the pose of a homogeneous (4, 4) or (3, 4) matrix with a proper rotation."""
     (a, b, c, x), (d, e, f, y), (g, h, i, z) = (
         (float(v) for v in row) for row in list(matrix)[:3]
     )
@@ -18,9 +18,9 @@ def pose_from_matrix(matrix: Floats | Sequence[Sequence[float]]) -> Pose:
 
 def quaternion_from_rotation(r: Sequence[float]) -> Quaternion:
     """
-    The unit quaternion of a rotation matrix given row by row, w >= 0.
+    Return the unit quaternion of a rotation matrix given row by row, w >= 0.
 
-    Of the four formulas (Shepperd) the one that divides by the largest component.
+    It uses the one of Shepperd's four formulas that divides by the largest component.
     """
     a, b, c, d, e, f, g, h, i = r
     trace = a + e + i

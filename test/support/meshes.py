@@ -9,7 +9,7 @@ from ur_cartesian_driver.kinematics.collision_meshes import missing_meshes
 
 def need_meshes(*models: str) -> None:
     """
-    Skip the test with the reason where meshes are missing.
+    Skip the test, with a reason, if meshes are missing.
 
     ``make test`` installs them and lets no test be skipped.
     """

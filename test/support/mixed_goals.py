@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Random goals of all kinds, mixed, for random robots: what users send, and what they should not.
+Random goals of all kinds, mixed, for random robots: goals that users send, or should not send.
 
-A robot depends on seed and number only, and so does each of its goals.
+A robot depends only on seed and number, and so does each of its goals.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def mixed_case(
     """
     Return a goal of a robot.
 
-    :param start: joints and TCP of an arm that cannot be put elsewhere.
+    :param start: joints and TCP, if the arm cannot be placed freely.
     """
     rng = np.random.default_rng([seed, robot_number, number])
     if start is None and rng.random() < 0.2:
@@ -113,22 +113,22 @@ def mixed_case(
 
 
 class MixedDraw(GoalDraw):
-    """A goal under construction, with everything that a goal can say."""
+    """A goal under construction, with everything that a goal can have."""
 
-    #: The TCP that the robot has; None = any.
+    #: The TCP of the robot; None = any.
     T_flange_tcp: Pose | None = None
     max_speed = 0.25
     execution = ExecutionMode.AUTO
-    #: Whether it has times; None = by chance.
+    #: Whether the goal has times; None = by chance.
     timed: bool | None = None
-    #: Shares of blended points, and of those goals in which their radius may be too large.
+    #: Fractions of blended points, and of goals with radii that may be too large.
     blended, oversized = 0.5, 0.05
 
     def chance(self, share: float) -> bool:
         return bool(self.rng.random() < share)
 
     def between(self, low: float, high: float) -> float:
-        """Return a number between two, drawn by its order of magnitude."""
+        """Return a number between two bounds, uniform in its logarithm."""
         return float(np.exp(self.rng.uniform(np.log(low), np.log(high))))
 
     def add(self, pose: Pose, kind=None, posture=ANY, via=None) -> None:
@@ -209,7 +209,7 @@ class MixedDraw(GoalDraw):
                 kind = self.segments[i].type
                 if kind in _OPTIMIZED:
                     kind = TYPE.LINEAR if kind == TYPE.OPTIMIZED_LINEAR else TYPE.JOINT
-                # Such a time is refused, whatever it is.
+                # Any time is refused if the turn leads in one of these motions.
                 may_lead = kind not in (TYPE.PROCESS, TYPE.CIRCULAR) or self.chance(0.1)
                 if before.angle_to(point.pose) > before.distance_to(point.pose) and not may_lead:
                     kind = TYPE.LINEAR

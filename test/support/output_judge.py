@@ -4,14 +4,14 @@
 The cycle in which each output of a run is due, against the tool's own way.
 
 The judge knows positions and outputs of the simulated controller in each cycle, and nothing of
-the plan. The way of the tool is the sum of its steps; a point is on it where a step is nearest. A
-slow run tells when the tool would be at each way at full speed: the time of the path. In any run,
-an output is due when no more of this time is left to its place than passes within its lead; a
-pulse is due where the way is a multiple of the distance behind the place where its train begins.
+the plan. The way of the tool is the sum of its steps; a point lies on it at the nearest step. A
+slow run gives the time of the path: the time at which the tool would be at each way at full speed.
+In any run, an output is due when the time of the path that is left to its place falls to its lead.
+A pulse is due if the way from the start of its train is a multiple of the pulse distance.
 
 An output takes effect at the end of a cycle, so the nearest cycle is up to half a cycle beside the
-time at which the output is due. Places come to the robot in whole micrometres, and leads with
-speeds at a few places: for a slow tool, that is more than a cycle.
+time at which the output is due. The robot gets places in whole micrometres, and leads with speeds
+at a few places: for a slow tool, the resulting error is more than a cycle.
 """
 
 from collections import Counter
@@ -21,19 +21,19 @@ from math import cos, floor
 import numpy as np
 from traced_run import STEP, TracedRun
 
-#: The slider of the runs that tell the time of the path.
+#: The slider of the slow runs, which give the time of the path.
 SLOW = 0.4
-#: How late or early, or how far from there [m] an output may switch near a rest.
+#: Largest time error [cycles], or distance [m], of an output near a rest.
 REST_CYCLES, REST_BOUND = 10, 1e-4
-#: How far beside its place an output may always switch [m]: a cycle of a tool with 10 mm/s.
+#: Distance from its place at which an output may always switch [m]: a cycle at 10 mm/s.
 RESOLUTION = 2e-5
 #: The same with a lead while the speed of the tool changes [m].
 WIDE_BOUND = 1e-4
 #: Change of the slider in some cycles that does not count.
 SLIDER_RESTS = 0.005
-#: So long before its effect the program decides on an output [cycles].
+#: Time from the program's decision on an output to its effect [cycles].
 DECIDED = 2.0
-#: For so long after it goes on [cycles] the program waits until the arm moves.
+#: Time for which a resumed program waits until the arm moves [cycles].
 GOING_ON = 8
 
 SLIDERS = {
@@ -47,10 +47,10 @@ SLIDERS = {
 class JudgedRun(TracedRun):
     """One run of a goal, and the places of its outputs and pulses on the tool's way."""
 
-    #: How fast the time of the path passes at most: no slider makes the tool faster.
+    #: Largest rate of the time of the path: no slider makes the tool faster.
     max_rate = 1.0
-    #: By how much the tool's way may be longer or shorter than the plan knows [m]: a pulse that is
-    #: nearer to the last point may come or not.
+    #: Largest difference of the tool's way from the planned way [m]: a pulse that is nearer to the
+    #: last point may come or not.
     rounding = 1e-5
 
     def place(self, wanted):
@@ -65,7 +65,7 @@ class JudgedRun(TracedRun):
         """
         Return the ways to the pulses of a train (count,).
 
-        :param given: how many were given: of those next to the last point, some may not come.
+        :param given: the number of given pulses: pulses next to the last point may not come.
         """
         first = self.way_of(train.first_waypoint) + train.phase
         length = self.way_of(train.last_waypoint) - first
@@ -81,11 +81,11 @@ class JudgedRun(TracedRun):
 
 
 class PathTime:
-    """The time of the path at full speed, from a run that the slider slows down for resolution."""
+    """The time of the path at full speed, from a run with a low slider for more resolution."""
 
     def __init__(self, slow):
         ways, first = np.unique(slow.ways, return_index=True)
-        # Rests are no time of the path.
+        # Rests do not count as time of the path.
         moving = np.append(0.0, np.cumsum(np.diff(slow.ways) > 0.0))
         self._ways, self._times = ways, SLOW * STEP * moving[first]
 
@@ -93,7 +93,7 @@ class PathTime:
         return np.interp(ways, self._ways, self._times)
 
     def is_near_rest(self, way):
-        """Return whether the tool is so slow there that it makes no way that counts."""
+        """Return whether the tool is so slow there that its way hardly grows."""
         k, speeds = int(np.searchsorted(self._ways, way)), np.diff(self._ways)
         return speeds[max(k - 3, 0) : k + 2].min() < 0.2 * np.median(speeds)
 
@@ -106,13 +106,13 @@ class PathTime:
 
 @dataclass
 class Verdict:
-    """How late outputs or pulses were [cycles], and which of them were too late or too early."""
+    """The delays of outputs or pulses, and the ones that were too late or too early."""
 
-    #: Negative = early; without those near a rest, where way tells little of time.
+    #: Delays [cycles], negative = early; not near a rest, where the way tells little of time.
     late: list = field(default_factory=list)
-    #: How far behind their places the tool was then [m].
+    #: Distances of the tool behind their places at that time [m].
     off: list = field(default_factory=list)
-    #: How late those were that were due while the program was paused [cycles].
+    #: Delays of the ones that were due while the program was paused [cycles].
     delayed: list = field(default_factory=list)
     misses: dict = field(default_factory=dict)
 
@@ -121,24 +121,24 @@ def judge_commands(run, path_time, bound, pauses=()):
     """
     Judge the edges of the commands of a run.
 
-    Near a rest the speed tells little of the slider, and the tool makes little way: there the
-    bound is wider. So it is with a lead while the speed of the tool changes, which may take less
-    time than the pieces in which the lead comes to the robot, and while the slider moves. What is
-    due in a pause, in which the tool coasts on, comes when it has ended.
+    The bound is wider near a rest, where the speed tells little of the slider and the tool makes
+    little way. For an output with a lead it is also wider while the slider moves, and while the
+    speed of the tool changes, which may take less time than the pieces in which the robot gets the
+    lead. Outputs that are due in a pause, in which the tool coasts on, come after the pause.
 
-    :param pauses: cycles in which the program is paused, and goes on.
+    :param pauses: for each pause, the cycles in which the program is paused, and goes on.
     """
     verdict, wanted_pins = Verdict(), Counter(wanted.pin for wanted in run.goal.io_commands)
     assert Counter(pin for pin, *_ in run.edges if pin in wanted_pins) == wanted_pins
     at = {pin: cycle for pin, _, cycle in run.edges}
     times = path_time(run.ways)
-    # Where the tool nearly rests, its way tells little of the time.
+    # If the tool nearly rests, its way tells little of the time.
     rate = np.minimum(np.diff(times, prepend=0.0) / STEP, run.max_rate)
     for wanted in run.goal.io_commands:
         place, edge = run.place(wanted), at[wanted.pin]
         left = path_time(place) - times
-        # What the program decides is carried out a cycle later. In the meantime the slider moves,
-        # or ceases to.
+        # A decision of the program is carried out a cycle later. In the meantime the slider may
+        # begin or cease to move.
         before = np.roll(rate, 2)
         seen = rate, np.roll(rate, 1), before, 3.0 * before - 2.0 * np.roll(rate, 3)
         lead = max(-wanted.offset, 0.0)
@@ -174,12 +174,13 @@ def _due(left, rate, lead, edge):
     """
     Return two times at which an output may have been due [cycles].
 
-    The first is when it was due first. While the slider is lowered, the time that is left may
-    fall a little below the lead and then exceed it again, so the second one is as far before the
-    edge as the output was ever overdue, or behind it as far as it was not due there.
+    The first one is the first time at which it was due. While the slider is lowered, the time that
+    is left may fall a little below the lead and then exceed it again. So the second one is before
+    the edge by the longest time for which the output was ever overdue, or, if the output was not
+    due at the edge, behind the edge by the time that was missing there.
 
     :param left: time of the path to its place by cycle [s].
-    :param rate: how fast this time passes.
+    :param rate: the rate at which this time passes.
     :param lead: the lead in time of the path by cycle [s].
     :param edge: the cycle in which the output switched.
     """
@@ -193,7 +194,7 @@ def _due(left, rate, lead, edge):
 
 
 def _lost(run, pauses):
-    """Return by cycle how much longer the way coasted in pauses was than its chords (n,) [m]."""
+    """Return, by cycle (n,), the excess of the ways coasted in pauses over their chords [m]."""
     lost = np.zeros(len(run.ways))
     for begin, end in pauses:
         if end < len(lost):
@@ -206,9 +207,9 @@ def judge_pulses(run, train, bound, pauses=()):
     """
     Judge the pulses of a train: their number, the cycle of each, and the widths.
 
-    Near a rest, where the tool is slow, what counts is the way that it is off. The pulses of the
-    way that the tool coasts in a pause come behind it, as fast as their width allows; of that way
-    the program knows the chord only.
+    Near a rest, where the tool is slow, the distance from the place counts. The pulses of the way
+    that the tool coasts in a pause come after the pause, as fast as their width allows; the
+    program knows only the chord of this way.
     """
     verdict = Verdict()
     counted = run.ways - _lost(run, pauses)
@@ -217,7 +218,7 @@ def judge_pulses(run, train, bound, pauses=()):
     assert len(rises) == len(places), (len(rises), len(places))
     assert set(run.cycles(train.pin, rises=False) - rises) <= {width} or pauses
     ways, first = np.unique(counted, return_index=True)
-    # Beside a rest the tool is at its place for many cycles: the nearest of them counts.
+    # Near a rest the tool is at a place for many cycles: the nearest of them counts.
     last = np.append(first[1:] - 1, len(counted) - 1)
     due = np.interp(places, ways, first)
     until = np.maximum(due, np.interp(places - 2e-6, ways, last))

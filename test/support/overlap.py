@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Tests that compute fill the time in which others wait for a clock.
+A scheduler in which computing tests fill the time while others wait for a clock.
 
-``--overlap`` makes every other worker of pytest-xdist one for tests that only compute. These run
+With ``--overlap``, every other worker of pytest-xdist runs tests that only compute. It runs them
 at a low priority, so that a test with sockets and deadlines has a processor when it needs one. The
-other workers help, at the same priority, when no such test is left.
+remaining workers help, at the same priority, when no test with deadlines is left.
 """
 
 from bisect import bisect_left
@@ -77,29 +77,29 @@ COMPUTING = (
     'test/urscript/',
 )
 LOW_PRIORITY = 10
-#: A worker knows so many tests in advance: it runs one when it knows the next.
+#: Number of tests that a worker knows in advance: it runs a test once it knows the next one.
 AHEAD = 4
 
 
 def is_for_computing(worker: str) -> bool:
-    """Tell whether a worker, by its name, is one for tests that compute."""
+    """Return whether a worker, by its name, is for tests that compute."""
     return int(worker.removeprefix('gw')) % 2 == 1
 
 
 def rank(test: str) -> int:
-    """Return the place of a test's path among those that compute; -1: it waits."""
+    """Return the place of a test's path among the computing ones; -1 = it waits for a clock."""
     return next((i for i, path in enumerate(COMPUTING) if test.startswith(path)), -1)
 
 
 class LowPriority:
-    """A plugin for a worker: from its first test that computes on, it has a low priority."""
+    """A plugin that gives a worker a low priority from its first computing test on."""
 
     def __init__(self) -> None:
         self.is_low = False
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_logstart(self, nodeid: str) -> None:
-        """No test that waits follows on this worker: the scheduler hands these out first."""
+        """Lower the priority for good: the scheduler hands out tests that wait first."""
         if not self.is_low and rank(nodeid) >= 0:
             os.nice(LOW_PRIORITY)
             self.is_low = True

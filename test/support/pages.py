@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The examples in the documents: commands with their output, and files that a reader saves."""
+"""The examples in the documents: commands with their output, and files for readers to save."""
 
 from itertools import takewhile
 from pathlib import Path
@@ -20,7 +20,7 @@ def saved_files(page: Path) -> dict[str, str]:
 
 
 def save_files(page: Path, folder: Path) -> None:
-    """Save them in a folder."""
+    """Save the files of a page in a folder."""
     for name, text in saved_files(page).items():
         (folder / name).write_text(text, encoding='utf-8')
 
@@ -41,6 +41,6 @@ def console_examples(page: Path) -> list[tuple[list[list[str]], str]]:
 
 
 def assert_shows(shown: str, came: str) -> None:
-    """Compare words; ``...`` in the document stands for any."""
+    """Compare words; ``...`` in the document stands for any words."""
     parts = (re.escape(part.strip()) for part in ' '.join(shown.split()).split('...'))
     assert re.fullmatch(' ?.*? ?'.join(parts), ' '.join(came.split())), came

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Clients of a robot's ports that know nothing of this package: sockets and the published formats.
+Clients of a robot's ports that share nothing with this package: sockets and published formats.
 
-What they see is what any other client of a robot sees.
+They see the same as any other client of a robot.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import threading
 import time
 from typing import Any, Self
 
-#: For an answer [s].
+#: Longest time for an answer [s].
 TIMEOUT = 30.0
 STATE, MESSAGE = 16, 20
 TEXT, SAFETY_MODE, ERROR, KEY, EXCEPTION = 0, 5, 6, 7, 10
@@ -99,7 +99,7 @@ class PlainPrimary:
 
 
 class PlainDashboard:
-    """The dashboard (29999): a line for a line."""
+    """The dashboard (29999): an answer line for each line."""
 
     def __init__(self, host: str, port: int) -> None:
         self.socket = socket.create_connection((host, port), timeout=TIMEOUT)
@@ -149,7 +149,7 @@ class PlainRealtime:
         return Sample(values[0], values[1:7], values[7:13], values[73:79])
 
     def motion(self, script: str) -> list[Sample]:
-        """Send a program; return its motion from the last sample at rest to the first again."""
+        """Send a program; return its motion, from the last sample at rest to the next at rest."""
         self.socket.sendall(script.encode())
         before = sample = self.next()
         start = sample.time
@@ -165,7 +165,7 @@ class PlainRealtime:
 
 @dataclass(frozen=True, slots=True)
 class RtdeRow:
-    """A packet of RTDE: joints by their targets and as measured [s, rad, rad/s], outputs."""
+    """A packet of RTDE: target and measured joints [s, rad, rad/s], and outputs."""
 
     time: float
     target_q: tuple[float, ...]
@@ -176,7 +176,7 @@ class RtdeRow:
 
 
 class RtdeBytes:
-    """The real-time data exchange (30004) without its socket: what to send, and rows of data."""
+    """The real-time data exchange (30004) without its socket: requests, and rows of data."""
 
     _OUTPUTS = 'timestamp,target_q,target_qd,actual_q,actual_qd,actual_digital_output_bits'
     _LAYOUT = struct.Struct('>B25dQ')
@@ -186,7 +186,7 @@ class RtdeBytes:
         self._received = bytearray()
 
     def requests(self, frequency: float) -> bytes:
-        """Ask for version 2 of the protocol, the outputs so many times a second, and the start."""
+        """Return requests for version 2, for outputs at a frequency [Hz], and for the start."""
 
         def frame(kind: int, body: bytes = b'') -> bytes:
             return struct.pack('>HB', 3 + len(body), kind) + body
@@ -196,7 +196,7 @@ class RtdeBytes:
         return frame(self._VERSION, version) + frame(self._SETUP, setup) + frame(self._START)
 
     def feed(self, data: bytes) -> list[RtdeRow]:
-        """Return the rows that are complete now."""
+        """Return the rows that are complete with these bytes."""
         self._received += data
         rows, start = [], 0
         while len(self._received) >= start + 3:
@@ -215,7 +215,7 @@ class RtdeBytes:
 
 
 class RtdeRecorder(asyncio.Protocol):
-    """A client of RTDE on an event loop: :attr:`rows` are what has come in."""
+    """A client of RTDE on an event loop: :attr:`rows` are the received rows."""
 
     def __init__(self) -> None:
         self.codec, self.rows = RtdeBytes(), list[RtdeRow]()
@@ -246,7 +246,7 @@ class PlainRtde:
         self._socket.close()
 
     def wait(self, seconds: float) -> None:
-        """Wait until so much time has passed on the controller's clock [s]."""
+        """Wait until this time has passed on the controller's clock [s]."""
         end, deadline = self.rows[-1].time + seconds, time.monotonic() + TIMEOUT
         while self.rows[-1].time < end:
             assert time.monotonic() < deadline, 'RTDE is silent'

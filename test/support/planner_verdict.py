@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Compare the planner's verdict on a goal with the robot's motion when it gets the goal anyway.
+Compare the planner's verdict on a goal with the motion of a robot that gets the goal anyway.
 
 A refused goal has no primitives. So the points before the refused one are planned, and the refused
-one is sent as a driver without a pre-flight check would send it: type, pose, speeds.
+point is sent as a driver without a pre-flight check would send it: type, pose, speeds.
 """
 
 from dataclasses import dataclass, replace
@@ -48,7 +48,7 @@ OPTIONS = PlanningOptions(
     singularity_margin_shoulder=0.0,
 )
 
-#: Refusals by the property of the arm that they are about.
+#: The property of the arm that each refusal is about.
 KINDS = {
     Unreachable: 'reach',
     JointLimitExceeded: 'limit',
@@ -56,13 +56,12 @@ KINDS = {
     InvalidPosture: 'branch',
 }
 
-#: Motions that take longer run in longer cycles [s]; those that take longer than the second bound
-#: do not run at all [s].
+#: Motions above the first bound run in longer cycles [s]; motions above the second do not run [s].
 SLOW_CYCLE_DURATION, MAX_RUN_DURATION = 2.5, 10.0
-#: This near to the border both may be right [m], [rad].
+#: Distance from the border within which both verdicts may be right [m], [rad].
 BORDER_SHIFT = 1e-4
-#: The arm has arrived when every joint is this near [rad]: the wire rounds to a millionth, which
-#: turns the joints of a nearly singular arm by a hundred times as much.
+#: The arm has arrived when every joint is this near [rad]: the wire rounds to a millionth, and the
+#: joints of a nearly singular arm turn by a hundred times as much.
 ARRIVAL_TOLERANCE = 1e-3
 
 
@@ -74,7 +73,7 @@ class Verdict:
     #: run, as it takes too long: the arm can follow the path, unless there is a refusal.
     planner: str
     refusal: str
-    #: Why the robot failed; empty = it ran to the end and arrived where planned.
+    #: The reason why the robot failed; empty = it arrived at the planned end.
     failure: str
     #: Index of the refused point, or of the last one.
     point: int
@@ -96,7 +95,7 @@ def compare(robot, case, options=OPTIONS, max_duration=inf) -> Verdict:
     """
     Plan a goal, and run it whether the planner accepts it or not.
 
-    :param max_duration: plans of motions that take longer are not run [s].
+    :param max_duration: a plan with a longer motion is not run [s].
     """
     arm = robot.controller.arm
     state = robot.place(case.q, case.T_flange_tcp)
@@ -156,7 +155,7 @@ def _check_named_point(refusal, segments, point) -> None:
 
 def is_borderline(robot, case, options=OPTIONS, max_duration=MAX_RUN_DURATION) -> bool:
     """
-    Tell whether the verdict of planner or robot changes when the goal is shifted a little.
+    Return whether the verdict of planner or robot changes when the goal is shifted a little.
 
     The whole goal is shifted along and turned about each axis, then each point at random.
     """
@@ -219,15 +218,15 @@ def _try_plan(goal, state, arm, options):
 
 
 def _is_for_time(refusal):
-    """Tell whether the arm can follow a refused path, beside a singularity say, but too slowly."""
+    """Return whether the arm can follow a refused path, but too slowly (near a singularity)."""
     return 'more than max_segment_time' in str(refusal)
 
 
 def _refused_point(goal, state, arm, options):
     """
-    Return the first point to which the arm cannot go, and the plan of those before it.
+    Return the first point to which the arm cannot go, and the plan of the points before it.
 
-    That is None if they take too long to be sent.
+    The plan is None if it takes too long, or if there are no points before.
     """
     before = None
     for count in range(1, len(goal.waypoints) + 1):
@@ -240,7 +239,7 @@ def _refused_point(goal, state, arm, options):
 
 
 def unchecked_primitive(case, point, q, arm):
-    """Return the primitive of a point as a driver without a pre-flight check would send it."""
+    """Return the primitive that a driver without a pre-flight check would send for a point."""
     goal = case.goal
     segment, waypoint = goal.segments[point], goal.waypoints[point]
     speeds: dict[str, Any] = {
@@ -278,7 +277,7 @@ def _named(waypoint):
 
 
 def _configuration_error(planned, run) -> str:
-    """Describe how far the arm ends beside the planned configuration."""
+    """Describe the distance of the arm's end from the planned configuration; '' = arrived."""
     off = max(abs(a - b) for a, b in zip(run.q, planned.segments[-1].joints, strict=True))
     return (
         ''
@@ -288,7 +287,7 @@ def _configuration_error(planned, run) -> str:
 
 
 def _posture_error(case, point, q, arm, run) -> str:
-    """Name the joint of a posture that the unchecked motion left somewhere else."""
+    """Describe the joint that ends beside the goal's posture after the unchecked motion."""
     named = _named(case.goal.waypoints[point])
     if not named:
         return ''

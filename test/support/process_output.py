@@ -20,5 +20,5 @@ def switch(waypoint: int, value: float) -> IOCommand:
 
 
 def is_on(digital_outputs: int) -> bool:
-    """Tell whether the output is on, by the bits of RTDE."""
+    """Return whether the output is on, by the bits of RTDE."""
     return bool(digital_outputs & (1 << PIN))

@@ -3,8 +3,8 @@
 """
 The number of cases of a random test, and their seed.
 
-`make test` draws a tenth of them from a fixed seed, so that a red run is red again. `make random`
-draws all; RANDOM_SEED=N draws others.
+`make test` draws a tenth of the cases from a fixed seed, so that a red run stays red. `make
+random` draws all; RANDOM_SEED=N draws others.
 """
 
 import os
@@ -15,7 +15,7 @@ SEED = int(os.environ.get('RANDOM_SEED', '1'))
 
 
 def cases(whole: int) -> int:
-    """Return how many of the cases of a whole run are drawn in this one; one at least."""
+    """Return the number of cases in this run, of the number in a whole run; at least one."""
     return max(1, round(SHARE * whole))
 
 

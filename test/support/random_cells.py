@@ -3,9 +3,9 @@
 """
 Random cells, and a judge of their distances that shares no computation with the package.
 
-Solids are surfaces of triangles; of cylinders there are two, one that the cylinder contains and
-one that contains it, and a sphere is a point with a radius. Carried bodies move with pinocchio's
-kinematics, those on the tool with the matrices of the textbook.
+Solids are surfaces of triangles. A cylinder has two surfaces, one inside of it and one around it;
+a sphere is a point with a radius. Carried bodies move with pinocchio's kinematics, and bodies on
+the tool with textbook matrices.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ T_TOOL0_FLANGE = matrix(np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]]))
 
 
 def random_pose(rng, middle=(0.0, 0.0, 0.0), spread=0.1):
-    """Return a pose with any rotation near a place."""
+    """Return a pose near a place, with any rotation."""
     quaternion = rng.normal(size=4)
     position = np.array(middle) + rng.uniform(-spread, spread, 3)
     return Pose(
@@ -68,7 +68,7 @@ def random_pose(rng, middle=(0.0, 0.0, 0.0), spread=0.1):
 
 
 def random_arm(rng, name=None):
-    """Return an arm of any model, half of them calibrated."""
+    """Return an arm of any model, calibrated in half of the cases."""
     name = str(rng.choice(MODEL_NAMES)) if name is None else name
     calibrated = rng.random() < 0.5
     return Arm(
@@ -121,11 +121,11 @@ def random_shape(rng, meshes=True, largest=0.4):
 
 def random_cell(rng, places, *, carried=True, meshes=True, spread=0.3, largest=0.4):
     """
-    Return a cell of up to ten bodies, most of them near places (n, 3) where the arm may be.
+    Return a cell of up to ten bodies, most of them near places (n, 3) that the arm may reach.
 
-    :param carried: whether links and tool carry some of them.
-    :param spread: how far they are from the places [m].
-    :param largest: how large boxes, cylinders and spheres are [m].
+    :param carried: whether links and tool carry some of the bodies.
+    :param spread: distance of the bodies from the places [m].
+    :param largest: largest size of boxes, cylinders and spheres [m].
     """
     bodies = []
     for k in range(int(rng.integers(1, 7))):
@@ -179,11 +179,11 @@ def _placed_in(body, frame, T):
 @dataclass(frozen=True, eq=False)
 class Part:
     """
-    A solid in the frame of what carries it.
+    A solid in the frame of its carrier.
 
-    :param inner: a surface in it, and ``outer``, one around it; the same if they are exact.
-    :param radius: what is added to both; a sphere is a point with a radius.
-    :param T: where the surfaces are on the carrier (4, 4).
+    :param inner: a surface inside of it; ``outer``: one around it; the same surface if exact.
+    :param radius: a radius around both; a sphere is a point with a radius.
+    :param T: the pose of the surfaces on the carrier (4, 4).
     """
 
     inner: np.ndarray
@@ -206,12 +206,12 @@ def box_of(part):
 
 
 def exact(surface, T, **more):
-    """Return the part with this very surface."""
+    """Return the part with exactly this surface."""
     return Part(surface, surface, T, **more)
 
 
 def part_of(shape, T):
-    """Return the part that a shape of the cell is."""
+    """Return the part of a shape of the cell."""
     if isinstance(shape, HalfSpace):
         return exact(np.empty((0, 3, 3)), T, is_half_space=True)
     if isinstance(shape, Sphere):
@@ -229,7 +229,7 @@ _prisms = lru_cache(cylinder_surfaces)
 
 
 def part_distances(a, T_a, b, T_b):
-    """Return a distance that is not above that of two parts, and one that is not below [m]."""
+    """Return a lower and an upper bound of the distance of two parts [m]."""
     if a.is_half_space:
         a, T_a, b, T_b = b, T_b, a, T_a
     T = np.linalg.inv(T_b @ b.T) @ T_a @ a.T
@@ -288,7 +288,7 @@ class CellJudge:
             self._add_bodies()
 
     def _add_bodies(self):
-        """Add the bodies that contain the links; their rims have 24 corners, which is less."""
+        """Add the bodies that contain the links; rims of 24 corners make them a little smaller."""
         bodies = CollisionBodies(self.arm)
         surfaces = body_surfaces(bodies, np.zeros(6))
         for link in Link:
@@ -318,8 +318,7 @@ class CellJudge:
         """
         Return bounds of the distance of two bodies, by name [m].
 
-        :returns: a distance that is not above the true one, and one that is not below; both are 0
-            or less where they touch.
+        :returns: a lower and an upper bound; both are 0 or less if the bodies touch.
         """
         low, high = inf, inf
         for one in self.parts[a]:
@@ -346,7 +345,7 @@ def _mesh_parts(arm):
         if shape.mesh is None:
             found[shape.link].append(part_of(Cylinder(shape.radius, shape.length), T))
         else:
-            # What is wholly inside a link does not touch its surface, but its convex hull.
+            # A body wholly inside of a link does not touch its surface, but its convex hull.
             found[shape.link].append(exact(file_surface(shape.mesh), T, is_solid=False))
     found[0].append(_connector(arm))
     return found

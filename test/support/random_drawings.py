@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Random drawings: their content as group codes, written as different programs do.
+Random drawings: their content as group codes, written in the ways of different programs.
 
-ezdxf needs the form of R2000, with handles and markers of subclasses. Other writers leave these
-out, mix the order of codes, and put blanks, comments and other ends of lines into the file; the
-content is the same.
+ezdxf needs the form of R2000, with handles and subclass markers. Other writers leave these out,
+mix the order of codes, and put blanks, comments and other line ends into the file; the content is
+the same.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,25 +22,25 @@ LAYERS = {
     'Frozen': (1, 5),
     'Locked': (4, 1),
 }
-#: Half the width of drawings [m], and the units of $INSUNITS that they have [m].
+#: Half the width of drawings [m], and the lengths of their units by $INSUNITS [m].
 SIZE = 0.06
 UNITS = {1: 0.0254, 4: 1e-3, 5: 1e-2, 9: 2.54e-5, 14: 0.1, 21: 1200 / 3937}
 
 
 @dataclass
 class Entity:
-    """An entity with its group codes, under the marker of their subclass."""
+    """An entity with its group codes, under the markers of their subclasses."""
 
     kind: str
     parts: list[tuple[str, list[Tag]]]
     common: list[Tag] = field(default_factory=list)
-    #: Of a POLYLINE, whose entities follow it.
+    #: The vertices of a POLYLINE, which follow it as entities.
     vertices: list['Entity'] = field(default_factory=list)
 
 
 @dataclass
 class Content:
-    """The contents of a drawing, whoever writes it."""
+    """The contents of a drawing, the same for all writers."""
 
     entities: list[Entity] = field(default_factory=list)
     blocks: dict[str, tuple[list[Tag], list[Entity]]] = field(default_factory=dict)
@@ -48,7 +48,7 @@ class Content:
 
 
 class Draftsman:
-    """Draws random entities; half of the ends lie where others are."""
+    """Draws random entities; half of their ends are at ends of others."""
 
     def __init__(self, random: Random, units: int = 0) -> None:
         self.random = random
@@ -61,7 +61,7 @@ class Draftsman:
         return float(f'{self.random.uniform(-self.size, self.size):.6g}')
 
     def place(self):
-        """Return a place, often one that was taken before, or one that nearly is."""
+        """Return a place, often an earlier one or a place near an earlier one."""
         if self.ends and self.random.random() < 0.5:
             x, y, z = self.random.choice(self.ends)
             return (
@@ -92,7 +92,7 @@ class Draftsman:
                 self.has_nested = True
                 inside.append(self.insert('Part', is_nested=True))
             for entity in inside:
-                # ezdxf shows the parts of an invisible polyline that a scale takes apart.
+                # If a scale breaks an invisible polyline into parts, ezdxf shows the parts.
                 entity.common = [tag for tag in entity.common if tag[0] != 60]
             found.blocks[name] = (point(10, (self.number(), self.number(), 0.0)), inside)
         for _ in range(self.random.randint(1, 8)):
@@ -202,7 +202,7 @@ class Draftsman:
         return Entity('SPLINE', [('AcDbSpline', tags)])
 
     def other(self):
-        """Draw something that has no path."""
+        """Draw an entity without a path."""
         return self.random.choice(
             (
                 Entity('POINT', [('AcDbPoint', point(10, self.place()))]),
@@ -226,7 +226,7 @@ class Draftsman:
 
     def insert(self, name, is_nested=False):
         tags: list[Tag] = [(2, name), *point(10, self.place())]
-        # ezdxf turns a shear, of a block that is scaled in one that is, into something else.
+        # ezdxf distorts a shear, which comes from scaled blocks in scaled blocks.
         uneven = ((1.5, 0.5, 1), (1, 1, -2)) if not self.has_nested else ()
         scale = self.random.choice(((1, 1, 1), (2, 2, 2), (-1, 1, 1), *uneven))
         tags += [(code, value) for code, value in zip((41, 42, 43), scale, strict=True)]
@@ -234,7 +234,7 @@ class Draftsman:
         if not is_nested and self.random.random() < 0.3:  # ezdxf does not scale the steps
             tags += [(70, 2), (71, 2), (44, 0.3 * self.size), (45, -0.2 * self.size)]
         tags += self.extrusion()
-        # An INSERT on a frozen layer shows nothing in AutoCAD; ezdxf draws its entities on others.
+        # An INSERT on a frozen layer shows nothing in AutoCAD; ezdxf shows entities on others.
         layers = tuple(name for name in LAYERS if name != 'Frozen')
         return Entity('INSERT', [('AcDbBlockReference', tags)], common=self.common(layers))
 
@@ -246,19 +246,19 @@ def point(code: int, place: Sequence[float]) -> list[Tag]:
 
 @dataclass
 class Writer:
-    """Writes a content in the manner of a program."""
+    """Writes a content in the way of a program."""
 
     version: str = 'AC1015'
     has_handles: bool = True
     has_markers: bool = True
-    #: Shuffles the codes of entities that have each code once.
+    #: The generator that shuffles codes, of entities that have each code once; None = no shuffle.
     mixes: Random | None = None
     comment: str = ''
     indent: int = 3
     end: str = '\n'
 
     def text(self, content: Content) -> str:
-        """Return the file."""
+        """Return the text of the file."""
         self._handle = 0x100
         tags = list(self._tags(content))
         lines = (f'{code:>{self.indent}}{self.end}{value}{self.end}' for code, value in tags)

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Random programs in the language of RS274/NGC, and the same with words of other machines.
+Random programs in the language of RS274/NGC, and the same programs with words of other machines.
 
-All lengths are even multiples of 0.254 mm, which are exact with few digits in inches too, and all
-arcs lead between points with whole coordinates on a circle around a point with such.
+All lengths are even multiples of 0.254 mm, which are exact with few digits in inches, too. All
+arcs lead between points with whole coordinates, around centres with whole coordinates.
 """
 
 from collections.abc import Sequence
@@ -35,11 +35,11 @@ class RandomProgram:
         self.random = random
         self.lines: list[str] = []
         self.subprogram: list[str] = []
-        #: In steps, if coordinates lead there; None after a change of coordinates.
+        #: The position in steps; None after a change of coordinates.
         self.at: list[int] | None = None
         self.plane, self.unit, self.share_of_x = 'G17', 1.0, 1
         self.relative, self.relative_centre = False, True
-        #: G92 or G52 is in use; 'begin': G92 says where the program begins.
+        #: The code in use, G92 or G52; 'begin' = G92 defines the place of the beginning.
         self.preset, self.motion = '', ''
         self._begin()
         for _ in range(statements):
@@ -164,7 +164,7 @@ class RandomProgram:
         words = self._words({} if end == begin and target[c] == self.at[c] else named)
         radius = end != begin and self.random.random() < 0.3
         if radius:
-            # Counterclockwise from begin to end it is so many twelfths, all unequal.
+            # The number of points on the circle from begin to end, counterclockwise.
             turn = _CIRCLE.index(end) - _CIRCLE.index(begin)
             cross = begin[0] * end[1] - begin[1] * end[0]
             if cross == 0:
@@ -250,7 +250,7 @@ class RandomProgram:
         return 'F' + self._number(25.4 * self.random.randint(2, 40) / self._inch())
 
     def _feed(self) -> None:
-        # G94 ends the feed before in LinuxCNC.
+        # In LinuxCNC, G94 ends the previous feed.
         self._put([self._feed_word(), *(['G94'] * self.random.randrange(2))])
 
     def _call(self) -> None:
@@ -264,7 +264,7 @@ class RandomProgram:
             self.subprogram.append('M99')
         if self.unit != self.subprogram_unit:
             return
-        # LinuxCNC wants the code first.
+        # LinuxCNC requires the code to be first.
         self.lines.append(self.random.choice(('M98 P1234', 'M98 P1234 L1', 'm98p1234l2')))
         self.relative, self.at, self.motion, self.share_of_x = False, None, 'G1', 1
 

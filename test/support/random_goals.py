@@ -5,7 +5,7 @@ Random goals on both sides of the limits of an arm.
 
 Uniformly drawn points are nearly all easy or absurd. So each family of goals is drawn around one
 limit (reach, joint range, a singularity, the column over the base ...), and about half of its
-goals cross it. A goal depends on model and number only.
+goals cross this limit. A goal depends only on model and number.
 """
 
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ LINEAR, JOINT, CIRCULAR, PROCESS = (
     SegmentType.PROCESS,
 )
 ANY = Posture()
-#: What straight moves are drawn from.
+#: The types from which straight moves are drawn.
 STRAIGHT = (LINEAR, LINEAR, LINEAR, PROCESS, SegmentType.OPTIMIZED_LINEAR)
 
 
@@ -83,18 +83,18 @@ class GoalDraw:
     # -- configurations
 
     def anywhere(self) -> np.ndarray:
-        """Return a configuration that is bent, one turn about zero."""
+        """Return a bent configuration, within one turn around zero."""
         q = self.rng.uniform(-pi, pi, 6)
         q[2] = self.sign() * self.rng.uniform(0.5, 2.6)
         q[4] = self.sign() * self.rng.uniform(0.5, 2.6)
         return q
 
     def place_arm(self, q) -> None:
-        """Let the arm stand there at the start."""
+        """Place the arm at the start."""
         self.q = self.last = tuple(float(x) for x in q)
 
     def place_arm_at(self, T_base_tcp: Pose, q) -> None:
-        """Start with the tool at a pose, near a configuration; anywhere if it is unreachable."""
+        """Start with the tool at a pose, near a configuration; anywhere if this is impossible."""
         near = vector6(float(x) for x in q)
         found = nearest(self.arm, T_base_tcp @ self.tool.inverse(), near)
         self.place_arm(self.anywhere() if found is None else found)
@@ -134,12 +134,12 @@ class GoalDraw:
         self.waypoints.append(Waypoint(pose=pose, posture=posture))
 
     def add_at(self, q, kind=None, posture=ANY) -> None:
-        """Add the point at which the tool is in a configuration."""
+        """Add the point of a configuration."""
         self.add(self.at(q), kind, posture)
         self.last = tuple(float(x) for x in q)
 
     def shifted(self, size: float, turn: float = 0.3) -> Pose:
-        """Return the last point moved that far [m] in any direction, and turned up to [rad]."""
+        """Return the last point, moved by a distance [m] and turned by at most an angle [rad]."""
         return Pose(
             tuple((np.array(self.pose.position) + size * self.direction()).tolist()),
             self.turn(turn, self.pose.quaternion),
@@ -169,7 +169,7 @@ class GoalDraw:
     # -- the goal
 
     def goal(self) -> Goal:
-        """Return the goal: with blends, with times in a third of those that can have them."""
+        """Return the goal with blends, and with times in a third of the possible cases."""
         self._blend()
         if self.rng.random() < 0.3 and all(map(self._can_have_time, range(len(self.segments)))):
             time, before = 0.0, self.at(self.q)
@@ -187,7 +187,7 @@ class GoalDraw:
         return Goal(waypoints=tuple(self.waypoints), segments=tuple(self.segments))
 
     def _can_have_time(self, i: int) -> bool:
-        """Tell whether a segment may have a time: not if it is OPTIMIZED or mostly turns."""
+        """Return whether a segment may have a time: not if it is OPTIMIZED or mostly turns."""
         kind = self.segments[i].type
         if kind in (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT):
             return False
@@ -269,7 +269,7 @@ def _range(draw: GoalDraw) -> None:
 
 
 def _wrist(draw: GoalDraw) -> None:
-    """Past a straight wrist, with and without the posture of the other side."""
+    """Past a straight wrist, with and without a posture on the other side."""
     q = draw.anywhere()
     side = draw.sign()
     straight = draw.rng.choice((0.0, pi * draw.sign()))
@@ -285,7 +285,8 @@ def _through_the_wrist(draw: GoalDraw) -> None:
     """
     So near to a straight wrist that the forearm swings round: 10 urad to 0.1 rad beside it.
 
-    Of a level axis 6, which no translation changes, the wrist goes straight through; so tilt it.
+    Axis 6 is tilted: with a level one, which no translation changes, the wrist goes straight
+    through.
     """
     q = draw.anywhere()
     q[4] = 0.0
@@ -324,7 +325,7 @@ def _column(draw: GoalDraw) -> None:
 
 
 def _column_arc(draw: GoalDraw) -> None:
-    """The same in a bend."""
+    """Past the column over the base on an arc."""
     _column(draw)
     end = draw.waypoints.pop().pose
     draw.segments.pop()
@@ -339,7 +340,7 @@ def _column_arc(draw: GoalDraw) -> None:
 
 
 def _joint(draw: GoalDraw) -> None:
-    """Joint moves with all postures, turns included, also to where nothing is."""
+    """Joint moves with all postures, including whole turns and unreachable targets."""
     for _ in range(draw.rng.integers(1, 4)):
         q = draw.moved(1.2)
         far = draw.rng.random() < 0.25
@@ -371,7 +372,7 @@ def _mixed(draw: GoalDraw) -> None:
 
 
 def _corners(draw: GoalDraw) -> None:
-    """Blends where corners are near to something: a stretched arm, a straight wrist."""
+    """Blends at corners near a limit: a stretched arm, a straight wrist."""
     q = draw.anywhere()
     q[draw.rng.choice((2, 4))] = draw.sign() * draw.rng.uniform(0.05, 0.5)
     draw.place_arm(q)

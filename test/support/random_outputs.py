@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Random goals with outputs by place, leads that overtake one another, and pulses, in one run."""
+"""Random goals with outputs by place, overtaking leads and pulses, in one run."""
 
 from dataclasses import replace
 from math import log10
@@ -30,17 +30,17 @@ from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 
 KINDS = ('stops', 'dwells', 'rounded', 'spline', 'appended', 'resumed', 'servo')
-#: As many points on a line [m]: servoj cuts corners, where no place is exact.
+#: As many points on a line [m], for servoj: it cuts corners, at which no place is exact.
 LINE = tuple((0.05 * (k + 1), 0.0) for k in range(len(ZIGZAG)))
 LAST = len(ZIGZAG) - 1
-#: How late or early an output or a pulse may be [cycles]: one, and what the judge may be off.
-#: Where points are appended, the speed at the begin of a lead is known less well; by set-points,
-#: the speed is not steady.
+#: Largest time error of an output or a pulse [cycles]: one, and the error of the judge. If points
+#: are appended, the speed at the begin of a lead is known less well; with set-points, the speed is
+#: not steady.
 BOUND, APPENDED_BOUND, SERVO_BOUND = 1.1, 2.0, 3.0
 
 
 class Case:
-    """A random goal and how it is run."""
+    """A random goal, and the way in which it is run."""
 
     def __init__(self, number, attempt):
         self.random = draw = random_of('outputs', number, attempt)
@@ -58,7 +58,7 @@ class Case:
         self.commands, self.pulses = self._commands(), self._pulses()
 
     def goal(self, home):
-        """Return the goal, which begins at a pose."""
+        """Return the goal, from a start pose."""
         x, y, z = home.position
         timed = self.shape in ('spline', 'appended')
         period = 0.06 * self.size / self.speed
@@ -96,7 +96,7 @@ class Case:
         return resume(goal, self.stopped, overlap=0.01 * self.size, approach=0.01).goal
 
     def act(self, controller, cycle):
-        """Pause the program, and let it go on."""
+        """Pause and resume the program in its cycles."""
         for begin, end in self.pauses:
             if cycle == begin:
                 controller.programs.pause()
@@ -104,7 +104,7 @@ class Case:
                 controller.programs.play()
 
     def _twist(self, places, k, period):
-        """Return the velocity with which the tool passes a point: as from the one to the other."""
+        """Return the velocity at a point: the mean velocity between its neighbours."""
         if k == LAST:
             return (0.0,) * 6
         (ax, ay), (bx, by) = places[k], places[k + 2]
@@ -127,7 +127,7 @@ class Case:
         return [each for k, each in enumerate(pauses) if not k or each[0] > pauses[k - 1][1] + 200]
 
     def _commands(self):
-        """Return commands beside points; with leads that overtake one another if two are near."""
+        """Return commands beside points; leads of near commands can overtake one another."""
         draw, commands = self.random, []
         beside = draw.randint(1, 3), draw.uniform(-0.02, 0.02)
         for pin in range(4):
@@ -157,7 +157,7 @@ class Case:
 
     def _pulses(self):
         draw, trains = self.random, []
-        # Else it is not known how many fit before the last point.
+        # Otherwise the number of pulses before the last point is not certain.
         least = 3.0 * (SetPointRun if self.kind == 'servo' else JudgedRun).rounding
         for pin in (4, 5):
             first = draw.randint(0, 2 if not self.sizes else self.sizes[0] - 2)
@@ -178,7 +178,7 @@ class Case:
 
 
 def accepted(number, robot):
-    """Return the first case of a number that the planner accepts, and how many it refused."""
+    """Return the first accepted case of a number, and the number of cases refused before."""
     for attempt in range(100):
         case, state = Case(number, attempt), robot.place(HOME, TOOL)
         try:
@@ -190,11 +190,11 @@ def accepted(number, robot):
 
 
 class SetPointRun(JudgedRun):
-    """The same by set-points: driver and robot in virtual time, seen by another client of RTDE."""
+    """A run by set-points: driver and robot in virtual time, seen by another client of RTDE."""
 
     #: After a pause, servoj catches up with its set-points.
     max_rate = 2.0
-    #: It creeps up to the last one, and the goal ends before it is there.
+    #: servoj creeps up to the last set-point, and the goal ends before it arrives.
     rounding = 1e-4
 
     def _trace(self, robot, goal, slider, act, sizes):
@@ -218,7 +218,7 @@ class SetPointRun(JudgedRun):
             await connection.open(HOST, RTDE)
             motion = cell.owner.start(plan(goal, state, ARM, OPTIONS), arm=SETUP)
             await cell.until(lambda: motion.outcome, 600.0)
-            await cell.sleep(5.0 * STEP)  # what RTDE has yet to report
+            await cell.sleep(5.0 * STEP)  # RTDE has yet to report the end
             connection.close()
             assert motion.outcome.succeeded, motion.outcome
 
@@ -227,7 +227,7 @@ class SetPointRun(JudgedRun):
 
 
 def verdicts(case, robot):
-    """Run a case; return the verdict on its commands, and one on each train."""
+    """Run a case; return the verdicts on its commands and on each pulse train."""
     run_of = SetPointRun if case.kind == 'servo' else JudgedRun
     slow = run_of(robot, case.goal, lambda cycle: SLOW, sizes=case.sizes)
     run = run_of(robot, case.goal, case.slider, case.act, sizes=case.sizes)

@@ -9,7 +9,7 @@ from random import Random
 
 import numpy as np
 
-#: Names of columns, for each a group; their units with the factor to SI.
+#: Groups of column names; units with their factors to SI.
 POSITIONS = (
     ('x', 'y', 'z'),
     ('X', 'Y', 'Z'),
@@ -48,16 +48,16 @@ OTHERS = ('intensity', 'note', 'index', 'force_x', 'I/O', 'temp\u00e9rature')
 
 @dataclass(frozen=True)
 class RandomTable:
-    """A table of text, and what numpy needs to read its numbers."""
+    """A table of text, and the values that numpy needs to read its numbers."""
 
     text: str
     encoding: str
-    #: For numpy: None = blanks.
+    #: The delimiter for numpy; None = blanks.
     delimiter: str | None
     has_decimal_commas: bool
     #: Lines before the first row.
     head: int
-    #: Names of columns; the kind of orientation.
+    #: The names of the columns; the kind of orientation.
     titles: tuple[str, ...]
     orientation: str
     #: By title: index, factor to SI.
@@ -169,7 +169,7 @@ def _text(random: Random, number: float, digits: int) -> str:
 
 
 def _lines(random: Random, columns, values, delimiter: str, decimal_comma: bool):
-    """Return the lines of the file, and how many come before the first row."""
+    """Return the lines of the file, and the number of lines before the first row."""
     style = random.choice(('{} [{}]', '{}({})', '{}_{}', '{} ({})', '{}/{}'))
     if delimiter.isspace() and delimiter != '\t':
         style = random.choice(('{}[{}]', '{}_{}', '{}/{}'))

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Packets of the real-time interface, read as the manufacturer's tables place their fields."""
+"""Packets of the real-time interface, read by the manufacturer's tables of field places."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A goal by set-points in a cell in virtual time, and what RTDE reports of it."""
+"""A goal by set-points in a cell in virtual time, and RTDE's reports of its motion."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ SETUP = ArmSetup.of(ARM)
 
 
 class RecordedGoal:
-    """A goal that has been started, and each state that is reported until it ends."""
+    """A started goal, and all reported states until its end."""
 
     def __init__(self, cell, goal):
         self.cell, self.states = cell, []
@@ -48,5 +48,5 @@ class RecordedGoal:
 
     @property
     def times(self):
-        """When the states were reported (n,) [s]."""
+        """The times of the reported states (n,) [s]."""
         return np.array([state.timestamp for state in self.states])

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The scenes that a page has recorded, as the messages of viser."""
+"""The recorded scenes of a page, as messages of viser."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def scenes_of(page: str) -> dict[str, list[tuple[float, dict[str, Any]]]]:
         content = msgspec.msgpack.decode(inner[8:at])
         buffers = []
         for length in content['binaryBufferLengths']:
-            at = -(-at // 8) * 8  # each begins at a multiple of 8
+            at = -(-at // 8) * 8  # each array begins at a multiple of 8
             buffers.append(inner[at : at + length])
             at += length
         for _, message in content['messages']:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A planner that looks ahead again and again, as a learned policy does; and its readings."""
+"""A planner that replans repeatedly, as a learned policy does; and its readings."""
 
 import asyncio
 from collections.abc import Callable
@@ -19,14 +19,14 @@ from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 
-#: Time between two points of a chunk, and how far it looks ahead [s].
+#: Time between two points of a chunk, and time that a chunk looks ahead [s].
 STEP, AHEAD = 0.05, 0.8
 #: Time from the planner's latest state of the arm to the beginning of a new tail, and from there
 #: to its first point, at least [s].
 LEAD, GAP = 0.2, 0.15
 #: Radius of the circle [m], and its period [s].
 RADIUS, PERIOD = 0.06, 4.0
-#: By how much the place of the circle wanders [m], and how fast [rad/s].
+#: Amplitude with which the circle wanders [m], and its angular frequency [rad/s].
 WANDER, WANDER_RATE = 0.01, 2.0
 
 
@@ -34,14 +34,14 @@ class Replanner:
     """
     Plans the next piece of a circle whose centre wanders.
 
-    Each chunk takes the centre to be where it is seen, so chunks contradict each other.
+    Each chunk assumes that the centre stays at its present place, so chunks contradict each other.
     """
 
     def __init__(self, home: Pose) -> None:
         self.home = home
 
     def chunk(self, time: float, *, last: bool = False) -> list[Waypoint]:
-        """Return points behind a time of the motion [s]; with ``last`` they end at rest."""
+        """Return points after a time of the motion [s]; with ``last`` they end at rest."""
         shift = WANDER * sin(WANDER_RATE * time)
         first = ceil((time + GAP) / STEP - 1e-9)
         points = [self._point(k * STEP, shift) for k in range(first, first + round(AHEAD / STEP))]
@@ -77,7 +77,7 @@ class Readings:
         connection.write(self._recorder.codec.requests(1.0 / self._cycle))
 
     def take(self) -> None:
-        """Take what has come in, into memory that does not grow."""
+        """Take the received data, into memory that does not grow."""
         for row in self._recorder.rows:
             self._rows[self._count] = (row.time, *row.target_q, *row.target_qd)
             self._count += 1
@@ -85,20 +85,20 @@ class Readings:
 
     @property
     def rows(self) -> Floats:
-        """All rows (n, 13): time [s], target_q [rad], target_qd [rad/s]."""
+        """Return all rows (n, 13): time [s], target_q [rad], target_qd [rad/s]."""
         self.take()
         return self._rows[: self._count]
 
     @property
     def moving(self) -> Floats:
-        """Those from the first in which the arm moves to the last."""
+        """Return the rows from the first to the last in which the arm moves."""
         rows = self.rows
         moves = np.flatnonzero((np.abs(rows[:, 7:]) > 1e-4).any(axis=1))
         return rows[moves[0] : moves[-1] + 1]
 
     @property
     def accelerations(self) -> Floats:
-        """Of the moving arm, by differences (n, 6) [rad/s^2]."""
+        """Return the accelerations of the moving arm, by differences (n, 6) [rad/s^2]."""
         rows = self.moving
         steps: Floats = np.diff(rows[:, 7:], axis=0) / np.diff(rows[:, :1], axis=0)
         return steps
@@ -112,7 +112,7 @@ async def replan(
     seconds: float,
     measure: Callable[[], object] = bool,
 ) -> None:
-    """Replace the tail so many times a second, measure once a second, then end at rest."""
+    """Replace the tail at a rate [Hz], measure once a second, then end at rest."""
     planner, count = Replanner(motion.home), 0
     assert await motion.until(lambda: motion.motion.progress)
     begin = cell.loop.time()

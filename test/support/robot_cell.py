@@ -7,9 +7,9 @@ The driver's robot loop with all its sockets runs against the controller of ``ur
 only time and network come from :mod:`virtual_network`. Cycles take 8 ms, as on a CB3 robot,
 because each costs computing time, unless a test chooses its robot.
 
-With the environment variable ``THREADS='delay N'`` new threads of the robot program begin N cycles
-later, and with ``THREADS='seed N'`` its threads take turns at random. With ``IMPERFECT=N`` the arm
-is imperfect, with noise by the seed N.
+With the environment variable ``THREADS='delay N'``, new threads of the robot program begin N
+cycles later; with ``THREADS='seed N'``, its threads take turns at random. With ``IMPERFECT=N`` the
+arm is imperfect, with noise from the seed N.
 """
 
 from __future__ import annotations
@@ -60,10 +60,10 @@ T = TypeVar('T')
 
 CYCLE = 0.008
 UR5E = robot_model('ur5e')
-#: How long the owner may be silent [s]; the real one is 5 s.
+#: Longest silence of the owner [s]; the driver allows 5 s.
 NODE_TIMEOUT = 0.4
 OWNER_PORT = 1
-#: A slower arm is at rest [rad/s]; the bound of the robot program.
+#: An arm is at rest below this speed [rad/s]; the bound of the robot program.
 REST_SPEED = 1e-4
 REVERSE, SENDER, TRAJECTORY, COMMANDS = 50001, 50002, 50003, 50004
 RTDE, PRIMARY, DASHBOARD = 30004, 30001, 29999
@@ -76,7 +76,7 @@ PENDANT_PROGRAM = 'external_control.urp'
 
 
 class CellMotion:
-    """A goal that was started, as its owner sees it."""
+    """A started goal, as seen by its owner."""
 
     def __init__(self):
         self.outcome: Any = None
@@ -85,7 +85,7 @@ class CellMotion:
 
 
 class Owner:
-    """The other end of the robot loop's pipe, as the node is."""
+    """The other end of the robot loop's pipe, in the role of the node."""
 
     def __init__(self):
         self.status = ConnectionStatus()
@@ -220,14 +220,14 @@ class RobotCell:
             self.robot.play_program()
         await self.until(self.is_ready, 3.0)
         await self.until(self.control_messages)
-        await self.sleep(2.0 * CYCLE)  # the program has read it, and waits for the next in time
+        await self.sleep(2.0 * CYCLE)  # the program has read its message, and waits for the next
 
     async def start_driver(self, number=1):
         """
-        Start the robot loop, with an owner that knows nothing yet.
+        Start the robot loop, with a new owner.
 
-        :param number: by which the driver knows its program again. Not drawn, so that the robots
-            of all cells get the same program, which is parsed once.
+        :param number: the number by which the driver recognises its program. It is not drawn, so
+            that the robots of all cells get the same program, which is parsed once.
         """
         self.owner = Owner()
         server = await asyncio.start_server(self.owner.serve, HOST, OWNER_PORT)
@@ -241,7 +241,7 @@ class RobotCell:
         self.loop_task = asyncio.create_task(robot_loop.run(reader))
 
     async def end_driver(self):
-        """End the robot loop as its owner does."""
+        """End the robot loop, as its owner does."""
         self.owner.hang_up()
         await asyncio.wait({self.loop_task}, timeout=5.0)
         self.loop_task.cancel()
@@ -250,7 +250,7 @@ class RobotCell:
         self.memory.close()
 
     async def start_robot(self, config):
-        """Start the controller, or another one in the place of one that has crashed."""
+        """Start the controller, or a new one in place of a crashed one."""
         self.robot = SimulatedRobot(
             config, sockets=ProgramNetwork(self.loop), clock=LoopClock(self.loop, config.cycle)
         )
@@ -259,19 +259,19 @@ class RobotCell:
 
     async def crash_robot(self):
         """Crash the controller with all its sockets; the arm stays where it is."""
-        self.robot.controller.power_off()  # brakes hold what no controller moves
+        self.robot.controller.power_off()  # without a controller, brakes hold the arm
         self.robot_task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await self.robot_task
 
     async def reboot_robot(self):
-        """Start the controller again: no power, no program, the arm where it was."""
+        """Start the controller again: no power, no program, the arm at its former place."""
         await self.start_robot(
             replace(self.robot.config, q=self.robot.controller.motion.q, power='off')
         )
 
     async def fetch_program(self):
-        """Be the External Control node: return the program of the driver, as it is played."""
+        """Fetch the driver's program as the External Control node does; return it as played."""
         reader, writer = await asyncio.open_connection(HOST, SENDER, limit=MAX_PROGRAM)
         writer.write(REQUEST)
         text = await reader.readuntil(b'# NODE_CONTROL_LOOP_ENDS\n')
@@ -279,7 +279,7 @@ class RobotCell:
         return f'def external_control():\n{text.decode()}\nend\n'
 
     async def load_pendant_program(self):
-        """Load a program whose External Control node fetches that of the driver."""
+        """Load a program whose External Control node fetches the driver's program."""
         assert not self.robot.controller.load_program(PENDANT_PROGRAM)
 
     async def close(self):
@@ -300,14 +300,14 @@ class RobotCell:
         return self.status.state is ConnectionState.READY
 
     def at_rest(self):
-        """Tell whether the arm rests: servoj creeps up to its last set-point without an end."""
+        """Return whether the arm is slow enough: servoj creeps to its last set-point for ever."""
         return max(map(abs, self.robot.controller.motion.qd)) < REST_SPEED
 
     async def until(self, condition, bound=2.0, purpose=''):
         """
         Wait for a condition, checked twice in each cycle; return the time it took [s].
 
-        :raises AssertionError: it does not hold within the bound [s].
+        :raises AssertionError: the condition does not hold within the bound [s].
         """
         begin = self.loop.time()
         while not condition():
@@ -319,7 +319,7 @@ class RobotCell:
         return self.loop.time() - begin
 
     def collect(self, states):
-        """Append what RTDE reported last to a list, unless it is there; return it."""
+        """Append RTDE's last report to a list, unless it is there already; return the report."""
         state = self.memory.read()
         if not states or state.timestamp > states[-1].timestamp:
             states.append(state)
@@ -343,10 +343,10 @@ class RobotCell:
         """Let time pass [s]."""
         await asyncio.sleep(seconds)
 
-    # ---- what people and other clients do -----------------------------------------------------
+    # ---- people and other clients -------------------------------------------------------------
 
     async def dashboard(self, *commands):
-        """Be another client of the dashboard; return the answers."""
+        """Send commands as another client of the dashboard; return the answers."""
         reader, writer = await asyncio.open_connection(HOST, DASHBOARD)
         await reader.readline()
         answers = []
@@ -357,7 +357,7 @@ class RobotCell:
         return answers
 
     def count_connected_programs(self):
-        """Return how many robot programs have said that they are connected."""
+        """Return the number of robot programs that have reported their connection."""
         return self.robot.controller.messages.log.count('ur_cartesian_driver: connected')
 
     def resend(self):
@@ -393,7 +393,7 @@ def run_cell(
     :param imperfect: seed of the imperfections of the arm, empty = it has none; by default from
         the environment.
     :param robot: fields of the simulator's configuration: model, frequency, geometry, ...
-    :param cell: its class.
+    :param cell: the class of the cell.
     """
     if imperfect is None:
         imperfect = os.environ.get('IMPERFECT', '')

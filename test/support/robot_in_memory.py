@@ -3,9 +3,9 @@
 """
 A simulated robot that runs our program, without network and without time.
 
-The bytes are those that the driver sends, the program is the one that it uploads, and the
-controller is the one behind ``ur-cartesian sim``; only the sockets are lists, and a cycle passes
-when a test steps it. So a motion costs the computing time of its cycles, and nothing else.
+It runs the driver's bytes, the driver's uploaded program, and the controller behind ``ur-cartesian
+sim``; only the sockets are lists, and a cycle passes when a test steps it. So a motion costs the
+computing time of its cycles, and nothing else.
 """
 
 from dataclasses import dataclass
@@ -29,9 +29,9 @@ from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets
 from ur_cartesian_driver.sim.state.power_and_safety import OPERATIONAL, SafetyEvent
 
 REVERSE, TRAJECTORY, COMMAND = 1, 2, 3
-#: Message that is no failure: a movep is slower than requested.
+#: A message that is no failure: a movep is slower than requested.
 IGNORED_MESSAGE = 'C196A0:'
-#: No motion of a test takes longer [s].
+#: Longest motion of a test [s].
 MAX_MOTION_TIME = 5000.0
 
 
@@ -39,9 +39,9 @@ MAX_MOTION_TIME = 5000.0
 class ProgramRun:
     """The end of a trajectory."""
 
-    #: Messages of the controller when it stopped; empty = it ran to the end.
+    #: Messages of the controller when it stopped; empty = the trajectory ran to its end.
     failure: str
-    #: Result that the robot program reported, if any.
+    #: The result that the robot program reported, if any.
     result: TrajectoryResult | None
     #: Joint positions at the end [rad], and the TCP pose that the controller reports.
     q: tuple
@@ -66,11 +66,11 @@ class RobotInMemory:
         twin=None,
     ):
         """
-        Start it.
+        Start the robot.
 
         :param edit: makes a program of the text that the driver sends.
-        :param interleaving_seed: of the random switches between its threads; None = no switches.
-        :param twin: the laws by which it moves; None = the assumed laws.
+        :param interleaving_seed: the seed of random switches between threads; None = no switches.
+        :param twin: the laws of its motion; None = the assumed laws.
         """
         self.model, self.geometry, self.twin = model, geometry, twin
         config = SimulatorConfig(
@@ -100,13 +100,13 @@ class RobotInMemory:
 
     @cached_property
     def slow(self):
-        """The same robot with a fifth of the cycles, for motions that take minutes."""
+        """The same robot with a fifth of the cycles, for motions of minutes."""
         return RobotInMemory(
             self.model, 0.2 / self.controller.cycle, self.geometry, twin=self.twin
         )
 
     def place(self, q, T_flange_tcp):
-        """Put the arm and its tool somewhere at rest; return what RTDE would report."""
+        """Put the arm with its tool at rest at joint positions; return RTDE's state."""
         self._ready()
         motion = self.controller.motion
         motion.T_flange_tcp = T_flange_tcp
@@ -132,7 +132,8 @@ class RobotInMemory:
         """
         Send the primitives as the driver does, and wait for the end of the motion.
 
-        :param data: sent instead of their bytes; ``announced``: instead of their number.
+        :param data: bytes that replace the bytes of the primitives.
+        :param announced_count: a number that replaces their number.
         :param on_cycle: called after each cycle.
         :param takes_offsets: whether the path gives way to offsets in registers.
         """
@@ -174,19 +175,19 @@ class RobotInMemory:
         )
 
     def feed(self, primitives):
-        """Let more points come."""
+        """Send more points."""
         self._socket(TRAJECTORY).feed(encode_points(primitives))
 
     def ask_to_idle(self):
-        """Let the message come that ends the mode in which trajectories run."""
+        """Send the message that ends the mode in which trajectories run."""
         self.ask(keepalive(0))
 
     def ask(self, message):
-        """Let a message come on the reverse socket."""
+        """Send a message on the reverse socket."""
         self._socket(REVERSE).feed(message.encode())
 
     def cancel(self):
-        """Let CANCEL come, without the number of points that were sent."""
+        """Send CANCEL, without the number of sent points."""
         self._command(trajectory(TrajectoryAction.CANCEL, 0, read_timeout=0))
 
     def late_results(self, cycles):
@@ -197,7 +198,7 @@ class RobotInMemory:
         return TrajectoryResultDecoder().feed(said) if said else []
 
     def send_command(self, command):
-        """Let a script command come."""
+        """Send a script command."""
         self._socket(COMMAND).feed(script_command.encode(command))
 
     def contact_answers(self):
@@ -208,7 +209,7 @@ class RobotInMemory:
     # -- between trajectories --------------------------------------------------------------------
 
     def _ready(self):
-        """Let the program wait for a trajectory, whatever the last one did to the controller."""
+        """Bring the program to wait for a trajectory, whatever the last one left behind."""
         controller = self.controller
         if controller.safety.mode not in OPERATIONAL:
             controller.programs.stop()

@@ -11,7 +11,7 @@ from typing import Any, Self
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import PrimaryDecoder
 
 #: Settings of a simulated robot, each of a type of its own: free ports, and no jump of its time
-#: where this computer does something else.
+#: while this computer is busy.
 FREE: dict[str, Any] = {
     'rtde_port': 0,
     'primary_port': 0,
@@ -93,7 +93,7 @@ PAUSE = struct.pack('>HB', 3, ord('P'))
 
 
 def fetch_program(driver: Any) -> str:
-    """Fetch the robot program from a driver as the External Control node does."""
+    """Fetch the robot program from a driver, as the External Control node does."""
     with socket.create_connection((HOST, driver.status.ports['script_sender_port'])) as sender:
         sender.settimeout(5.0)
         sender.sendall(b'request_program\n')

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Random goals with rounded corners, and what their plans do, measured by geometry."""
+"""Random goals with rounded corners, and geometric measures of their plans."""
 
 from dataclasses import dataclass
 
@@ -29,7 +29,7 @@ STEP = 0.002
 
 @dataclass
 class RoundedCase:
-    """A goal with the arm that is to carry it out."""
+    """A goal, with its arm."""
 
     arm: Arm
     state: RobotState
@@ -37,7 +37,7 @@ class RoundedCase:
 
     @property
     def starts(self):
-        """The poses at which segments begin."""
+        """The start poses of the segments."""
         return [self.state.actual_tcp_pose, *(point.pose for point in self.goal.waypoints[:-1])]
 
 
@@ -114,7 +114,7 @@ def programmed(case):
 
 @dataclass
 class Measured:
-    """The largest values of a motion, as parts of their limits."""
+    """The largest values of a motion, as fractions of their limits."""
 
     deviation: float
     speed: float
@@ -127,7 +127,7 @@ class Measured:
 
 
 def measure(case, plan, options=OPTIONS):
-    """Return what a plan does, by the forward kinematics of its joint polynomials."""
+    """Return the motion of a plan, by the forward kinematics of its joint polynomials."""
     duration = plan.duration
     t = np.arange(0.0, duration, STEP)
     q, qd, qdd = plan.joint_spline.rows(t)

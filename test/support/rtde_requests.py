@@ -9,6 +9,6 @@ START = struct.pack('>HB', 3, ord('S'))
 
 
 def setup_outputs(*names, frequency=500.0):
-    """Ask for outputs, in the form of version 2."""
+    """Return the request for outputs, in the form of version 2."""
     payload = struct.pack('>d', frequency) + ','.join(names).encode()
     return struct.pack('>HB', 3 + len(payload), ord('O')) + payload

@@ -9,7 +9,7 @@ DIALECTS = ('2.0', '2.10', '2.12', '2.14')
 
 
 def saved_program(dialect, host):
-    """Return the program of a dialect, as a definition that can be loaded and played."""
+    """Return the program of a dialect, as a definition to load and play."""
     lines, keep = [], True
     for line in TEXT.read_text('ascii').replace('@HOST@', host).splitlines():
         match line.split():

@@ -1,8 +1,8 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A call of each script function, with arguments that the simulated controller takes."""
+"""A call of each script function, with arguments that the simulated controller accepts."""
 
-#: Joints whose pose is well within reach, and a pose; the numbers of the other points are theirs.
+#: Joints with a pose well within reach, and a pose; the other points use the same numbers.
 Q = '[0.2, -1.5, 1.5, -1.5, -1.5, 0.1]'
 POSE = 'p[0.3, -0.3, 0.4, 0, 3.14159, 0]'
 #: Arguments of the functions that need some.
@@ -112,7 +112,7 @@ for _name in ('get', 'read'):
         ARGUMENTS |= {f'read_{side}_{_kind}_register': '0' for side in ('input', 'output')}
         ARGUMENTS[f'write_output_{_kind}_register'] = 'True' if _kind == 'boolean' else '0, 1'
 ARGUMENTS['write_output_boolean_register'] = '0, True'
-#: Functions of Modbus signals, which need one.
+#: A call before functions of Modbus signals, which need a signal.
 SIGNAL = 'modbus_add_signal("127.0.0.1", 1, 2, {}, "s")\n'
 MODBUS = {
     'modbus_get_signal_status': (0, '"s"'),
@@ -129,7 +129,7 @@ MODBUS = {
 
 
 def call(name):
-    """Return a call as a program writes it, and what has to stand before."""
+    """Return a call as a program writes it, and the statements that it needs before."""
     if name in MODBUS:
         kind, arguments = MODBUS[name]
         return SIGNAL.format(kind), f'{name}({arguments})'

@@ -4,7 +4,7 @@
 The guide's sample program on a simulated controller, driven by our servo side over RTDE only.
 
 Controller and driver take turns cycle by cycle through the bytes of RTDE, with a delay that a
-test may vary; so it needs no real time and is always the same.
+test may vary; so a run needs no real time, and can be repeated exactly.
 """
 
 from collections import deque
@@ -31,7 +31,7 @@ SETTINGS = ServoSettings()
 
 
 class OpenLoopClock(ServoClock):
-    """Runs at rate 1, whatever the robot does with the set-points."""
+    """A clock with the rate 1, whatever the robot does with the set-points."""
 
     def advance(self, passed, speed, in_flight):
         super().advance(passed, 1.0, self.target)
@@ -50,7 +50,7 @@ class OpenLoopStream(ServoStream):
 
 
 class GuideCell:
-    """A UR5e that runs the sample of the guide, or another program, and one client of RTDE."""
+    """A UR5e that runs the guide's sample or another program, and a client of RTDE."""
 
     def __init__(self, program=GUIDE):
         self.controller = assemble(SimulatorConfig()).controller
@@ -67,7 +67,7 @@ class GuideCell:
         self._inputs = ready[0].inputs
         self._effective_speed = EffectiveSpeed()
         self._inbox, self._outbox = deque(), deque()
-        #: Where the arm was in each cycle.
+        #: The joints of the arm in each cycle.
         self.joints = []
         (text,) = UploadDecoder().feed(program.read_bytes())
         self.controller.programs.submit(text.text)
@@ -82,9 +82,9 @@ class GuideCell:
 
     def cycle(self, take, *, delay=0):
         """
-        Let a cycle pass: the robot's, then its packets, then what ``take(feedback)`` writes.
+        Run a cycle: the robot's, then its packets, then the set-points from ``take(feedback)``.
 
-        :param delay: packets stay on the wire for so many cycles more than the one before did.
+        :param delay: the number of packets that stay on the wire after the cycle.
         """
         self.controller.step()
         self.joints.append(self.q)

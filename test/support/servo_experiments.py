@@ -3,10 +3,10 @@
 """
 The two experiments of the servoj guide: set-points without and with a buffer.
 
-The tool goes up and down along the vertical axis, again and again, with the set-points at the rate
-of the packets or as our loop makes them, on the simulated controller at two positions of the speed
-slider. ``doc/servo_experiments.png`` is drawn from the same numbers by
-``scripts/draw_servo_experiments.py``.
+The tool goes up and down along the vertical axis repeatedly, on the simulated controller at two
+positions of the speed slider. The set-points come at the rate of the packets, or from the driver's
+servo loop. ``scripts/draw_servo_experiments.py`` draws ``doc/servo_experiments.png`` from the same
+numbers.
 """
 
 from dataclasses import dataclass
@@ -25,9 +25,9 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.protocol.program.registers import ServoMode, SyncState
 
 UNBUFFERED = GUIDE.with_name('servoj_unbuffered.script')
-#: How far up the tool goes [m], and how long there and back takes [s].
+#: Height of the motion [m], and time for the way up and down [s].
 HEIGHT, PERIOD = 0.1, 2.0
-#: Number of other set-points that servoj may get before the next one of ours.
+#: Number of other set-points that servoj may get before the driver's next one.
 AHEAD = 200
 #: Set-points of one period are computed once.
 ROWS = round(PERIOD / CYCLE)
@@ -47,7 +47,7 @@ def up_and_down(home):
 
 
 class UpAndDown:
-    """Set-points of a number of periods, or without end."""
+    """Set-points of a number of periods, or endless ones."""
 
     def __init__(self, rows, periods=np.inf):
         self._rows, self._end, self._step = rows, periods * len(rows), 0.0
@@ -79,7 +79,7 @@ class Result:
 
     @property
     def jerkiness(self):
-        """Greatest change of a joint's acceleration from one cycle to the next [rad/s^2]."""
+        """The largest change of a joint's acceleration from one cycle to the next [rad/s^2]."""
         settled = self.actual[round(0.5 / CYCLE) :]
         return float(np.abs(np.diff(settled, n=3, axis=0)).max() / CYCLE**2)
 
@@ -105,9 +105,9 @@ class Experiment:
 
     def run(self, take, seconds, late):
         """
-        Let time pass.
+        Run the experiment for some seconds.
 
-        :param late: every so many cycles a packet comes together with the next one; 0 = never.
+        :param late: period [cycles] in which a packet comes late, with the next one; 0 = never.
         """
         for i in range(round(seconds / CYCLE)):
             self.cell.cycle(take, delay=int(late > 0 and i % late == 0))
@@ -117,7 +117,7 @@ class Experiment:
     def result(self):
         actual = np.array(self.cell.joints)
         skipped, at = 0, 0
-        for row in map(tuple, self.written):  # servoj got them in this order too
+        for row in map(tuple, self.written):  # servoj got them in the same order
             found = row in self._received[at : at + AHEAD]
             at += self._received[at : at + AHEAD].index(row) + 1 if found else 0
             skipped += not found

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A valve that acts late, on an output of the simulated controller, and the beads that it lays."""
+"""A valve with dead times, on an output of the simulated controller, and its beads."""
 
 from dataclasses import dataclass
 
@@ -17,10 +17,9 @@ CYCLE = ARM.model.control_cycle
 
 class SimulatedValve:
     """
-    Opens and closes some time after its output; ``on_cycle`` of a run.
+    A valve that opens and closes some time after its output; serves as ``on_cycle`` of a run.
 
-    Nothing is taken from a plan: it sees the output and the tool as the controller has them at the
-    end of each cycle.
+    It uses nothing of a plan, but only the controller's output and tool at the end of each cycle.
     """
 
     def __init__(self, controller, pin, *, open, close):
@@ -37,11 +36,11 @@ class SimulatedValve:
         self._tool.append(controller.motion.T_base_tcp.position)
 
     def switched_at(self):
-        """Return where the tool was when the output switched, an array (n, 2, 3) of beads [m]."""
+        """Return the places of the tool when the output switched, by bead (n, 2, 3) [m]."""
         return self._places({True: 0.0, False: 0.0})
 
     def beads(self):
-        """Return where the beads begin and end, an array (n, 2, 3) [m]."""
+        """Return the places at which the beads begin and end (n, 2, 3) [m]."""
         return self._places(self._delays)
 
     def _places(self, delays):
@@ -55,7 +54,7 @@ class SimulatedValve:
 
 @dataclass(frozen=True)
 class Bead:
-    """A bead along x of the tool: its speed [m/s] and length [m], and how it is executed."""
+    """A bead along x of the tool: speed [m/s], length [m], and mode of execution."""
 
     speed: float
     length: float
@@ -63,11 +62,11 @@ class Bead:
 
     @property
     def run(self):
-        """The way to gain speed and to lose it, with the way of the lead at full speed [m]."""
+        """The distance to gain or lose speed, and to cover the lead at full speed [m]."""
         return mm(6) + self.speed**2 + 0.08 * self.speed
 
     def path(self, start, lead):
-        """Return a path with the bead at points that it passes, or between its points."""
+        """Return a path whose bead begins and ends at its points, or between them."""
         on, off = (digital(PIN), True), (digital(PIN), False)
         path = Path(start).at(speed=self.speed, acceleration=1.0).by(mm(5), of_tool=True)
         if self.is_rounded:
@@ -87,7 +86,7 @@ class Bead:
 
 
 def laid(robot, path, options):
-    """Lay the beads of a path, which begins at the tool; return where they begin and end."""
+    """Lay the beads of a path that begins at the tool; return the places of their ends."""
     state = robot.place(HOME, TOOL)
     goal = path(state.actual_tcp_pose).goal()
     made = plan(goal, state, ARM, options)
@@ -98,13 +97,13 @@ def laid(robot, path, options):
 
 
 def along(beads, start, axis):
-    """Return the ends of beads along an axis of the tool, from its start on (n, 2) [m]."""
+    """Return the ends of beads along an axis of the tool, from its start (n, 2) [m]."""
     direction = start.apply(axis)
     return (beads - start.position) @ (np.array(direction) - start.position)
 
 
 def errors(robot, bead, lead, options):
-    """Return how far behind the wanted places a bead begins and ends (2,) [m]."""
+    """Return the distances of a bead's begin and end behind the wanted places (2,) [m]."""
     start = robot.place(HOME, TOOL).actual_tcp_pose
     beads = laid(robot, lambda pose: bead.path(pose, lead), options)
     assert len(beads) == 1

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Imitations of what slicers and a dispenser's CAM write: G-code of thousands of short moves.
+Imitations of the programs of slicers and a dispenser's CAM: G-code of thousands of short moves.
 
 Each print keeps the places, speeds and switches that it writes, so that a test needs no importer
-to know them. They are made from a fixed seed, and are the same in every run.
+to know them. The prints are made from a fixed seed, and are the same in every run.
 """
 
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ CHORD = 0.12
 
 @dataclass
 class Print:
-    """A program, and what it says."""
+    """A program, and its contents."""
 
     lines: list = field(default_factory=list)
     #: Places on the curve [mm], and the speed [mm/s] at which each is approached.
@@ -39,14 +39,14 @@ class Print:
 
     @property
     def curve(self):
-        """Places (n, 3) [mm]."""
+        """The places (n, 3) [mm]."""
         return np.array(self.places)
 
     def say(self, *lines):
         self.lines += lines
 
     def line(self, x, y, z=None, speed=None, extruded=''):
-        """Go straight to a place [mm], as far as the program's three digits know it."""
+        """Go straight to a place [mm], rounded to the three digits of the program."""
         old = self.places[-1] if self.places else (0.0, 0.0, 0.0)
         place = (round(x, 3), round(y, 3), old[2] if z is None else round(z, 3))
         rise = '' if place[2] == old[2] else f' Z{place[2]:.3f}'
@@ -84,7 +84,7 @@ class Print:
 
 
 def _begun(*header):
-    """Return the dice of a print, and the print with its first lines."""
+    """Return the random generator of a print, and the print with its first lines."""
     made = Print()
     made.say(*header)
     return np.random.default_rng(SEED), made
@@ -133,7 +133,7 @@ def part():
 
 
 def _wall(made, width, height, radius, z):
-    """Add a rectangle with round corners, half as wide and high as it is [mm]."""
+    """Add a rectangle with round corners, by half its width and half its height [mm]."""
     across, along = width - radius, height - radius
     made.line(-across, -height, z, speed=60.0)
     made.switch('M3', True)
@@ -148,7 +148,7 @@ def _wall(made, width, height, radius, z):
 
 
 def _infill(made, width, height, spacing):
-    """Add lines from side to side of a rectangle, one beside the other."""
+    """Add parallel lines from side to side of a rectangle."""
     x, side = -width, -1
     while x <= width:
         begun = x > -width

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Run a few tests in a folder of their own, with the settings of all tests, in a process."""
+"""Run a few tests in a process and a folder of their own, with the settings of all tests."""
 
 from collections.abc import Mapping
 import os
@@ -15,7 +15,7 @@ def run_small_suite(
     folder: Path, modules: Mapping[str, str], *options: str
 ) -> subprocess.CompletedProcess[str]:
     """
-    Run the tests, and return the process that has ended.
+    Run the tests, and return the ended process.
 
     :param modules: text of each test module, by its path in ``test/``.
     """

@@ -1,13 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A test with deadlines tells nothing of a computer that stands still.
+Repeats failed tests with deadlines after a standstill of the computer.
 
-A virtual machine may get no processor for seconds, and on two processors robot, driver and several
-tests at once may leave one of them none. Timeouts then pass that are much longer than what they
-wait for, and a test fails without a defect. A test runs once more if its own process stood still,
-or if a driver in it says that its robot loop was silent for 5 s or ended; no other does. The
-summary counts it as rerun.
+A virtual machine may get no processor for seconds. With two processors, robot, driver and several
+tests may leave one of the processes without any. Even generous timeouts then pass, and a test
+fails without a defect. A test runs once more only if its own process stood still, or if a driver
+in it reports that its robot loop was silent for 5 s or ended. The summary counts it as rerun.
 """
 
 import logging
@@ -20,13 +19,13 @@ import pytest
 STEP = 0.02  # [s]
 #: As long as the shortest deadlines of the driver [s].
 LIMIT = 0.2
-#: What a driver says, in a result or its log, when its robot loop sent nothing for 5 s, ten
-#: heartbeats.
+#: Words of a driver, in a result or its log, after its robot loop sent nothing for 5 s (ten
+#: heartbeats).
 SILENT_LOOP = 'robot loop ended unexpectedly'
 
 
 class Standstill(logging.Handler):
-    """A plugin for pytest that marks the tests which wait, and watches the time while they run."""
+    """A pytest plugin that marks the tests that wait for a clock, and measures standstills."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -35,15 +34,15 @@ class Standstill(logging.Handler):
         Thread(target=self._watch, name='standstill', daemon=True).start()
 
     def __call__(self, error: BaseException) -> bool:
-        """Tell whether a test that failed runs again; pytest-rerunfailures asks."""
+        """Return whether a failed test runs again; called by pytest-rerunfailures."""
         return bool(self) or SILENT_LOOP in str(error).lower()
 
     def __bool__(self) -> bool:
-        """Tell the same of any error; older versions of the plugin ask so."""
+        """Return the same for any error; called by older versions of the plugin."""
         return self.longest > LIMIT or self.loop_was_silent
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Hear what drivers log."""
+        """Check a log record of a driver."""
         self.loop_was_silent |= SILENT_LOOP in record.getMessage().lower()
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:

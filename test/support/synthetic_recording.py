@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Synthetic recordings: a motion along two points on a line, the arm 1 mm beside it."""
+"""Synthetic recordings: a motion along a line with two points, the arm 1 mm beside it."""
 
 import json
 import os
@@ -29,7 +29,7 @@ SPEED = 0.1
 
 
 def path(first, last, point):
-    """A straight piece of the plan along x at SPEED [m/s], from x [m] to x."""
+    """Return a straight piece of the plan along x at SPEED [m/s], from one x [m] to another."""
     poses = np.zeros((2, 7))
     poses[:, 0], poses[:, 6] = (first, last), 1.0
     return ReferencePath(
@@ -60,7 +60,7 @@ METADATA = motion_metadata(
 
 
 def packet(i, begun=0, **others):
-    """The i-th packet on the plan; the arm is 1 mm beside its target."""
+    """Return the i-th packet on the plan; the arm is 1 mm beside its target."""
     x = SPEED * i * PERIOD
     return RobotState(
         timestamp=START + i * PERIOD,
@@ -87,7 +87,7 @@ def outputs(bits):
 
 
 class Warnings(list):
-    """Takes warnings."""
+    """Collects warnings."""
 
     def __call__(self, text):
         self.append(text)

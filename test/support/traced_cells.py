@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Goals through random cells, and how near the bodies come along the joints of a trace.
+Goals through random cells, and the distances of the bodies along the joints of a trace.
 
-Between the cycles of a trace the joints are interpolated, so densely that no body can have been
-0.1 mm nearer than found: steps that the distance before them proves to be harmless are left out.
+Between the cycles of a trace the joints are interpolated so densely that no body can have been
+0.1 mm nearer than found. Steps are left out if the distance before them proves them harmless.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from ur_cartesian_driver.motion.goal.goal import (
     Waypoint,
 )
 
-#: No body comes nearer between two steps by more than this [m].
+#: Largest approach of two bodies between two steps [m].
 STEP = 1e-4
-#: Spheres that cover the surfaces of a body.
+#: Largest number of spheres that cover a surface of a body.
 _SLICES = 10
 KINDS = ('primitives', 'spline', 'rounded', 'free axis')
 
@@ -93,7 +93,7 @@ def random_goal(rng, kind, start):
 
 
 def cell_beside(rng, arm, tcp, q, goal):
-    """Return a cell with bodies beside a goal, none of which is too close at its start (6,)."""
+    """Return a cell with bodies beside a goal; none is too close to its start joints (6,)."""
     ways = np.array([point.pose.position for point in goal.waypoints])
     frames = CellJudge(arm, tcp, EMPTY_CELL).frames(q)
     away = rng.normal(size=(len(ways), 3)) * 0.12
@@ -109,7 +109,7 @@ def cell_beside(rng, arm, tcp, q, goal):
 
 
 def short_of(clearance, distance):
-    """Return by how much a distance is too small [m]; what touches has no depth, but is so."""
+    """Return the shortfall of a distance [m]; above 0 for touching bodies, without their depth."""
     return max(clearance - distance, 0.0 if distance > 0.0 else 1e-9)
 
 
@@ -138,7 +138,7 @@ class TraceJudge:
             self._ways[name] = np.linalg.norm(np.diff(points, axis=0), axis=2).max(axis=1)
 
     def pairs(self):
-        """Return the pairs that are measured, and the distance that they keep [m]."""
+        """Return the measured pairs, and the distances that they have to keep [m]."""
         carriers, found = self.judge.carriers, []
         for k, body in enumerate(self.cell.bodies):
             for other in (*LINK_NAMES[:7], *(each.name for each in self.cell.bodies[:k])):
@@ -152,12 +152,12 @@ class TraceJudge:
         return found
 
     def nearest(self):
-        """Return the pair that is deepest below its clearance, and by how much it is [m]."""
+        """Return the largest shortfall of a pair below its clearance [m], and the pair."""
         found = [(self.shortfall(*pair), pair) for pair in self.pairs()]
         return max(found, default=(0.0, None))
 
     def shortfall(self, a, b, clearance):
-        """Return by how much two bodies come closer than a clearance; 0 = they do not [m]."""
+        """Return the largest shortfall of two bodies below a clearance [m]; 0 = none."""
         ways = self._ways[a] + self._ways[b]
         along = np.append(0.0, np.cumsum(ways))
         lower = self._lower(a, b)
@@ -185,7 +185,8 @@ class TraceJudge:
         """Return the shortfall between two cycles."""
         part, worst = 0.0, 0.0
         while True:
-            # Where both ends keep the clearance, half of what is between them may be nearer.
+            # A step covers the slack and 2 STEP: if both of its ends keep the clearance, no place
+            # between falls short by more than STEP.
             part += (max(slack, 0.0) + 2.0 * STEP) / max(way, 1e-12)
             if part >= 1.0:
                 return worst
@@ -194,7 +195,7 @@ class TraceJudge:
             worst, slack = max(worst, short_of(clearance, high)), low - clearance
 
     def _lower(self, a, b):
-        """Return distances (n,) that two bodies are not closer than, by spheres around one."""
+        """Return lower bounds (n,) of the distances of two bodies, by spheres around one."""
         if any(part.is_half_space for part in self.judge.parts[a]):
             a, b = b, a
         centres, radii = self._covers[a]

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A goal in the simulated controller: where the tool is, and what its outputs are, by cycle."""
+"""A goal in the simulated controller: the place of the tool and the outputs, by cycle."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ def instructions_of(goal, state, sizes=()):
     """
     Return the records of a goal, as the robot program gets them.
 
-    :param sizes: as for :class:`TracedRun`. Pulses to the last point are those of an open goal.
+    :param sizes: as for :class:`TracedRun`. Pulses to the last point are as in an open goal.
     """
     if not sizes:
         return list(plan(goal, state, ARM, OPTIONS).instructions)
@@ -59,10 +59,11 @@ class TracedRun:
     """
     One run: the way of the tool [m] by cycle, and the edges of the standard digital outputs.
 
-    :param goal: a goal, or a function that makes one from the pose at the start.
+    :param goal: a goal, or a function that makes a goal from the start pose.
     :param slider: the speed slider by cycle.
     :param act: called after each cycle, with the controller and the number of the cycle.
-    :param sizes: the numbers of points that come together, the others appended; empty = all.
+    :param sizes: the numbers of points that are sent together; all but the first are appended;
+        empty = all points are sent at once.
     """
 
     def __init__(
@@ -76,7 +77,7 @@ class TracedRun:
         #: The goal that was run, and the position of the tool by cycle (n, 3) [m].
         self.goal, self.positions, outputs = self._trace(robot, goal, slider, act, sizes)
         changes = np.diff(np.array(outputs, dtype=int), axis=0)
-        #: Pin, whether the output rises, cycle.
+        #: The edges: pin, whether the output rises, cycle.
         self.edges = [
             (int(pin), bool(changes[k, pin] > 0), int(k) + 1) for k, pin in np.argwhere(changes)
         ]
@@ -104,7 +105,7 @@ class TracedRun:
         return goal, np.array(positions), outputs
 
     def way_of(self, point):
-        """Return the way to where the tool is nearest to a point of the goal."""
+        """Return the way at which the tool is nearest to a point of the goal."""
         target = np.array(self.goal.waypoints[point].pose.position)
         a, step = self.positions[:-1], np.diff(self.positions, axis=0)
         square = np.maximum((step**2).sum(axis=1), 1e-300)

@@ -3,8 +3,8 @@
 """
 The files that belong to the project, for tests that walk a folder.
 
-Users write goals, pictures, recordings and programs of their own anywhere in a checkout. None of
-them is a part of the project, so none of them is tested.
+Users write goals, pictures, recordings and programs of their own anywhere in a checkout. These
+files do not belong to the project, so they are not tested.
 """
 
 from functools import cache
@@ -17,7 +17,7 @@ def tracked_files(folder: Path, pattern: str) -> tuple[Path, ...]:
     """
     Return the files in a folder that match a glob and that git tracks, sorted.
 
-    Where git tracks none, as in an installation or in a source distribution, these are all.
+    If git tracks none, as in an installation or a source distribution, all matches are returned.
     """
     command = ['git', 'ls-files', '-z', '--', f':(glob){pattern}']
     try:

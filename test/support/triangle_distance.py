@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Distances by brute force over triangles, with nothing but numpy: the judge of distances.
+The judge of distances: brute force over triangles, with nothing but numpy.
 
 A surface is an array (n, 3, 3) of the corners of its triangles [m].
 """
@@ -11,9 +11,9 @@ from itertools import chain, product, repeat
 import numpy as np
 from scipy.spatial import cKDTree, ConvexHull
 
-# Pairs of triangles that are measured at once: the nearest few first, which rule out most others.
+# Numbers of triangle pairs that are measured at once; the nearest few rule out most others.
 _CHUNKS = (128, 1024, 8192)
-# Directions along which triangles are compared, beside that of the nearest corners.
+# Directions along which triangles are compared, besides the direction of the nearest corners.
 _DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if d > (0.0, 0.0, 1.0)])
 _TINY = 1e-300
 # The corner behind each corner.
@@ -22,15 +22,15 @@ _NEXT = [1, 2, 0]
 
 def triangle_distance(one, other):
     """
-    Return the smallest distance of two surfaces [m]; 0 where a triangle passes through another.
+    Return the smallest distance of two surfaces [m]; 0 if a triangle passes through another.
 
-    Only pairs of triangles that may be nearer than the best pair so far are measured: by their
-    boxes along the axes, then by their separation along some other directions.
+    Only pairs of triangles that may be nearer than the best pair so far are measured. They are
+    chosen by their boxes along the axes, then by their separation along some other directions.
     """
     a, b = one.reshape(-1, 3), other.reshape(-1, 3)
     corners, numbers = cKDTree(b).query(a)
     k = int(np.argmin(corners))
-    # Of two points it is the distance, but for rounding.
+    # For two points this is the distance, except for rounding.
     best = float(corners[k]) * (1.0 + 1e-9)
     rows, columns, gaps = _near_pairs(one, other, best)
     directions = np.vstack([_DIRECTIONS, b[numbers[k]] - a[k]])
@@ -54,7 +54,7 @@ def triangle_distance(one, other):
 
 
 def _near_pairs(one, other, best):
-    """Return the pairs of triangles whose boxes are within a distance, and that of the boxes."""
+    """Return the pairs of triangles whose boxes are within a distance, and box distances."""
     (low, high), (other_low, other_high) = _bounds(one), _bounds(other)
     rows = np.flatnonzero(
         _gaps((low, high), (other_low.min(axis=0), other_high.max(axis=0))) <= best
@@ -77,7 +77,7 @@ def _bounds(triangles):
 
 
 def _gaps(a, b):
-    """Return the distances of boxes, each given by its lowest and its highest corner."""
+    """Return the distances of boxes, each given by its lowest and highest corner."""
     apart = np.maximum(np.maximum(a[0] - b[1], b[0] - a[1]), 0.0)
     return np.sqrt(np.einsum('...c,...c', apart, apart))
 
@@ -115,16 +115,16 @@ def _cross(a, b):
 
 def _is_inside(points, corners, inwards):
     """
-    Whether points (n, 3) are above or below their triangles (n, 3, 3).
+    Return whether points (n, 3) are above or below their triangles (n, 3, 3).
 
-    :param inwards: (n, 3, 3) of each edge the direction in the plane that leads inwards.
+    :param inwards: (n, 3, 3) for each edge, the inward direction in the plane.
     """
     beyond = np.einsum('nkc,nkc->nk', points[:, None] - corners, inwards)
     return (beyond >= 0.0).all(axis=1)
 
 
 def _segment_distances(a, a_end, b, b_end):
-    """Return the distances (...) of segments: between both lines, or at one of the four ends."""
+    """Return the distances (...) of segments: between their lines, or at one of four ends."""
     u, v, r = a_end - a, b_end - b, a - b
     uu, vv, uv, ur, vr = (
         np.einsum('...c,...c', x, y) for x, y in ((u, u), (v, v), (u, v), (u, r), (v, r))
@@ -152,7 +152,7 @@ def _segment_distances(a, a_end, b, b_end):
 
 
 def encloses(surface, point):
-    """Whether a closed surface encloses a point: it fills the whole view (Van Oosterom)."""
+    """Return whether a closed surface encloses a point: it fills the whole view (Van Oosterom)."""
     a, b, c = (surface[:, k] - point for k in range(3))
     x, y, z = (np.linalg.norm(each, axis=1) for each in (a, b, c))
     volume = np.einsum('nc,nc->n', a, np.cross(b, c))
@@ -183,7 +183,7 @@ def box_surface(size):
 
 def cylinder_surfaces(radius, length, n=128):
     """
-    Return two prisms about z: one that a cylinder contains, and one that contains it.
+    Return two prisms about z, one inside of a cylinder and one around it.
 
     With 128 sides they are 0.06 % of the radius apart.
     """

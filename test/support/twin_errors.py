@@ -6,9 +6,9 @@ Plan goals with and without the twin of a simulated arm, and measure both errors
     python test/support/twin_errors.py [-n ARMS]
 
 prints the table of doc/twin.md. The laws of each arm are drawn at random; its twin has the values
-with small errors, as an identification would find them. The judge is the controller: the time
-between the first and the last cycle in which the target joints of RTDE move, and how far the
-target of the tool is off the planned path.
+with small errors, as an identification would find them. The controller is the judge: the time
+between the first and the last cycle in which the target joints of RTDE move, and the distance of
+the tool's target from the planned path.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 TYPE = SegmentType
 HOME = (0.3, -1.4, 1.5, -1.2, -1.3, 0.4)
 TOOL = Pose((0.01, 0.02, 0.1))
-#: Law -> range from which the laws of arms are drawn; relative error of a twin.
+#: Law -> range of its values in arms; relative error of a twin.
 DRAWN = {
     'start_time': (0.05, 0.4),
     'turn_ratio': (1.0, 4.0),
@@ -41,7 +41,7 @@ OPTIONS = PlanningOptions()
 
 
 def true_twin(seed, model='ur5', **fixed):
-    """Return the laws of an arm, drawn at random but for those that are fixed."""
+    """Return the laws of an arm, all drawn at random except for the fixed ones."""
     random = Random(seed)
     values = {name: random.uniform(*bounds) for name, bounds in DRAWN.items()} | fixed
     return Twin(
@@ -120,7 +120,7 @@ def goals(home, seed):
 
 
 def moving_time(robot, made):
-    """Return the time for which the arm moves [s], and the cycles of the run."""
+    """Return the time of the arm's motion [s], and the cycles of the run."""
     ran = robot.run([segment.primitive for segment in made.segments])
     assert ran.failure == '', ran.failure
     moves = np.flatnonzero((np.diff(ran.joints, axis=0) != 0.0).any(axis=1))
@@ -128,7 +128,7 @@ def moving_time(robot, made):
 
 
 def warm_robot(twin, frequency=None):
-    """Return a robot that has moved already: the first motion of a program is slow."""
+    """Return a robot that has moved already, because the first motion of a program is slow."""
     robot = RobotInMemory('ur5', frequency, twin=twin)
     state = robot.place(HOME, TOOL)
     x, y, z = state.actual_tcp_pose.position
@@ -138,13 +138,13 @@ def warm_robot(twin, frequency=None):
 
 
 def plan_of(robot, goal, twin=None, options=OPTIONS):
-    """Return the plan of a goal from HOME, which follows a twin."""
+    """Return the plan of a goal from HOME, by the laws of a twin."""
     options = replace(options, twin=twin, robot=ArmIdentity(model='ur5'))
     return plan(goal, robot.place(HOME, TOOL), robot.controller.arm, options)
 
 
 def off_path(made, ran):
-    """Return how far the tool gets from the planned path [m]."""
+    """Return the largest distance of the tool from the planned path [m]."""
     path = made.reference.poses[:, :3]
     begin, step = path[:-1], np.diff(path, axis=0)
     square = np.maximum((step**2).sum(axis=1), 1e-18)
@@ -158,9 +158,9 @@ def off_path(made, ran):
 
 def errors(seed):
     """
-    Return the errors of plans for each kind of goal (2, 2): without twin, and with.
+    Return the errors of plans for each kind of goal (2, 2), without and with the twin.
 
-    Each row has the error of the planned time [s] and that of the path [m].
+    Each row has the error of the planned time [s] and of the path [m].
     """
     true = true_twin(seed)
     robot, twin = warm_robot(true, 500.0), measured_twin(true, seed)

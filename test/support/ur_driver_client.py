@@ -19,7 +19,7 @@ def kind(name: str) -> Any:
 
 
 class UrDriverClient:
-    """Calls services and actions, and listens to topics; the cell's executor runs meanwhile."""
+    """Calls services and actions, and listens to topics, while the cell's executor runs."""
 
     def __init__(self, cell):
         self.cell, self.node = cell, cell.client_node
@@ -30,7 +30,8 @@ class UrDriverClient:
         """
         Destroy the clients of actions, which rclpy does not destroy with their node.
 
-        They would keep its participant. Where 32 are alive, no node finds another.
+        They would keep the node's participant. If 32 participants are alive, nodes do not find
+        each other.
         """
         for client in self._action_clients:
             client.destroy()
@@ -63,7 +64,7 @@ class UrDriverClient:
         return received
 
     def action(self, name, type_name):
-        """Return the client of an action, when its server is there."""
+        """Return the client of an action, once its server is there."""
         client = ActionClient(self.node, kind(type_name), name)
         self._action_clients.append(client)
         self.cell.spin_until(client.server_is_ready)
@@ -86,7 +87,7 @@ class UrDriverClient:
         return response.status, response.result
 
     def start_robot(self):
-        """Start the arm as the integration tests of the UR driver do: all calls succeed."""
+        """Start the arm as in the UR driver's integration tests; all calls have to succeed."""
         for name in (
             'close_popup',
             'close_safety_popup',

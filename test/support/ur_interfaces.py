@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The packages of messages that the UR ROS 2 driver uses, which are not on PyPI.
+The message packages of the UR ROS 2 driver, which are not on PyPI.
 
-Those that are not installed are built from ``test/interfaces``, which has the same fields, once
-for each change of them. They are kept below ``build/``, and out of the environment.
+Missing packages are built from ``test/interfaces``, which has the same fields, once for each
+change of these files. They are kept below ``build/``, outside of the environment.
 """
 
 from collections.abc import Iterator, Mapping
@@ -28,7 +28,7 @@ ROS_WHEELS = CHECKOUT / 'cmake' / 'ros_wheels.cmake'
 BUILD = CHECKOUT / 'build' / f'test-interfaces-{sys.implementation.cache_tag}'
 
 _COMMON = ('action_msgs', 'builtin_interfaces', 'geometry_msgs', 'std_msgs')
-#: The packages that each one uses, in the order in which they are built.
+#: The dependencies of each package; the packages are in the order of building.
 DEPENDENCIES: Mapping[str, tuple[str, ...]] = {
     'trajectory_msgs': _COMMON,
     'control_msgs': (*_COMMON, 'trajectory_msgs'),
@@ -51,12 +51,12 @@ _PACKAGE_XML = """<package format="3">
 
 
 class CannotBuild(Exception):
-    """There is nothing to build the packages with: only a checkout has it."""
+    """The packages cannot be built: there is no CMake or no checkout."""
 
 
 def built_interfaces() -> Path | None:
     """
-    Return the prefix with the packages that are not installed; None = all are installed.
+    Return the prefix with the missing packages; None = all are installed.
 
     :raises CannotBuild: some are missing, and there is no CMake or no checkout.
     """
@@ -68,7 +68,7 @@ def built_interfaces() -> Path | None:
     BUILD.mkdir(parents=True, exist_ok=True)
     prefix, stamp = BUILD / 'prefix', BUILD / 'stamp'
     digest = _digest(missing)
-    with BUILD.joinpath('lock').open('w') as lock:  # of tests that run beside this one
+    with BUILD.joinpath('lock').open('w') as lock:  # for tests that run at the same time
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not stamp.exists() or stamp.read_text() != digest:
             for folder in ('prefix', 'source', 'cmake'):
@@ -80,7 +80,7 @@ def built_interfaces() -> Path | None:
 
 
 def environment(prefix: Path) -> dict[str, str]:
-    """Return the environment for processes that use the packages."""
+    """Return the environment of processes that use the packages."""
     packages = next(prefix.glob('lib/python*/site-packages'))
     paths = {
         'AMENT_PREFIX_PATH': prefix,
@@ -95,11 +95,11 @@ def environment(prefix: Path) -> dict[str, str]:
 
 @contextlib.contextmanager
 def importable(prefix: Path | None) -> Iterator[None]:
-    """Let this process import the packages; afterwards they are missing again."""
+    """Make the packages importable in this process; afterwards they are missing again."""
     if prefix is None:
         yield
         return
-    # ROS loads these by their names alone, and the search path of a running process is fixed.
+    # ROS loads these libraries by name, and the search path of a running process is fixed.
     for kind in ('fastrtps', 'introspection'):
         for library in prefix.glob(f'lib/*__rosidl_typesupport_{kind}_c.so'):
             ctypes.CDLL(str(library))
@@ -116,7 +116,7 @@ def importable(prefix: Path | None) -> Iterator[None]:
             _imported[name] = sys.modules.pop(name)
 
 
-#: The modules that were imported so far.
+#: The modules imported so far.
 _imported: dict[str, ModuleType] = {}
 
 

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A client by others, the ``ur-rtde`` package of PyPI, at work: a program of its own.
+A program that uses a third-party client, the ``ur-rtde`` package of PyPI.
 
-It plays one of the :data:`SCENES` against an address and prints its readings, as JSON.
+It plays one of the :data:`SCENES` against an address, and prints its readings as JSON.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from typing import Any
 
 #: A tool in the flange, as a pose with a rotation vector.
 TOOL = [0.01, 0.0, 0.1, 0.0, 0.0, pi / 2]
-#: Not a scene: no interface of the package is connected before.
+#: This is no scene, because no interface of the package is connected before.
 SERVE = 'serve'
 PENDANT_TARGET = [0.3, -1.6, 1.7, -1.4, -1.5, 0.2]
 HOME = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
 
 
 class Client:
-    """The interfaces of the package at one robot, and what they have read so far."""
+    """The interfaces of the package at one robot, and their readings so far."""
 
     def __init__(self, host: str) -> None:
         from dashboard_client import DashboardClient
@@ -52,15 +52,15 @@ class Client:
     def note_at_rest(self, name: str, **values: Any) -> None:
         """Note the readings once the arm rests.
 
-        The package's two connections read packets of their own, so the answer to a move may be
-        ahead of the newest state.
+        The package's two connections read separate packets, so the answer to a move may be ahead
+        of the newest state.
         """
         self.until(lambda: max(map(abs, self.receive.getActualQd())) < 1e-9)
         self.note(name, **values)
 
     @contextlib.contextmanager
     def sampled(self, name: str) -> Iterator[None]:
-        """Read poses all the time while something moves the arm."""
+        """Read poses during the block, in which the arm moves."""
         end, poses, joints = threading.Event(), [], []
 
         def read() -> None:
@@ -261,7 +261,7 @@ def power(client: Client) -> None:
 
 
 def serve_external_control(host: str, port: str) -> None:
-    """Serve the package's own program to a node that fetches it, and move by it."""
+    """Serve the package's own program to a node that fetches it, and move with this program."""
     from rtde_control import RTDEControlInterface
 
     flags = RTDEControlInterface.FLAG_USE_EXT_UR_CAP

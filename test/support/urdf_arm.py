@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""An arm with a part and a fixed tool as a URDF that the tests write, and pinocchio's poses."""
+"""An arm with a part and a fixed tool, as a URDF of the tests, and pinocchio's poses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

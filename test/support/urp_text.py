@@ -38,7 +38,7 @@ def urp_text(*nodes: str, once: bool = True) -> str:
 
 
 def urpx(name: str, script: str, **application: object) -> dict[str, Any]:
-    """Return the content of a program of PolyScope X, without what no robot needs to run it."""
+    """Return the content of a program of PolyScope X, reduced to the parts that a robot runs."""
     information = {'name': name, 'description': '', 'programState': 'FINAL'}
     return {
         'application': application,

@@ -4,8 +4,8 @@
 An event loop on a clock of its own, with a network in memory.
 
 When nothing is ready, time jumps to the next timer: a test of minutes takes only its computing
-time and runs the same each time. The code under test gets its timers, connections and listening
-ports from this loop and does not notice the difference.
+time, and runs in the same way each time. The code under test gets its timers, connections and
+listening ports from this loop, and does not notice the difference.
 
 Faults of single connections: :meth:`VirtualLoop.cut`, :meth:`~VirtualLoop.freeze` and
 :meth:`~VirtualLoop.inject_data`.
@@ -26,9 +26,9 @@ _FIRST_CLIENT_PORT = 60_001
 
 class _SkippingSelector(selectors.DefaultSelector):
     """
-    Does not wait: adds the timeout to the virtual time instead.
+    A selector that does not wait, but adds the timeout to the virtual time.
 
-    Nor does it ask the system in each turn for events of sockets: there are none.
+    It never asks the system for events of sockets, because there are none.
     """
 
     loop: 'VirtualLoop'
@@ -41,7 +41,7 @@ class _SkippingSelector(selectors.DefaultSelector):
 
 
 class VirtualLoop(asyncio.SelectorEventLoop):
-    """The loop; one test, one loop."""
+    """The event loop; each test has its own."""
 
     def __init__(self):
         selector = _SkippingSelector()
@@ -49,7 +49,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         super().__init__(selector)
         selector.loop = self
         self.servers = {}
-        #: Client ends of all connections that were made.
+        #: Client ends of all connections so far.
         self.ends = []
         #: Ports to which the cable is cut.
         self.unreachable = frozenset()
@@ -57,15 +57,15 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def time(self):
         return self.now
 
-    # ---- what asyncio is asked for ---------------------------------------------------------
+    # ---- the interface of asyncio ----------------------------------------------------------
 
-    # The loop's own has a type for each argument of the function.
+    # The overridden method has a type for each argument of the function.
     def run_in_executor(self, executor, func, *args):  # type: ignore[override]
-        """Call the function at once: a thread knows nothing of the virtual time."""
+        """Call the function at once, because a thread knows nothing of the virtual time."""
         future = self.create_future()
         try:
             future.set_result(func(*args))
-        except Exception as error:  # belongs to the one who awaits the future
+        except Exception as error:  # raised where the future is awaited
             future.set_exception(error)
         return future
 
@@ -104,7 +104,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         far.protocol.connection_made(far)
         return near
 
-    # ---- what a test does to a connection ----------------------------------------------------
+    # ---- faults of connections ---------------------------------------------------------------
 
     def open_ends(self, port):
         """Return the client ends of the open connections to a port."""
@@ -124,8 +124,8 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         """
         Deliver nothing to and from some ports, and refuse new connections to them.
 
-        When the cable to a port is whole again (it is not in ``ports``), all that was sent
-        arrives, as TCP repeats it.
+        When the cable to a port is whole again (the port is not in ``ports``), all sent data
+        arrive, because TCP repeats them.
         """
         self.unreachable = frozenset(ports)
         for end in self.ends:
@@ -146,18 +146,18 @@ class _Server:
         self.sockets = [_Socket((HOST, port))]
 
     async def start_serving(self):
-        """Do nothing: it serves."""
+        """Do nothing: the server serves already."""
 
     def close(self):
         if self._loop.servers.get(self._port) is self:
             del self._loop.servers[self._port]
 
     async def wait_closed(self):
-        """Do nothing: it is closed."""
+        """Do nothing: the server is closed already."""
 
 
 class _Socket:
-    """The part of a socket's interface that is used."""
+    """The used part of a socket's interface."""
 
     def __init__(self, name):
         self._name = name
@@ -218,7 +218,7 @@ class _End(asyncio.Transport):
     abort = close
 
     def _receive(self, data):
-        """Queue data from the peer; no bytes mean that it has closed."""
+        """Queue data from the peer; no bytes = the peer has closed."""
         if self.frozen or self._closing:
             return
         self._inbox.append(data)
@@ -229,7 +229,7 @@ class _End(asyncio.Transport):
         return self._paused or not self.loop.unreachable.isdisjoint(ports)
 
     def schedule(self):
-        """Deliver what has been sent, if it can arrive."""
+        """Deliver the sent data, if they can arrive."""
         if self._inbox and not self._is_due and not self._is_held():
             self._is_due = True
             self.loop.call_soon(self._deliver)
@@ -273,7 +273,7 @@ class _ProgramSocket(asyncio.Protocol):
 
 
 class ProgramNetwork:
-    """The simulator's ScriptSockets: what robot programs open on the loop's network."""
+    """The simulator's ScriptSockets: sockets of robot programs on the loop's network."""
 
     def __init__(self, loop):
         self._loop = loop

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The inverse of what the driver sends to the robot program: bytes back to messages.
+The inverse of the driver's encoders for the robot program: bytes to messages.
 
-It is written after the tables of the protocol, and shares no code with the encoders, so that a
-round trip is a test of them.
+It follows the tables of the protocol, and shares no code with the encoders, so that a round trip
+is a test of them.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol.program.reverse import ControlMode, ReverseMessage
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
-#: Motion type -> the move, and whether its target is a pose.
+#: By motion type: the move, and whether its target is a pose.
 MOVES: dict[int, tuple[Any, bool]] = {
     0: (MoveJ, False),
     1: (MoveL, True),
@@ -58,7 +58,7 @@ MOVES: dict[int, tuple[Any, bool]] = {
     12: (OptimoveJ, True),
     13: (OptimoveL, False),
 }
-#: Motion type -> whether target and via point of the arc are poses.
+#: By motion type: whether target and via point of the arc are poses.
 ARCS = {3: (True, True), 9: (False, False), 10: (False, True), 11: (True, False)}
 SPLINE, SWITCH_OUTPUT = 51, 200
 
