@@ -202,7 +202,7 @@ class Kinematics:
 
     def __init__(self, geometry, limits, T_flange_tool):
         """
-        Keep it.
+        Take the table, the ranges and the tool.
 
         :param limits: lowest and highest positions of the joints (6, 2) [rad].
         :param T_flange_tool: a pose.
@@ -225,7 +225,7 @@ class Kinematics:
         return tool, J
 
     def solve(self, target, q, iterations=60):
-        """Return the configurations that Newton's steps lead to from (n, 6), and which arrive."""
+        """Run Newton's method from configurations (n, 6); return its ends, and which arrived."""
         q = np.array(np.atleast_2d(q), dtype=float)
         for _ in range(iterations):
             T, J = self.jacobian(q)
@@ -259,19 +259,19 @@ class Kinematics:
         return solutions
 
     def within(self, q, slack=1e-6):
-        """Tell whether configurations are within the ranges."""
+        """Return whether configurations are within the ranges."""
         return ((q >= self.low - slack) & (q <= self.high + slack)).all(axis=-1)
 
     def measures(self, q):
         """Return the distances from singularities (n, 3): wrist, elbow [rad], shoulder [m]."""
         frames = dh_frames(self.geometry, q)
         axes = frames[:, :6, :3, 2]
-        # The wrist centre: where axis 6 is nearest to axis 5.
+        # The wrist centre: the place of axis 6 that is nearest to axis 5.
         centre = frames[:, 5, :3, 3]
         normal = np.cross(axes[:, 0], axes[:, 1])
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         wrist = np.linalg.norm(np.cross(axes[:, 3], axes[:, 5]), axis=1)
-        # Of the calibrated angle of the elbow only some milliradians are unknown.
+        # Only some milliradians of the elbow's calibrated angle are unknown.
         elbow = np.abs(np.sin(q[:, 2]))
         shoulder = np.abs(np.einsum('ni,ni->n', centre - frames[:, 1, :3, 3], normal))
         return np.stack([np.arcsin(np.minimum(1.0, wrist)), np.arcsin(elbow), shoulder], axis=1)

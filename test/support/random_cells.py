@@ -161,7 +161,7 @@ def random_cell(rng, places, *, carried=True, meshes=True, spread=0.3, largest=0
 
 
 def _placed_in(body, frame, T):
-    """Return a fixed body in another frame of the base, where it is turned about z."""
+    """Return a fixed body in another frame of the base, turned by 180 degrees about z."""
     x, y, z, w = body.T_frame_body.quaternion
     # A turn by 180 degrees about z is the quaternion (0, 0, 1, 0).
     return CellBody(

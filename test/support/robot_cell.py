@@ -340,7 +340,7 @@ class RobotCell:
         ]
 
     async def sleep(self, seconds):
-        """Let time pass [s]."""
+        """Wait for a time on the loop's clock [s]."""
         await asyncio.sleep(seconds)
 
     # ---- people and other clients -------------------------------------------------------------

@@ -201,7 +201,7 @@ def _offsets(text: str, unit: str) -> tuple[float, ...]:
 
 
 def count(text: str) -> int:
-    """Return a number of things, such as variants of a sweep."""
+    """Return a count, such as the number of variants of a sweep."""
     number = _whole(text)
     if not 0 <= number <= MAX_VARIANTS:
         raise argparse.ArgumentTypeError(f'{text} is not within 0 and {MAX_VARIANTS}')

@@ -11,7 +11,8 @@ position nearest to the arc's centre. (Along the old path the angle about this c
 so the old path is near every position on the arc.)
 
 A point is kept if an output, wait, dwell or posture belongs to it, if speed, acceleration or
-corner change after it, or if the tool would be turned by more than `MAX_TURN` there without it.
+corner change after it, or if the orientation there would change by more than `MAX_TURN` without
+it.
 """
 
 from __future__ import annotations

@@ -192,7 +192,7 @@ class _LogBridge(logging.Handler):
     """
     Passes the log records of one driver to the logger of its node.
 
-    Records that belong to no driver (a callback failed) go to the oldest node of the process.
+    Records without a driver, such as a failed callback's, go to the oldest node of the process.
     """
 
     _bridges: ClassVar[list[_LogBridge]] = []
@@ -256,7 +256,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         )
         _check_arguments(remove_ros_args(own_arguments)[1:])
     except RuntimeError as error:
-        # rcl appends the source line to its sentence, which only lists unknown arguments.
+        # rcl appends the source line to its sentence; for unknown arguments it just lists them.
         reason = re.split(r', at /', str(error))[0]
         if reason.startswith('['):
             reason = f'{reason[1:-1]} is not understood. {_USAGE}'

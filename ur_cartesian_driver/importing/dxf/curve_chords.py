@@ -10,10 +10,10 @@ of the chord has a point of the curve beside it, and the bound holds in both dir
 Farin, Curves and Surfaces for CAGD: both properties hold for positive weights.) Each curve is
 halved until every piece is within a small fraction of the tolerance of its chord.
 
-Then pieces are merged greedily: a chord spans as many as the remaining tolerance allows. Only
-the ends of pieces are checked, because a polyline is farthest from a line at one of its points,
-and its projection covers the whole line. A chord ends where the curve turns back by more than the
-remaining tolerance.
+Then pieces are merged greedily: a chord spans as many pieces as the remaining tolerance allows.
+Only the ends of pieces are checked, because a polyline is farthest from a line at one of its
+points, and its projection covers the whole line. A chord ends where the curve turns back by more
+than the remaining tolerance.
 
 Curves are arrays (m, n + 1, 4): m curves of degree n with control points (w x, w y, w z, w).
 """

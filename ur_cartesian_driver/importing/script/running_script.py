@@ -20,7 +20,7 @@ class RunningScript:
         self.interpreter: ScriptInterpreter | None = None
         #: A clause that names the last call with an assumed value; '' = none.
         self._assumed = ''
-        #: The remarks by reason: the functions and other things it applies to, and their lines.
+        #: The remarks by reason: the names to which the reason applies, and the lines.
         self._said: dict[str, tuple[dict[str, None], set[int]]] = {}
 
     @property

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The kinds of rows in the table of names; each row has a name, and serves it.
+The kinds of rows in the table of names, and the way in which each kind serves its names.
 
 Types are texts, such as ``ur_msgs/srv/SetIO``, because most of their packages are not on PyPI.
 """
