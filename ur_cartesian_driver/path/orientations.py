@@ -9,10 +9,10 @@ All are orientations of the controlled frame in the frame of the path.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos, isfinite, pi, sin, sqrt
+from math import cos, isfinite, sin, sqrt
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.geometry.pose import multiply, normalize, Quaternion
+from ur_cartesian_driver.motion.geometry.pose import MAX_ANGLE, multiply, normalize, Quaternion
 from ur_cartesian_driver.motion.geometry.vectors import (
     cross,
     dot,
@@ -31,8 +31,6 @@ X: Vector3 = (1.0, 0.0, 0.0)
 Y: Vector3 = (0.0, 1.0, 0.0)
 Z: Vector3 = (0.0, 0.0, 1.0)
 
-#: Angles larger than this [rad] must be degrees by mistake.
-MAX_ANGLE = 4.0 * pi
 #: Directions that differ by less than this [rad] are parallel.
 _PARALLEL = 1e-6
 

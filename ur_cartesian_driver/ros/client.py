@@ -346,7 +346,7 @@ class GoalClient:
             later points.
         :param replace_from_time: alternatively, the time from which new points replace old ones
             [s].
-        :return: a future of the response of ``~/append_points``. If the request is refused,
+        :returns: a future of the response of ``~/append_points``. If the request is refused,
             ``accepted`` is false, ``message`` says why, and the goal goes on as it was.
         :raises RuntimeError: no goal of this client runs.
         :raises ValueError: both ``replace_from_point`` and ``replace_from_time`` are given.

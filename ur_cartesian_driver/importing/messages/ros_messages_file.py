@@ -43,12 +43,11 @@ from ur_cartesian_driver.importing.messages.message_terms import (
 )
 from ur_cartesian_driver.importing.text_file import file_text, quoted
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.geometry.pose import MAX_ANGLE
 from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows
 from ur_cartesian_driver.motion.goal.goal import Posture, SegmentType
 
 _WITHOUT_TURN = ((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.0))
-#: A larger joint position [rad] must be in degrees; MoveIt keeps joints within one turn.
-_MAX_ANGLE = 4.0 * np.pi
 #: The fields that are read from the parts of a pose.
 _PARTS_OF_POSE = {'position': 'xyz', 'orientation': 'xyzw'}
 #: The fields that are read from the header of a pose.
@@ -384,7 +383,7 @@ def _angle(value: Any, line: int) -> float:
     :raises BrokenFile: the value is no number, or must be in degrees.
     """
     angle = _number(value, 'positions', line)
-    if abs(angle) > _MAX_ANGLE:
+    if abs(angle) > MAX_ANGLE:
         raise BrokenFile(
             getattr(value, 'line', line), f'a joint position is {angle:g} rad; give it in radians'
         )

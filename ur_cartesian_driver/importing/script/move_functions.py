@@ -16,7 +16,7 @@ from ur_cartesian_driver.importing.script.collected_events import (
     CollectedPoint,
     Steps,
 )
-from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import MAX_ANGLE, Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
 from ur_cartesian_driver.motion.twin.laws import ASSUMED_LAWS
@@ -43,8 +43,8 @@ JOINT_A, JOINT_V = ASSUMED_LAWS.timed_joint_acceleration, ASSUMED_LAWS.timed_joi
 PURE_TURN = 1e-6
 #: The assumed turn ratio of movel.
 TURN_RATIO = ASSUMED_LAWS.turn_ratio
-#: Larger lengths [m] are taken for millimetres, larger angles [rad] for degrees.
-FAR, MAX_ANGLE = 3.0, 12.6
+#: Larger lengths [m] are taken for millimetres.
+FAR = 3.0
 #: Joints that turn by less than this angle [rad] do not move.
 SAME_ANGLE = 1e-6
 

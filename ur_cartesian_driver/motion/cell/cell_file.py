@@ -32,7 +32,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from math import hypot, isfinite, pi
+from math import hypot, isfinite
 from pathlib import Path
 from typing import Any, TYPE_CHECKING, TypeVar
 
@@ -51,6 +51,7 @@ from ur_cartesian_driver.motion.cell.urdf_bodies import read_urdf
 from ur_cartesian_driver.motion.errors import shortened, suggestion
 from ur_cartesian_driver.motion.geometry.pose import (
     IDENTITY,
+    MAX_ANGLE,
     normalize,
     Pose,
     Quaternion,
@@ -71,8 +72,6 @@ FORMAT = 1
 _MAX_SHAPES = 10_000
 #: Largest rounding error in the length of a quaternion, and the largest that is not corrected.
 _UNIT_TOLERANCE, _EXACT_UNIT = 1e-3, 1e-12
-#: Largest angle [rad]; a larger one is probably given in degrees.
-_MAX_ANGLE = 4.0 * pi
 
 _HEAD = ('cell', 'clearance', 'bodies', 'may_touch', 'urdf')
 _TURNS = ('rpy', 'orientation', 'rotation_vector')
@@ -450,7 +449,7 @@ class _CellReader(NodeReader):
             exact = abs(length - 1.0) <= _EXACT_UNIT
             return (x, y, z, w) if exact else normalize((x, y, z, w))
         angles = self._vector(node, what)
-        if max(map(abs, angles)) > _MAX_ANGLE:
+        if max(map(abs, angles)) > MAX_ANGLE:
             self.refuse(
                 node, f'the {what} has an angle of more than two turns; give it in radians'
             )

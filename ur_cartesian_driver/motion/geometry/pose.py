@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import acos, atan2, cos, hypot, sin, sqrt
+from math import acos, atan2, cos, hypot, pi, sin, sqrt
 from typing import TypeAlias, TypeVar
 
 import numpy as np
@@ -26,6 +26,9 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3
 Quaternion: TypeAlias = tuple[float, float, float, float]
 #: One number, or the numbers of a batch.
 N = TypeVar('N', float, Floats)
+
+#: A larger rotation or joint position [rad] must be in degrees by mistake: two turns.
+MAX_ANGLE = 4.0 * pi
 
 _SMALL_ANGLE = 1e-9
 # Below this cosine of the pitch, roll and yaw turn about the same axis.

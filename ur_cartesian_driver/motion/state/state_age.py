@@ -86,7 +86,7 @@ class StaleStates:
         """
         Take the age of a state [s], at the time ``now`` [s].
 
-        :return: whether :attr:`age` has changed: states became too old, twice as old, or fresh.
+        :returns: whether :attr:`age` has changed: states became too old, twice as old, or fresh.
         """
         if age > (0.5 * self._max_age if self.age else self._max_age):
             self._last_old = now
