@@ -414,6 +414,19 @@ def test_modules_that_a_page_names_exist(page):
     ] == []
 
 
+def test_names_that_the_glossary_finds_in_modules_are_there():
+    text = (CHECKOUT / 'doc' / 'glossary.md').read_text(encoding='utf-8')
+    places = re.findall(r'`([a-z_/]+\.py)` \((`[^)]+`)\)', text)
+    assert len(places) > 30
+    missing = []
+    for module, names in places:
+        source = (CHECKOUT / 'ur_cartesian_driver' / module).read_text(encoding='utf-8')
+        for name in re.findall(r'`(?:\w+\.)?(\w+)`', names):
+            if not re.search(rf'(class|def) {name}\b|^ *{name}\b', source, re.MULTILINE):
+                missing.append((module, name))
+    assert missing == []
+
+
 def test_readme_leads_to_every_document():
     linked = set()
     for document in DOCUMENTS:

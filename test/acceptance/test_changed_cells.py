@@ -159,7 +159,7 @@ def test_a_body_in_the_way_stops_the_running_goal(driver, home, execution):
     driver.change_cell([wall(home, 0.2)])
     outcome = motion.result(10.0)
     assert outcome.code is ErrorCode.COLLISION
-    assert outcome.text.startswith('The cell has changed, and what is left of the path would to')
+    assert outcome.text.startswith('The cell has changed, and the rest of the path would to')
     assert 'wall' in outcome.text
     travelled = driver.state.actual_tcp_pose.position[1] - home().position[1]
     assert 0.0 < travelled < 0.15

@@ -48,7 +48,7 @@ async def inject_cause(cell: RobotCell, cause: str):
     elif cause == 'silent owner':
         cell.owner.silent = True
     elif cause == 'body in the way':
-        cell.owner.cancel(collision='what is left of the path would touch')
+        cell.owner.cancel(collision='the rest of the path would touch')
     elif cause == 'freeze all':
         cell.other_clients += [end.peer for end in setpoint_connections(cell)]
         for port in set(cell.loop.servers) - {robot_cell.OWNER_PORT}:

@@ -192,11 +192,11 @@ class ChangeableCell(ABC):
             if active.path is not None:
                 active.path.check(self.arm, lambda: self.options)
         except GoalRefused as error:
-            return f'the cell has changed, and what is left of the path would touch: {error}'
+            return f'the cell has changed, and the rest of the path would touch: {error}'
         except Exception as error:  # a motion that cannot be checked must not go on
             self._log.exception('checking a motion in the changed cell failed')
             return (
-                'the cell has changed, and what is left of the path cannot be checked '
+                'the cell has changed, and the rest of the path cannot be checked '
                 f'({type(error).__name__}: {error})'
             )
         return ''

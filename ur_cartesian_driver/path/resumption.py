@@ -494,7 +494,7 @@ def _check(goal: Goal, place: PathPlace, overlap: float, approach: float) -> Non
         raise InvalidGoal(
             'keep_open',
             'is true, so the goal does not hold all points of its path',
-            'send what is left of the path as a goal of its own',
+            'send the rest of the path as a goal of its own',
         )
     # The name may have a prefix. If the goal has the pose of its frame, this pose is kept.
     moved = goal.T_base_frame == IDENTITY and goal.moving_frame is None
@@ -509,7 +509,7 @@ def _check(goal: Goal, place: PathPlace, overlap: float, approach: float) -> Non
         raise InvalidGoal(
             f'trajectory.points[{k}].pose',
             'is given by joint positions, so the path around it is not known without the arm',
-            'give the pose, or send what is left of the path as a goal of its own',
+            'give the pose, or send the rest of the path as a goal of its own',
         )
     for k, segment in enumerate(goal.segments):
         if segment.dwell and resolve_execution_mode(goal_table(goal)).traits.is_spline:

@@ -32,7 +32,7 @@ class GoalSignal(Enum):
     CANCEL = 'the client cancels', ErrorCode.CANCELLED
     PREEMPT = 'a newer goal takes over', ErrorCode.PREEMPTED
     # Faults of a motion.
-    COLLISION = 'what is left of the path would touch', ErrorCode.COLLISION
+    COLLISION = 'the rest of the path would touch', ErrorCode.COLLISION
     VIOLATION = 'the arm is outside the path tolerance', ErrorCode.PATH_TOLERANCE_VIOLATED
     DEVIATION = 'the robot does something other than planned', ErrorCode.EXECUTION_FAILED
     STANDSTILL = 'the arm stands although nothing holds it', ErrorCode.EXECUTION_FAILED
