@@ -212,10 +212,10 @@ def _times(goal: GoalTable, options: PlanningOptions) -> None:
     times = goal.waypoints.times
     steps = np.diff(times, prepend=0.0)
     # The first point may have the time 0: then the robot is already there.
-    is_late = (steps > 0.0) | ((steps == 0.0) & (np.arange(len(times)) == 0))
+    is_in_order = (steps > 0.0) | ((steps == 0.0) & (np.arange(len(times)) == 0))
     motion_times = steps - np.append(0.0, goal.motions.dwells[:-1])
-    for i in rows_where(~is_late | (motion_times > options.max_segment_time))[:1]:
-        if is_late[i]:
+    for i in rows_where(~is_in_order | (motion_times > options.max_segment_time))[:1]:
+        if is_in_order[i]:
             raise long_segment_error(i, float(motion_times[i]), options.max_segment_time)
         remedy = (
             'increase it' if is_spline(goal) else 'increase it, or set all times to 0 for speeds'

@@ -138,7 +138,7 @@ class ExpressionCompiler(PythonWriter):
         if code.is_truth or not self._may_be_stored(node, code):
             return code
         self.at(node)
-        first, again = self._twice(code)
+        first, again = self._kept(code)
         python = self.choose(self.has_type(first, 'float'), again, self.call('copied', again))
         return replace(code, python=python, is_simple=False)
 
@@ -154,7 +154,7 @@ class ExpressionCompiler(PythonWriter):
         )
         return isinstance(node, stored) and not isinstance(code.python, ast.Constant)
 
-    def _twice(self, code: CompiledExpression) -> tuple[ast.expr, ast.expr]:
+    def _kept(self, code: CompiledExpression) -> tuple[ast.expr, ast.expr]:
         """Return code that evaluates an expression, and code that reads its value again."""
         if code.is_simple:
             return code.python, code.python
@@ -200,7 +200,7 @@ class ExpressionCompiler(PythonWriter):
             return CompiledExpression(self.constant(signed), 1 + code.weight, is_simple=True)
         if node.operator == '+':
             return CompiledExpression(self.call('plus', code.python), 1 + code.weight)
-        first, again = self._twice(code)
+        first, again = self._kept(code)
         negative = self.node(ast.UnaryOp, ast.USub(), again)
         python = self.choose(self.has_type(first, 'float'), negative, self.call('minus', again))
         return CompiledExpression(python, 1 + code.weight)
@@ -225,8 +225,8 @@ class ExpressionCompiler(PythonWriter):
             )
         if not right.is_simple and not self._is_fixed(left):
             left = replace(left, is_simple=False)  # the right side may change its value
-        (first_a, a), (first_b, b) = self._twice(left), self._twice(right)
-        is_quick = self._are_quick(symbol, constants, first_a, first_b, right.is_simple)
+        (first_a, a), (first_b, b) = self._kept(left), self._kept(right)
+        is_quick = self._quick_condition(symbol, constants, first_a, first_b, right.is_simple)
         if is_quick is None:  # two constants
             return CompiledExpression(self.call(OPERATORS[symbol], a, b), weight, is_truth)
         if symbol == '/':
@@ -245,7 +245,7 @@ class ExpressionCompiler(PythonWriter):
             isinstance(code.python, ast.Name) and not code.python.id.startswith('g_')
         )
 
-    def _are_quick(
+    def _quick_condition(
         self,
         symbol: str,
         constants: Sequence[bool],
@@ -295,7 +295,7 @@ class ExpressionCompiler(PythonWriter):
             and index.value >= 0
         ):
             return CompiledExpression(self.call('get_item', target.python, *key), weight)
-        first, again = self._twice(target)
+        first, again = self._kept(target)
         fits = self.compare(self.call('len', again), ast.Gt(), index)
         item = self.item(again, index)
         is_quick = self.both([self.has_type(first, 'list'), fits])
