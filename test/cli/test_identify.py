@@ -87,7 +87,7 @@ def test_our_own_recordings_name_their_arm(laws, tmp_path, capsys):
         (
             'movej(a)',
             [],
-            'calls of movej and movel in calls.script: 1, moves in the recordings: 2;',
+            'motions in calls.script: 1, moves in the recordings: 2;',
         ),
         ('movej(a)\nmovel(b)', [], 'says movel for move 2, but the recording moves.csv shows a'),
         ('movej(a)\nmovej(b)', ['-o', 'twin.yaml'], 'the recordings do not name their arm'),

@@ -8,7 +8,11 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.identification.arm_samples import read_samples
-from ur_cartesian_driver.identification.recorded_calls import MotionCommand, read_commands
+from ur_cartesian_driver.identification.recorded_calls import (
+    MotionCommand,
+    read_commands,
+    SetPoints,
+)
 
 NAMES = ['timestamp', *(f'target_q_{i}' for i in range(6)), *(f'actual_q_{i}' for i in range(6))]
 ROWS = np.column_stack([0.002 * np.arange(60), np.tile(0.1 * np.arange(12), (60, 1))])
@@ -143,10 +147,42 @@ def test_arguments_are_bound_as_the_controller_does(call, found):
     assert read_commands(call, 'x') == [MotionCommand(name='movej', **found)]
 
 
+def test_calls_of_servoj_in_a_row_are_one_motion():
+    """Until a stop, or another motion, comes between."""
+    line = 'servoj([0, 0, 0, 0, 0, {}], t=0.04, lookahead_time=0.06, gain=500)'
+    lines = [line.format(0.1), 'sleep(1)', line.format(-0.2), 'stopj(2)', line.format(0.3)]
+    found = read_commands('\n'.join([*lines, 'movej(x)', 'servoj([1,2,3,4,5,6], 0, 0, 1)']), 'x')
+    first, second, move, third = [each.set_points for each in found]
+    assert [each.name for each in found] == ['servoj', 'servoj', 'movej', 'servoj']
+    assert first == SetPoints(
+        targets=((0, 0, 0, 0, 0, 0.1), (0, 0, 0, 0, 0, -0.2)),
+        times=(0.04, 0.04),
+        lookahead_time=0.06,
+        gain=500.0,
+        is_stopped=True,
+    )
+    assert (second.times, second.is_stopped) == ((0.04,), False)
+    assert move is None
+    assert third == SetPoints(targets=((1, 2, 3, 4, 5, 6),), times=(1.0,))
+
+
+ZEROS = '[0, 0, 0, 0, 0, 0]'
+
+
 @pytest.mark.parametrize(
     ('content', 'words'),
     [
-        ('sleep(1)', 'moves.script has no call of movej or movel'),
+        ('sleep(1)', 'moves.script has no call of movej, movel or servoj; write one a line'),
+        ('servoj(q, t=1)', 'line 1: q of servoj is no list of six plain numbers; write the'),
+        ('servoj([1, 2, 3], t=1)', 'line 1: q of servoj is no list of six plain numbers'),
+        (f'servoj({ZEROS})', 'line 1: servoj leaves t out; write the time that it had'),
+        (f'servoj({ZEROS}, t=0)', 'line 1: t of servoj is 0; it must be more than 0'),
+        (f'servoj({ZEROS}, t=1, gain=x)', 'gain of servoj is no plain number'),
+        (
+            f'servoj({ZEROS}, t=1)\nservoj({ZEROS}, t=1, gain=500)',
+            'line 2: servoj has another lookahead_time or gain than the call before; record',
+        ),
+        (f'while x:\n servoj({ZEROS}, t=1)\nend', 'line 2: servoj stands in a loop, a branch'),
         ('movel(there, a=fast)', 'line 1: a of movel is no plain number; write the number that'),
         ('movel(there, 1, 0.2 + x)', 'moves.script, line 1: v of movel is no plain number'),
         ('\nmovej(q, v=-1)', 'moves.script, line 2: v of movej is -1; it must be more than 0'),

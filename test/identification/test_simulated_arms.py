@@ -98,6 +98,9 @@ def drawn_twin(model, random):
         'ringing_frequency': random.uniform(6.0, 15.0),
         'ringing_decay': random.uniform(4.0, 10.0),
         'position_noise': random.uniform(6e-5, 1.5e-4),
+        'servo_gain_factor': random.uniform(0.6, 1.7),
+        'servo_lookahead_factor': random.uniform(0.7, 1.5),
+        'set_point_deceleration': random.uniform(5.0, 18.0),
     }
     estimates = {name: Estimate(value=x, interval=(x, x)) for name, x in laws.items()}
     arm = ArmIdentity(model=model, software='3.15.8' if model == 'ur3' else '5.21.0')
@@ -107,6 +110,17 @@ def drawn_twin(model, random):
 CHAIN = """movej([0.9, -1.2, 1.2, -1.6, -1.5, 0.2])
 movej([0.1, -1.0, 1.3, -1.4, -1.5, -0.5], a=1.7, v=0.6)
 movej([0.6, -1.2, 1.4, -1.6, -1.5, 0.2], a=1.2, v=0.8)"""
+#: Where the chain ends, wrist 3 turns there and back, with rest before, between and behind.
+TURNED = [0.0] * 10 + [0.004 * i for i in range(41)] + [0.16] * 15
+CALL = 'servoj([0.6, -1.2, 1.4, -1.6, -1.5, {!r}], t=0.04)'
+SERVO = '\n'.join(
+    CALL.format(0.2 + turned) for turned in [*TURNED, *(0.16 - turned for turned in TURNED[10:])]
+)
+SERVO += '\nstopj(2)'
+#: Then it turns until no further set-point comes, and back.
+BACK = 'movej([0.6, -1.2, 1.4, -1.6, -1.5, 0.2], a=2, v=1)'
+LEFT = '\n'.join(CALL.format(0.2 + turned) for turned in [0.02 * i for i in range(61)])
+LEFT += '\nsleep(1)'
 LINES = """movel(pose_trans(get_target_tcp_pose(), p[0, 0, 0, 0.3, 0.2, 0.5]), a=0.5, v=0.1)
 movel(pose_add(get_target_tcp_pose(), p[0.02, -0.05, 0.12, 0, 0, 0]))"""
 LONG = 'movej([{}, -1.2, 1.4, -1.6, -1.5, 0.2], a=3, v=0.5)'
@@ -114,13 +128,15 @@ LONG = 'movej([{}, -1.2, 1.4, -1.6, -1.5, 0.2], a=3, v=0.5)'
 
 def recordings(recorder):
     """Return the recordings of the standard experiments, and their calls."""
-    found = [recorder.run('chain', CHAIN), recorder.run('lines', LINES)]
+    found = [recorder.run('chain', CHAIN), recorder.run('servo', SERVO, after=1.0)]
+    found += [recorder.run('left', LEFT), recorder.run('back', BACK)]
+    found.append(recorder.run('lines', LINES))
     events = {
         'stop': lambda controller: controller.programs.stop(),
         'pause': lambda controller: controller.programs.pause(),
         'protective': lambda controller: controller.safety_event(SafetyEvent.PROTECTIVE_STOP),
     }
-    calls = [CHAIN, LINES]
+    calls = [CHAIN, SERVO, LEFT, BACK, LINES]
     for i, (name, event) in enumerate(events.items()):
         body = LONG.format(-1.4 if i % 2 == 0 else 1.6)
         found.append(recorder.run(name, body, event, after=1.0))

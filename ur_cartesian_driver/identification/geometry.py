@@ -29,6 +29,8 @@ class Kind(Enum):
     LINE = 'line'
     #: A single wrist that turns the tool on the spot is a joint move and a line at once.
     EITHER = 'turn of one joint'
+    #: Known by its calls only.
+    SERVO = 'motion of servoj'
     OTHER = 'another shape'
 
 

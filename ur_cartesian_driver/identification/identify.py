@@ -19,9 +19,6 @@ from ur_cartesian_driver.motion.twin.laws import LAWS
 
 #: Laws that no recording identifies so far.
 _LATER = {
-    'set_point_deceleration': 'set-points are not recorded',
-    'servo_gain_factor': 'set-points are not recorded',
-    'servo_lookahead_factor': 'set-points are not recorded',
     'blend_begin': 'blends are not evaluated',
     'blend_shape': 'blends are not evaluated',
     'blend_speed_ratio': 'blends are not evaluated',
@@ -51,6 +48,7 @@ class Identification:
                 (Kind.LINE, 'line', ''),
                 (Kind.JOINT, 'joint move', ''),
                 (Kind.EITHER, 'turn', ' of one joint'),
+                (Kind.SERVO, 'motion', ' of servoj'),
             )
             if kinds[kind]
         ]
@@ -92,6 +90,8 @@ def identify(
         'timed_joint_speed': joint[1],
         'timed_linear_acceleration': linear[0],
         'timed_linear_speed': linear[1],
+        'set_point_deceleration': estimators.set_point_deceleration(moves),
+        **estimators.servo_filter(moves),
         'idle_between_moves': estimators.idle_between_moves(moves),
         **estimators.arm_figures(recordings),
         **estimators.packet_gaps(recordings),

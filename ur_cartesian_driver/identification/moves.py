@@ -10,12 +10,18 @@ from dataclasses import dataclass, replace
 from ur_cartesian_driver.identification.arm_samples import ArmSamples
 from ur_cartesian_driver.identification.geometry import Kind, Travel, travel_of
 from ur_cartesian_driver.identification.profile import find_profile, Misfit, Profile
-from ur_cartesian_driver.identification.recorded_calls import MotionCommand
+from ur_cartesian_driver.identification.recorded_calls import MotionCommand, SetPoints
 from ur_cartesian_driver.identification.segmentation import follows, Piece, pieces
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 
 #: Kinds that a call can make.
-_KINDS = {'movej': (Kind.JOINT, Kind.EITHER), 'movel': (Kind.LINE, Kind.EITHER)}
+_KINDS = {
+    'movej': (Kind.JOINT, Kind.EITHER),
+    'movel': (Kind.LINE, Kind.EITHER),
+    'servoj': (Kind.SERVO,),
+}
+#: Time after the last call of servoj within which what moves still belongs to it [s].
+_AFTER_SERVO = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,9 +61,28 @@ class FoundMove:
             (part for part in (travel.joint, travel.line, travel.turn) if part is not None), None
         )
 
+    @property
+    def set_points(self) -> SetPoints | None:
+        """The calls of servoj that made it; None = others, or not known."""
+        return self.command.set_points if self.command is not None else None
+
     def with_command(self, command: MotionCommand) -> FoundMove:
         """Return the move with the call that made it."""
+        if command.set_points is not None:
+            return replace(self, command=command, travel=Travel(kind=Kind.SERVO), profile=None)
         return replace(self, command=command)
+
+    def continued(self, by: FoundMove) -> FoundMove:
+        """Return the move with another one behind it, which the same calls made."""
+        moving = self.piece.moving[0], by.piece.moving[1]
+        piece = replace(
+            self.piece,
+            end=by.piece.end,
+            moving=moving,
+            ending=self.piece.ending or by.piece.ending,
+            slowed=self.piece.slowed or by.piece.slowed,
+        )
+        return replace(self, piece=piece)
 
 
 def find_moves(samples: ArmSamples) -> list[FoundMove]:
@@ -79,29 +104,44 @@ def join_commands(
     moves: Sequence[FoundMove], commands: Sequence[MotionCommand], name: str
 ) -> list[FoundMove]:
     """
-    Give each move the call that made it.
+    Give each move the call that made it; what calls of servoj in a row made is one move.
 
     :param name: of the file with the calls, for error texts.
     :raises ValueError: their numbers or kinds differ.
     """
-    own = [move for move in moves if not move.piece.resumed]
-    if len(own) != len(commands):
-        raise ValueError(
-            f'calls of movej and movel in {name}: {len(commands)}, moves in the recordings: '
-            f'{len(own)}; write one call for each move, in the order of the recordings'
-        )
-    joined = iter(commands)
-    found = []
-    for i, move in enumerate(moves, 1):
-        if move.piece.resumed:
-            found.append(move)
+    found: list[FoundMove] = []
+    number = 0
+    for move in moves:
+        if found and _goes_on(found[-1], move):
+            found[-1] = found[-1].continued(move)
             continue
-        command = next(joined)
-        if move.travel.kind is not Kind.OTHER and move.travel.kind not in _KINDS[command.name]:
+        if not move.piece.resumed:
+            if number < len(commands):
+                move = move.with_command(commands[number])
+            number += 1
+        found.append(move)
+    if number != len(commands):
+        raise ValueError(
+            f'motions in {name}: {len(commands)}, moves in the recordings: {number}; write one '
+            'call for each move (of servoj, all calls of a motion), in the order of the recordings'
+        )
+    for i, move in enumerate(found, 1):
+        kind, command = move.travel.kind, move.command
+        if command is not None and kind is not Kind.OTHER and kind not in _KINDS[command.name]:
             raise ValueError(
                 f'{name} says {command.name} for move {i}, but the recording '
-                f'{move.samples.name} shows a {move.travel.kind.value} at '
+                f'{move.samples.name} shows a {kind.value} at '
                 f'{move.samples.time[move.piece.moving[0]]:.2f} s'
             )
-        found.append(move.with_command(command))
     return found
+
+
+def _goes_on(before: FoundMove, move: FoundMove) -> bool:
+    """Return whether a move belongs to the motion of servoj before it."""
+    points = before.set_points
+    if points is None or move.samples is not before.samples:
+        return False
+    time, begin = move.samples.time, before.piece.moving[0]
+    since = time[move.piece.moving[0]] - time[begin]
+    rest = points.rest(move.samples.target_q[begin].tolist())
+    return bool(since + rest < sum(points.times) + _AFTER_SERVO)

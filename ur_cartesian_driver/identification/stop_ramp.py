@@ -11,6 +11,8 @@ once, and is not used.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ur_cartesian_driver.identification.least_squares import fit, Measured
@@ -25,9 +27,24 @@ _STEADY = 2e-3
 _SHORTEST = 0.02
 
 
-def find_ramp(time: Floats, travel: Floats, follows: Flags) -> Measured | Misfit | None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopRamp:
     """
-    Return the time from full speed to rest [s].
+    A ramp that was found.
+
+    :param begin: time at which it begins, by the controller's clock [s].
+    :param time: from full speed to rest [s].
+    :param deceleration: of the travel, if time is not scaled but speed is [rad/s^2 or m/s^2].
+    """
+
+    begin: float
+    time: Measured
+    deceleration: Measured
+
+
+def find_ramp(time: Floats, travel: Floats, follows: Flags) -> StopRamp | Misfit | None:
+    """
+    Return the ramp from full speed to rest.
 
     :param time: (n,) the controller's clock [s], to rest.
     :param travel: (n,) travel along the path [rad or m].
@@ -71,4 +88,11 @@ def find_ramp(time: Floats, travel: Floats, follows: Flags) -> Measured | Misfit
         return None
     if found.rms > max(MISFIT, 3.0 * noise_of(found.residuals)):
         return Misfit(rms=found.rms)
-    return found.measured(3)
+    _, v, begin, whole, _ = found.parameters.tolist()
+    whole = max(abs(whole), cycle)
+    error = found.combination({1: 1.0 / whole, 3: -v / whole**2}).error
+    return StopRamp(
+        begin=float(time[last]) + begin,
+        time=found.measured(3),
+        deceleration=Measured(value=v / whole, error=error, freedom=found.freedom),
+    )
