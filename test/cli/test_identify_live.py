@@ -49,6 +49,8 @@ def hidden_laws(seed):
         'friction': random.uniform(1e-4, 3e-4),
         'static_error': random.uniform(5e-5, 4e-4),
         'single_gaps': 0.01,
+        'servo_gain_factor': random.uniform(0.7, 1.5),
+        'servo_lookahead_factor': random.uniform(0.8, 1.3),
     }
     return Twin(
         arm=ArmIdentity(model='ur5e', software='5.21.0'),

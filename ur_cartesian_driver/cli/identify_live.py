@@ -128,6 +128,8 @@ class _Series:
     experiments: Sequence[LawExperiment]
     surprise: str = ''
     outcomes: dict[str, str] = field(default_factory=dict)
+    #: In which each experiment that was recorded began.
+    states: dict[str, RobotState] = field(default_factory=dict)
 
     def run(self) -> None:
         """Run all that are wanted and possible, up to the first surprise."""
@@ -157,6 +159,7 @@ class _Series:
         if not self.agrees(experiment):
             return 'skipped: not wanted', first
         state = asyncio.run(ready_state(self.address, first))  # again, after the answer
+        self.states[experiment.name] = state
         asyncio.run(
             record_experiment(self.address, experiment, state, self.bounds, self._path(experiment))
         )
@@ -185,7 +188,8 @@ class _Series:
                 found = read_samples(path)
                 moves = find_moves(found)
                 number = sum(not move.piece.resumed for move in moves)
-                own = experiment.calls[:number]  # an experiment that was ended made fewer
+                # An experiment that was ended made fewer.
+                own = experiment.calls(self.states[experiment.name])[:number]
                 if own:
                     join_commands(moves, read_commands('\n'.join(own), CALLS), CALLS)
             except ValueError as error:

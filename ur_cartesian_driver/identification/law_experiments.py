@@ -24,6 +24,8 @@ from ur_cartesian_driver.motion.twin.laws import ASSUMED_LAWS
 
 #: Tolerance of box and speed, for the robot's rounding [m, m/s].
 _OVER = 1e-3
+#: The call that ends a motion of servoj.
+_SERVO_STOP = 'stopj(2)'
 #: Places on the path that are compared with the box.
 _PLACES = 25
 
@@ -123,9 +125,12 @@ class LawExperiment:
         }[self.interruption]
         return f'{what} {happens}, at up to {fast}. It shows {self.shows}.'
 
-    @property
-    def calls(self) -> tuple[str, ...]:
-        """The calls behind the recorded moves; the way back from a stop is not recorded."""
+    def calls(self, state: RobotState) -> tuple[str, ...]:
+        """
+        Return the calls behind each recorded move; the way back from a stop is not recorded.
+
+        :param state: in which the motion begins.
+        """
         there, back = self._call('there', self.there), self._call('back', self.back)
         return (there,) if self.interruption is Interruption.STOP else (there, back)
 
@@ -184,6 +189,48 @@ class LawExperiment:
         return -self.wrist if state.actual_q[5] > 0.0 else self.wrist
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoExperiment(LawExperiment):
+    """
+    Wrist 3 turns there and back by calls of ``servoj``; ``there`` has the arguments of all.
+
+    Each call moves the set-point by little, so the arm does not jump even if the set-point does.
+    In the first ones the arm rests, because the first motion of a program may set out slowly.
+    """
+
+    back: str = ''
+    #: The t of each call [s]: whole cycles at 125 and 500 Hz. Times at rest [s].
+    call_time: float = 0.04
+    rest_before: float = 0.4
+
+    def calls(self, state: RobotState) -> tuple[str, ...]:
+        """Return the calls of the one motion, with the numbers of the place."""
+        numbers = [f'{each!r}' for each in state.target_q[:5]]
+        lines = [
+            self._line([*numbers, f'{state.target_q[5] + turned!r}'])
+            for turned in self._turned(state)
+        ]
+        return ('\n'.join([*lines, _SERVO_STOP]),)
+
+    def script(self, state: RobotState) -> str:
+        """Return the body of the program: the same calls, beginning where the arm is by then."""
+        numbers = [f'back[{i}]' for i in range(5)]
+        lines = [self._line([*numbers, f'back[5] + {turned!r}']) for turned in self._turned(state)]
+        return '\n'.join(['back = get_target_joint_positions()', *lines, _SERVO_STOP])
+
+    def _line(self, joints: Sequence[str]) -> str:
+        return f'servoj([{", ".join(joints)}], t={self.call_time:g}, {self.there})'
+
+    def _turned(self, state: RobotState) -> list[float]:
+        """Return the angle of wrist 3 at the end of each call, from where it began [rad]."""
+        count = round(self.wrist / self.speed / self.call_time)
+        angle, held = self._wrist_angle(state), round(self.rest / self.call_time)
+        there = [angle * i / count for i in range(1, count + 1)]
+        back = [angle - turned for turned in there]
+        before = [0.0] * round(self.rest_before / self.call_time)
+        return [*before, *there, *[angle] * held, *back, *[0.0] * held]
+
+
 _TIMED_SPEED = ASSUMED_LAWS.timed_joint_speed
 LAW_EXPERIMENTS = (
     LawExperiment(
@@ -210,6 +257,14 @@ LAW_EXPERIMENTS = (
         speed=0.04,
         there='a=0.4, v=0.04',
         back='a=0.4, v=0.04',
+    ),
+    ServoExperiment(
+        name='servoj',
+        shows='the filter of servoj',
+        wrist=radians(10.0),
+        speed=0.1,
+        there='lookahead_time=0.1, gain=300',
+        rest=0.8,
     ),
     LawExperiment(
         name='wrist_fast',
