@@ -161,8 +161,8 @@ def test_a_time_that_cannot_be_read_is_refused(tmp_path, cell, sentence):
         ('qx,qy,qz,qw', '0,0,0,0.5', 'the quaternion has the length 0.5, but must have 1'),
         ('rx,ry,rz', '0,90,0', 'a turn of 90 rad is more than two turns; if it is in degrees'),
         ('roll [rad],pitch [rad],yaw [rad]', '0,0,-45', 'a turn of 45 rad is more than two'),
-        ('speed [m/s]', '0', 'the speed is 0; leave the column out, or write'),
-        ('blend [mm]', '-1', 'the blend is -0.001; leave the column out, or write'),
+        ('speed [m/s]', '0', 'the speed is 0; leave the column out, or write a number above 0'),
+        ('blend [mm]', '-1', 'the blend is -0.001; leave the column out, or write 0 or more'),
     ],
 )
 def test_a_number_that_cannot_be_meant_is_refused(tmp_path, header, row, sentence):

@@ -72,13 +72,15 @@ def collect_csv(file: Path, options: ImportOptions, into: PathCollector) -> None
 
 def _check_signs(values: Mapping[str, Floats], lines: Sequence[int]) -> None:
     """Refuse a speed that is not above 0, and a blend radius below 0."""
-    for name in ('speed', 'blend'):
+    for name, is_wrong, wanted in (
+        ('speed', np.less_equal, 'a number above 0'),
+        ('blend', np.less, '0 or more'),
+    ):
         numbers = values.get(name, np.ones(1))
-        wrong = numbers <= 0.0 if name == 'speed' else numbers < 0.0
-        for row in rows_where(wrong)[:1]:
+        for row in rows_where(is_wrong(numbers, 0.0))[:1]:
             raise BrokenFile(
                 lines[row],
-                f'the {name} is {numbers[row]:g}; leave the column out, or write a number above 0',
+                f'the {name} is {numbers[row]:g}; leave the column out, or write {wanted}',
             )
 
 

@@ -6,8 +6,6 @@ from __future__ import annotations
 
 import contextlib
 
-from rclpy.action.server import RCLError
-from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
@@ -15,6 +13,7 @@ from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.motion.events import Pulse
 from ur_cartesian_driver.msg import Pulse as PulseMessage
 from ur_cartesian_driver.ros.messages.state_messages import pulse_message
+from ur_cartesian_driver.ros.node_endpoints import SHUT_DOWN_ERRORS
 
 #: Reliable, and deep enough for the pulses of some seconds.
 PULSES_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
@@ -34,6 +33,5 @@ class PulsePublisher:
         driver.add_pulse_listener(self._publish)
 
     def _publish(self, pulse: Pulse) -> None:
-        # The node, or all of ROS, may have been shut down meanwhile.
-        with contextlib.suppress(InvalidHandle, RCLError):
+        with contextlib.suppress(*SHUT_DOWN_ERRORS):
             self._topic.publish(pulse_message(pulse, self._base, self._clock.now().to_msg()))
