@@ -206,7 +206,12 @@ def test_a_body_beside_the_path_stops_a_goal_that_offsets_may_lead_there(driver,
     wide = PathOffset(limits=(0.0, 0.045, 0.0), speed=0.05, acceleration=1.0)
     for band in (PathOffset(), wide):
         points = [Waypoint(pose=home(y=0.06 * k), time=1.5 * k) for k in (1, 2)]
-        goal = Goal(waypoints=points, execution=ExecutionMode[execution], path_offset=band)
+        goal = Goal(
+            waypoints=points,
+            execution=ExecutionMode[execution],
+            path_offset=band,
+            goal_time_tolerance=-1.0,  # a busy computer may be late with its set-points
+        )
         motion = driver.start(driver.plan(goal))
         wait_for(lambda: driver.progress is not None and driver.progress.fraction > 0.1, 10.0)
         driver.change_cell([body])

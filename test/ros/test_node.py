@@ -317,9 +317,9 @@ def test_a_signal_ends_the_goal_with_a_result_and_the_command_with_0(
 
 def run_when_ready(client, goal, on_feedback):
     """Send a goal again and again until the driver has connected to its robot."""
-    deadline = monotonic() + 15.0
+    deadline = monotonic() + 30.0
     while True:
-        _, result = client.send(goal, on_feedback)
+        _, result = client.send(goal, on_feedback, timeout=30.0)
         if result.error_code != ErrorCode.ROBOT_NOT_READY or monotonic() > deadline:
             return result
 
