@@ -5,7 +5,8 @@
 from collections import Counter
 from dataclasses import asdict
 
-from hidden_arm import Laws, smooth_steps, standard_experiments
+from hidden_arm import Laws, smooth_steps, standard_experiments, unseen_moves
+import numpy as np
 import pytest
 from random_cases import cases, random_of
 
@@ -46,6 +47,27 @@ def test_intervals_contain_the_true_laws(identified):
         assert inside[name] > least, f'{name}: {inside[name]} of {number[name]}'
     whole = sum(number.values())
     assert sum(inside.values()) > 0.92 * whole - 4.0 * (0.07 * whole) ** 0.5
+
+
+@pytest.mark.random
+@pytest.mark.timeout(1200)
+def test_moves_that_no_recording_shows_are_predicted(identified):
+    late, off = [], []
+    for i, (laws, results) in enumerate(identified):
+        known = {name: getattr(results[name], 'value', true) for name, true in laws.items()}
+        for number in range(4):
+            true, predicted = (
+                unseen_moves(Laws(**each), random_of('unseen moves', i, number))
+                for each in (laws, known)
+            )
+            times = np.linspace(0.0, true.duration, 500)
+            late.append(abs(true.duration - predicted.duration))
+            off.append(np.abs(true.places_at(times) - predicted.places_at(times)).max())
+    print(
+        f'{5 * len(late)} moves: end {1e6 * np.max(late):.3g} us, place {1e6 * np.max(off):.3g} um'
+    )
+    assert np.max(late) < 1e-3
+    assert np.max(off) < 1e-4
 
 
 @pytest.mark.random

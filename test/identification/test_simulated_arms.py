@@ -7,6 +7,8 @@ Their targets have no noise, so intervals are narrower than what the simulator m
 its ramps change once a cycle. So margins are added.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from random_cases import cases, random_of
@@ -19,6 +21,7 @@ from ur_cartesian_driver.motion.twin.laws import LAWS
 from ur_cartesian_driver.motion.twin.twin import ArmIdentity, Estimate, Twin
 from ur_cartesian_driver.sim import SimulatorConfig
 from ur_cartesian_driver.sim.controller_assembly import assemble
+from ur_cartesian_driver.sim.motion.paths.second_motion_version import SecondMotionVersion
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 MODELS = ('ur3', 'ur5e', 'ur10e')
@@ -30,8 +33,8 @@ TIME, EXACT, CLOSE = 2e-4, 1e-4, 0.05
 class Recorder:
     """Runs programs on a simulated controller, and notes what RTDE would report."""
 
-    def __init__(self, model, twin):
-        config = SimulatorConfig(model=model, polyscope=twin.arm.software, twin=twin)
+    def __init__(self, model, twin, **settings):
+        config = SimulatorConfig(model=model, polyscope=twin.arm.software, twin=twin, **settings)
         self.controller = assemble(config).controller
         self.controller.motion.teleport(HOME)
         self.rows = []
@@ -168,6 +171,22 @@ def test_the_laws_of_a_simulated_arm_are_found(case):
         if not low - margin <= true <= high + margin:
             wrong.append(f'{name} is {true}, found {found.value} in {found.interval}')
     assert not wrong
+
+
+@pytest.mark.parametrize('rise', [0.02, 0.1])
+def test_the_ramps_of_motion_version_2_are_said_to_be_another_law(rise):
+    twin = replace(
+        drawn_twin('ur5e', random_of('version 2', rise)),
+        arm=ArmIdentity(model='ur5e', software='5.22.0', motion_version=2),
+    )
+    laws = SecondMotionVersion(ramp_rise=rise)
+    recorder = Recorder('ur5e', twin, motion_version=2, second_motion_version=laws)
+    results = identify(*recordings(recorder)).results
+    for name in ('start_time', 'timed_joint_speed', 'timed_linear_speed', 'idle_between_moves'):
+        assert isinstance(results[name], Unknown), name
+    assert 'followed no trapezoid' in results['start_time'].reason
+    for name in ('stop_time', 'pause_time', 'protective_stop_time', 'lag', 'friction'):
+        assert results[name].value == pytest.approx(twin.estimates[name].value, rel=CLOSE), name
 
 
 def test_a_blend_is_named_and_not_used():

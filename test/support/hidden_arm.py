@@ -168,7 +168,7 @@ class Program:
         """
         laws, before = self.laws, 0.4 + self.random.uniform(0.0, 0.002)
         knots = [(0.0, 0.0), (laws.start_time, 1.0)]
-        end = before + self.path_time + 0.5 * laws.start_time
+        end = before + self.duration
         ramp = {
             'stop': laws.stop_time,
             'pause': laws.pause_time,
@@ -181,15 +181,9 @@ class Program:
         count = round((end + 1.0) / self.cycle)
         t = self.cycle * np.arange(count)
 
-        def path_y(times):
-            p = rate.integral(times - before)
-            y = np.repeat(self.parts[0][2](np.zeros(1)), len(p), axis=0)
-            for begin, _, place in self.parts:
-                y = np.where((p >= begin)[:, None], place(np.maximum(p, begin)), y)
-            return y
-
         fine = (self.cycle / SUBSTEPS) * np.arange(count * SUBSTEPS)
-        y, q = path_y(t), joints(path_y(fine))
+        y, q = (self._along(rate.integral(x - before)) for x in (t, fine))
+        q = joints(q)
         states, safety = np.full(count, STOPPED), np.full(count, NORMAL)
         states[(t > before - 0.05) & (t < end)] = PLAYING
         if ending:
@@ -199,6 +193,22 @@ class Program:
             if ending == 'protective':
                 safety[passed] = PROTECTIVE_STOP
         return self._packets(name, t, y, q, states, safety)
+
+    @property
+    def duration(self):
+        """Time from the start of the program to the end of its last move [s]."""
+        return self.path_time + 0.5 * self.laws.start_time
+
+    def places_at(self, times):
+        """Return the places of the tool (n, 6) at times since the start of the program [s]."""
+        rate = Steps((0.0, 0.0), (self.laws.start_time, 1.0))
+        return self._along(rate.integral(times))
+
+    def _along(self, path_times):
+        y = np.repeat(self.parts[0][2](np.zeros(1)), len(path_times), axis=0)
+        for begin, _, place in self.parts:
+            y = np.where((path_times >= begin)[:, None], place(np.maximum(path_times, begin)), y)
+        return y
 
     def _packets(self, name, t, y, q, states, safety):
         generator = np.random.default_rng(self.random.randrange(2**32))
@@ -315,3 +325,20 @@ def standard_experiments(laws, random, shape=speed_steps):
         recordings.append(stopped.record(ending, ending, near(1.2)))
         commands += stopped.commands
     return recordings, commands
+
+
+def unseen_moves(laws, random):
+    """Return a program of five moves that the standard experiments do not have."""
+    program = Program(laws=laws, random=random)
+
+    def draw(low, high):
+        return random.uniform(low, high)
+
+    for _ in range(5):
+        a, v = random.choice([(None, None), (draw(0.4, 3.0), draw(0.05, 0.8))])
+        if random.random() < 0.5:
+            program.movej([draw(-1.5, 1.5) for _ in range(6)], a, v)
+        else:
+            turn = program.y[3:] + draw(-0.8, 0.8) * np.array([0.6, 0.0, 0.8])
+            program.movel(np.array([draw(-0.4, 0.4) for _ in range(3)]), turn, a, v)
+    return program

@@ -12,7 +12,12 @@ from ur_cartesian_driver.identification import estimators
 from ur_cartesian_driver.identification.arm_samples import ArmSamples
 from ur_cartesian_driver.identification.estimators import Result, Unknown
 from ur_cartesian_driver.identification.geometry import Kind
-from ur_cartesian_driver.identification.moves import find_moves, FoundMove, join_commands
+from ur_cartesian_driver.identification.moves import (
+    find_moves,
+    FoundMove,
+    join_commands,
+    without_chance_fits,
+)
 from ur_cartesian_driver.identification.profile import Misfit
 from ur_cartesian_driver.identification.recorded_calls import MotionCommand
 from ur_cartesian_driver.motion.twin.laws import LAWS
@@ -78,7 +83,7 @@ def identify(
     :param commands_name: the file of the calls, for error texts.
     :raises ValueError: the calls do not match the moves.
     """
-    moves = [move for samples in recordings for move in find_moves(samples)]
+    moves = without_chance_fits([move for samples in recordings for move in find_moves(samples)])
     if commands:
         moves = join_commands(moves, commands, commands_name)
     joint, linear = (estimators.left_out(moves, kind) for kind in (Kind.JOINT, Kind.LINE))

@@ -100,6 +100,24 @@ def find_moves(samples: ArmSamples) -> list[FoundMove]:
     return moves
 
 
+def without_chance_fits(moves: Sequence[FoundMove]) -> list[FoundMove]:
+    """
+    Return the moves, without any profile if most of them fit none.
+
+    A slow or short move may look like a trapezoid on an arm that moves by another law; the figures
+    of such a profile would be wrong.
+    """
+    fits, misfits = (
+        sum(isinstance(move.profile, kind) for move in moves) for kind in (Profile, Misfit)
+    )
+    if fits >= misfits:
+        return list(moves)
+    return [
+        replace(move, profile=None) if isinstance(move.profile, Profile) else move
+        for move in moves
+    ]
+
+
 def join_commands(
     moves: Sequence[FoundMove], commands: Sequence[MotionCommand], name: str
 ) -> list[FoundMove]:
