@@ -105,7 +105,7 @@ def is_stopped(robot: RobotState) -> bool:
 
 
 def is_paused(robot: RobotState) -> bool:
-    """Return whether the program is paused: it reads nothing until it is resumed."""
+    """Return whether the program is paused; it then reads nothing until it is resumed."""
     return robot.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
 
 

@@ -31,7 +31,7 @@ class KeepaliveTimes(Protocol):
 
     #: Time of the last keepalive [s].
     last_keepalive: float
-    #: The longest pause between two keepalives since the last reset of this number [s].
+    #: The longest pause between two keepalives since this number was last set to 0 [s].
     max_keepalive_gap: float
 
 
@@ -91,7 +91,7 @@ class EventLog:
         return next((entry.text for entry in entries if entry.is_robot_error), '')
 
     def keepalive_gap(self) -> float:
-        """Return the longest pause between two keepalives since the last call [s]."""
+        """Return the longest pause between two keepalives since the last call [s]; reset it."""
         self._last_gap = self._keepalives.max_keepalive_gap
         self._keepalives.max_keepalive_gap = 0.0
         return self._last_gap

@@ -67,7 +67,7 @@ CAUSE_TIMEOUT = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkCallbacks:
-    """Callbacks of a link's owner; all are called on the event loop."""
+    """Callbacks to the owner of a link; all are called on the event loop."""
 
     #: The robot's newest state; called before any status or event that follows from this state, so
     #: the owner has a state when READY is reported.
@@ -95,9 +95,9 @@ class RobotLink:
         """
         Prepare; :meth:`run` connects.
 
-        :param may_upload: whether the first connection may start the robot program; True in the
-            owner's first robot loop, and in a later one if the program ran when the previous loop
-            was lost.
+        :param may_upload: whether the first connection may start the robot program. The driver
+            passes True in its first robot loop, and in a later loop if the program ran when the
+            previous loop was lost.
         """
         self._settings, self._callbacks = settings, callbacks
         self._status = LinkStatus(
@@ -196,13 +196,18 @@ class RobotLink:
     # ---- calls of the owner -------------------------------------------------------------------
 
     def note_remote_control(self, remote: bool) -> None:
-        """Note whether clients may control the robot; on a change, reconnect the primary port."""
+        """
+        Note whether clients may control the robot.
+
+        On a change, the primary interface reconnects: the robot decides when a client connects
+        whether the client may send.
+        """
         if self._remote_control not in (None, remote):
             self._primary.reconnect()
         self._remote_control = remote
 
     def set_executing(self, busy: bool) -> None:
-        """Set whether a goal runs, which determines the status and the kind of keepalive."""
+        """Set whether a goal runs: this sets status and kind of keepalive, and resets the feed."""
         self.program.is_executing = busy
         self.program.feed = NO_OVERRIDE
         if busy:

@@ -37,7 +37,8 @@ REPORT_TIMEOUT = 5.0
 SILENCE_TIMEOUT = 1.5
 #: Error code of a request on a read-only connection.
 READ_ONLY_CODE = 210
-#: Beginning of a message's title if a secondary program failed, which stops no other program.
+#: Beginning of a message's title if a secondary program failed; such a failure stops no other
+#: program.
 SECONDARY_EXCEPTION = 'SECONDARY_PROGRAM_EXCEPTION'
 #: Beginnings of the text of an exception if the robot could not compile a program.
 COMPILE_ERRORS = ('compile_error_', 'syntax_error_')
@@ -48,7 +49,7 @@ REPEAT_TIMEOUT = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrimaryCallbacks:
-    """Called on the event loop."""
+    """Callbacks of the primary client; called on the event loop."""
 
     #: The robot's configuration, at least once for each connection.
     configuration: Callable[[ConfigurationData], None]
@@ -72,7 +73,7 @@ class _Request:
 
 
 class PrimaryClient:
-    """One connection at a time, established again when it breaks."""
+    """Keeps one connection to the primary interface, and makes a new one when it breaks."""
 
     def __init__(self, listener: PrimaryCallbacks) -> None:
         """Prepare; :meth:`stay_connected` connects."""
@@ -92,7 +93,8 @@ class PrimaryClient:
         Send a program or command; return False while there is no connection.
 
         :param is_wanted: returns whether the request is still wanted and disturbs no other
-            program; called before it is sent again because the first connection was read-only.
+            program. It is called before the request is sent again, which happens if the first
+            connection was read-only.
         """
         request = _Request(data, is_wanted, asyncio.get_running_loop().time())
         if self._is_reconnecting:

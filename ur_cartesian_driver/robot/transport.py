@@ -93,7 +93,7 @@ class TcpConnection(asyncio.BufferedProtocol):
 
     def eof_received(self) -> bool:
         """
-        Have the transport close: half-open connections are not used.
+        Have asyncio close the transport: half-open connections are not used.
 
         The end is reported now and not when the transport is gone: a robot program that is
         started again connects at the same moment, and must find the previous program gone.
@@ -142,7 +142,8 @@ class TcpConnection(asyncio.BufferedProtocol):
     def send_at_once(self, data: bytes) -> bool:
         """Send bytes in one system call, for a reader that stops at the first pause."""
         if self._transport is not None:
-            # Twice the size: the system counts the memory of its packets, not their content.
+            # Twice the size of the data, because the system counts the memory that its packets
+            # take, which is more than the data in them.
             sock = self._transport.get_extra_info('socket')
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 2 * len(data))
         return self.send(data)
@@ -186,7 +187,7 @@ async def dial(connection: TcpConnection, host: str, port: int) -> None:
 
 
 def error_reason(error: OSError) -> str:
-    """Return the system's text for an error; asyncio's adds the address, or counts attempts."""
+    """Return the system's text for an error, without the address that asyncio's text adds."""
     if error.errno is not None and error.errno in errno.errorcode:
         return os.strerror(error.errno).lower()
     return error.strerror or str(error)  # such as an unknown host name

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The corner of the experiments ``corner_*``: its motion, and its comparison with a recording.
+The motion of the experiments ``corner_*``, and the comparison of a recording with it.
 
-Wrist 3 turns, then wrist 2, with a rounded corner between them, in pieces of 20 ms. The pieces
-come over a socket, and the functions of the robot program follow them, as in a goal with rounded
-corners.
+Wrist 3 turns, then wrist 2, with a rounded corner between them. This computer sends the motion
+over a socket as splines of 20 ms, the pieces; the functions of the robot program follow them, as
+in a goal with rounded corners.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
 
 #: Speed of the wrist that turns [rad/s].
 SPEED = 0.2
-#: Durations of a ramp, a cruise, the corner, and a piece [s].
+#: Durations of a ramp, of a turn at constant speed, of the corner, and of a piece [s].
 RAMP, CRUISE, CORNER, PIECE = 0.2, 0.2, 0.1, 0.02
 #: Number of pieces; piece in which the pause is requested; number of pieces sent before the pause.
 PIECES, PAUSE_IN, SENT_BEFORE_PAUSE = 45, 21, 32
 #: Angle by which each wrist turns [rad].
 TURN = SPEED * (0.5 * RAMP + CRUISE + 0.5 * CORNER)
-#: RTDE output register with the time of the program in its piece [s].
+#: RTDE output register with the time since the program began its current piece [s].
 SPLINE_TIME = 47
-#: Placeholders in the script for the address of this computer.
+#: Placeholders in the script for the address and the port to which the program connects.
 HOST, PORT = '@HOST@', '@PORT@'
 
 
 def corner_pieces(start: Sequence[float]) -> list[Spline]:
     """
-    Return the pieces of the corner.
+    Return the pieces of the whole motion.
 
     :param start: joint positions at which the arm rests [rad].
     """
@@ -65,7 +65,7 @@ def _piece(q: Floats, qd: Floats, qdd: Floats, duration: float) -> Spline:
 
 
 def corner_messages(start: Vector6) -> tuple[bytes, bytes]:
-    """Return the bytes of the pieces sent before the pause, and of the others."""
+    """Return two messages: the pieces to send before the pause, and all others."""
     pieces = corner_pieces(start)
     pieces[-1] = Spline(
         target=pieces[-1].target, velocities=ZERO6, accelerations=ZERO6, duration=PIECE
@@ -80,7 +80,7 @@ def corner_messages(start: Vector6) -> tuple[bytes, bytes]:
 def corner_script() -> str:
     """Return the body of the program, with the placeholders HOST and PORT."""
     settings = ProgramSettings(
-        # A program for software this old names no function that the robot may lack.
+        # A program for the oldest supported software calls only functions that every robot has.
         host='none', reverse_port=1, trajectory_port=1, script_command_port=1, version=(3, 14, 3)
     )  # fmt: skip
     text = render(settings)
@@ -122,9 +122,9 @@ end"""
 
 def distances_from_corner(q: Floats) -> Floats:
     """
-    Return the distances (n,) of joint positions from the path of the corner [rad].
+    Return the distances (n,) of joint positions from the path of the motion [rad].
 
-    :param q: joint positions (n, 6) [rad]; at rest before the corner in the first row.
+    :param q: joint positions (n, 6) [rad]; the first row is the start of the motion.
     """
     path = JointSpline.of(vector6(q[0].tolist()), corner_pieces(q[0].tolist()))
     places = path.rows(np.arange(0.0, PIECES * PIECE + 5e-4, 1e-3))[0]

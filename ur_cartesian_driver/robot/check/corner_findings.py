@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The analyses of the experiments ``corner_*``, which test assumptions of rounded corners."""
+"""The analyses of the experiments ``corner_*``, which compare the motion with its pieces."""
 
 from __future__ import annotations
 
@@ -14,14 +14,18 @@ from ur_cartesian_driver.robot.check.corner_experiment import distances_from_cor
 from ur_cartesian_driver.robot.check.finding import Finding, note, ok
 from ur_cartesian_driver.robot.check.motion_samples import MotionSamples
 
-#: Largest distance of the joints from the path of a corner; the same with a pause [rad]. The
-#: simulated controller keeps within 0.01 mrad, or within 0.1 mrad if calls come a step late.
+#: Largest accepted distance of the target joints from their path, without and with a pause [rad].
+#: The simulated controller keeps within 0.01 mrad, or 0.1 mrad if calls come a step late.
 FOLLOWED, FOLLOWED_IN_PAUSE = 1e-4, 1.4e-3
 _NOT_FOLLOWED = 'The program followed no pieces: its log tells why.'
 
 
 def followed(check: str, slider: float) -> Callable[[MotionSamples], Finding]:
-    """Return the analysis that compares the joints with the pieces of the corner."""
+    """
+    Return the analysis of how closely the joints follow the pieces of the corner.
+
+    :param slider: fraction of the speed slider; the lag of the arm is judged only at 1.
+    """
 
     def analyse(samples: MotionSamples) -> Finding:
         own = _following(samples)
@@ -47,8 +51,9 @@ def steps(check: str) -> Callable[[MotionSamples], Finding]:
     """Return the analysis that counts the cycles in which the program made no step."""
 
     def analyse(samples: MotionSamples) -> Finding:
-        # Left out are the first piece, in which the program learns the slider (below 100 % its
-        # calls take more than a cycle by design), and the last one, which only brakes.
+        # The first piece is left out, because in it the program finds the fraction of the slider
+        # (below 100 % its calls take more than a cycle by design); the last one, because it only
+        # brakes.
         own = _following(samples)
         own[own] = (samples.pieces_begun[own] > 1) & (samples.pieces_begun[own] < PIECES)
         progress = np.diff(samples.spline_time[own])
@@ -105,7 +110,7 @@ def _following(samples: MotionSamples) -> Flags:
 
 
 def _since_start(samples: MotionSamples, own: Flags) -> Floats:
-    """Return the target joints (m, 6): first at rest, then in the rows of a mask."""
+    """Return the target joints (m, 6): the first sample, at rest, then the rows of ``own``."""
     return np.vstack([samples.target_q[:1], samples.target_q[own]])
 
 

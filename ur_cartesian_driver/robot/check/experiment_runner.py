@@ -94,7 +94,7 @@ async def _run(address: RobotAddress, experiment: Experiment, run: ProgramRun) -
 
 
 async def _move(experiment: Experiment, run: ProgramRun) -> float:
-    """Run the program; return the stop command's time by the controller's clock [s], or NaN."""
+    """Run the program; return the controller's time at the stop command [s]; NaN = none sent."""
     await asyncio.sleep(MARGIN)
     stop_sent = float('nan')
     if experiment.is_corner:
@@ -112,7 +112,7 @@ async def _move(experiment: Experiment, run: ProgramRun) -> float:
 
 
 async def _follow_corner(experiment: Experiment, run: ProgramRun) -> None:
-    """Run the program that follows a corner, and send it the messages for its socket."""
+    """Run the program that follows a corner, and send it the pieces over a socket."""
     recorder = run.recorder
     first, rest = corner_messages(vector6(recorder.newest['target_q']))
 
@@ -144,7 +144,7 @@ async def _follow_corner(experiment: Experiment, run: ProgramRun) -> None:
 
 async def _pause(run: ProgramRun) -> None:
     """
-    Pause the program in the corner for a while, if the robot takes the command.
+    Pause the program in the corner for :data:`PAUSE`; return at once if the robot does not pause.
 
     :raises Surprise: the program does not get as far as the corner.
     """

@@ -33,8 +33,9 @@ SLIDER = 0.5
 #: Experiment ``path_offset``: length of the offset, and of the line that follows [m]; speed of
 #: both motions [m/s]; pause after each motion [s].
 OFFSET, OFFSET_SPEED, OFFSET_REST = 0.004, 0.01, 0.4
-#: Difference below which two heights are equal [m]; speed below which the tool is at rest [m/s],
-#: although the filter of the path offset may still move it a little.
+#: Difference below which two distances of the resting tool from its start count as equal [m];
+#: speed below which the tool counts as at rest [m/s], because the filter of the path offset may
+#: still move it a little.
 SAME_HEIGHT, RESTING_SPEED = 3e-4, 1e-4
 #: Fractions of the speed slider at which a corner is followed.
 CORNER_SLIDERS = (1.0, 0.5, 0.1)
@@ -46,7 +47,7 @@ class Experiment:
     A motion that settles a question about the controller.
 
     :param check: name in the report and in doc/robot_program.md.
-    :param motion: sentence for a person who has to agree: what moves, how far and how fast.
+    :param motion: sentence shown before a person agrees: what moves, how far and how fast.
     :param script: URScript body of the program that moves the arm.
     :param analyses: derive the findings from the samples of the motion.
     :param slider: fraction of the speed slider during the motion; None = unchanged.
@@ -201,7 +202,7 @@ def _resting_heights(samples: MotionSamples) -> list[float]:
 
 
 def _nearest(value: float, laws: dict[str, float]) -> str:
-    """Return the law that predicts a value within 15 %; empty = none does."""
+    """Return the name of the law that predicts a value within 15 %; empty = none does."""
     name = min(laws, key=lambda law: abs(value / laws[law] - 1.0))
     return name if abs(value / laws[name] - 1.0) < 0.15 else ''
 
@@ -342,7 +343,7 @@ EXPERIMENTS = (
 
 
 def program(name: str, body: str) -> bytes:
-    """Return a program for the primary interface."""
+    """Return the program ``ur_check_<name>`` with this body, for the primary interface."""
     lines = '\n'.join(f'  {line}' for line in body.splitlines())
     return f'def ur_check_{name}():\n{lines}\nend\n'.encode()
 

@@ -21,13 +21,13 @@ class MotionSamples:
     :param target_q: target joint positions (n, 6) [rad].
     :param actual_q: measured joint positions (n, 6) [rad].
     :param tool_speed: speed of the target TCP (n,) [m/s].
-    :param scaling: speed_scaling (n,).
-    :param fraction: target_speed_fraction (n,).
+    :param scaling: RTDE output speed_scaling (n,).
+    :param fraction: RTDE output target_speed_fraction (n,).
     :param stop_sent: time of the stop command by the controller's clock [s]; NaN = none was sent.
     :param target_distance: distance of the target TCP from its first position (n,) [m].
     :param actual_distance: distance of the measured TCP from its first position (n,) [m].
-    :param spline_time: time of the program in its piece of a corner (n,) [s].
-    :param pieces_begun: number of pieces that the program has begun (n,).
+    :param spline_time: time since the program began its current piece of a corner (n,) [s].
+    :param pieces_begun: number of pieces of a corner that the program has begun (n,).
     :param runtime_state: (n,) see :class:`~...motion.state.rtde_state.RuntimeState`.
     """
 
@@ -51,12 +51,12 @@ class MotionSamples:
 
     @property
     def moving(self) -> Flags:
-        """Return a mask (n,) of the rows whose target differs from the row before."""
+        """Return a mask (n,) of the rows whose target joints differ from the row before."""
         steps = np.abs(np.diff(self.target_q, axis=0)).max(axis=1) > 1e-9
         return np.concatenate([[False], steps])
 
     @property
     def duration(self) -> float:
-        """The time from the first to the last motion of the target [s]; 0 = no motion."""
+        """The time from the first to the last change of the target joints [s]; 0 = none."""
         rows = np.flatnonzero(self.moving)
         return float(self.time[rows[-1]] - self.time[rows[0] - 1]) if len(rows) else 0.0

@@ -37,7 +37,7 @@ from ur_cartesian_driver.robot.services.dashboard_connection import (
 from ur_cartesian_driver.robot.services.robot_api_connection import RobotApiConnection
 from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
-#: The interfaces that only other clients need.
+#: Ports of the interfaces that this driver does not use.
 OTHER_PORTS = {'secondary': 30002, 'real-time': 30003, 'interpreter': 30020}
 
 
@@ -73,7 +73,7 @@ async def observe(address: RobotAddress, seconds: float) -> AsyncIterator[Findin
 
 
 async def _observe_remote_control(address: RobotAddress, version: ControllerVersion) -> Finding:
-    """Ask the dashboard or Robot API about remote control, which CB3 does not have."""
+    """Ask the dashboard or Robot API for the state of remote control, if it can tell."""
     check = 'remote_control'
     number = (version.major, version.minor)
     if version.major >= POLYSCOPE_X and number < FIRST_VERSION:

@@ -32,7 +32,7 @@ from ur_cartesian_driver.robot.services.dashboard_connection import POLYSCOPE_X
 #: A line for the log, and a secondary program that only writes this line.
 RIGHTS_MARK = 'ur-cartesian check-robot'
 RIGHTS_PROGRAM = f'sec ur_check_rights():\n  textmsg("{RIGHTS_MARK}")\nend\n'.encode()
-#: A secondary program that writes the motion version behind this text.
+#: A text, and a secondary program that logs it, followed by the motion version.
 MOTION_VERSION_MARK = f'{RIGHTS_MARK}: motion version '
 MOTION_VERSION_PROGRAM = (
     'sec ur_check_motion_version():\n'
@@ -42,7 +42,7 @@ MOTION_VERSION_PROGRAM = (
 LOCAL_CONTROL = 'C210'
 #: RTDE outputs for comparing the reported pose with the calibrated kinematics.
 _POSE_FIELDS = ('actual_q', 'actual_TCP_pose', 'tcp_offset')
-#: Longest waits for the configuration, for the kinematics after it, and for RIGHTS_PROGRAM [s].
+#: Longest waits for the configuration, the kinematics after it, and a line that was asked for [s].
 CONFIGURATION_TIMEOUT, GEOMETRY_TIMEOUT, RIGHTS_TIMEOUT = 6.0, 2.0, 3.0
 
 
@@ -190,7 +190,7 @@ def _limits(configuration: ConfigurationData) -> Finding:
 
 
 def _calibration(model: str, geometry: DhTable | None, state: Mapping[str, Any]) -> Finding:
-    """Compare the reported pose with the computed one, as the driver does before goals."""
+    """Compare the reported TCP pose with the computed one, as the driver does before goals."""
     if geometry is None:
         return skipped('calibration', 'The robot did not report its calibration')
     if missing := [name for name in _POSE_FIELDS if name not in state]:

@@ -23,9 +23,10 @@ from ur_cartesian_driver.robot.check.primary_observations import LOCAL_CONTROL, 
 from ur_cartesian_driver.robot.check.rtde_recorder import name_in, RtdeRecorder
 from ur_cartesian_driver.robot.rtde.probe import read_state
 
-#: Timeouts for the first motion, the next event, and rest after a stop [s].
+#: Longest waits: for a program to move the arm, for its next expected event, for rest after a
+#: stop command [s].
 START_TIMEOUT, END_TIMEOUT, REST_TIMEOUT = 3.0, 30.0, 3.0
-#: Time in which the loss of a connection is noticed [s].
+#: Time within which a lost connection is noticed [s].
 LOSS_TIME = 0.25
 
 
@@ -54,7 +55,7 @@ class ProgramRun:
     The connections for running programs, one after the other; used once.
 
     All methods that wait raise OSError if RTDE is lost, and :class:`Surprise` if the robot stops,
-    the primary interface is lost, or the watch of the caller finds a fault.
+    the primary interface is lost, or ``watch`` finds a fault.
     """
 
     def __init__(
@@ -66,9 +67,10 @@ class ProgramRun:
         """
         Prepare; :meth:`open` connects.
 
-        :param names: RTDE outputs to record; ``target_q``, ``runtime_state`` and ``safety_mode``
-            are among them.
-        :param watch: returns the fault of a row, as a clause; '' = none.
+        :param names: RTDE outputs to record; they must include ``target_q``, ``runtime_state``
+            and ``safety_mode``.
+        :param watch: returns the fault that the outputs of one packet show, as a clause;
+            '' = none.
         """
         self._address, self._watch = address, watch
         self.recorder = RtdeRecorder(names, address.host, address.rtde_port)
@@ -141,7 +143,12 @@ class ProgramRun:
         return False
 
     async def wait_for(self, is_reached: Callable[[Mapping[str, Any]], bool], time: float) -> bool:
-        """Watch each row until one meets a condition; return whether one did in time [s]."""
+        """
+        Check each row for faults until the newest one meets a condition.
+
+        :param time: longest wait [s].
+        :return: whether the condition was met in time.
+        """
         wrong = ''
 
         def check(row: Mapping[str, Any]) -> bool:
@@ -163,9 +170,9 @@ class ProgramRun:
         self, is_reached: Callable[[Mapping[str, Any]], bool], time: float, otherwise: str
     ) -> None:
         """
-        Watch each row until one meets a condition.
+        Check each row for faults until the newest one meets a condition.
 
-        :param otherwise: clause for the error if no row did within ``time`` [s].
+        :param otherwise: clause for the error if the condition is not met within ``time`` [s].
         """
         if not await self.wait_for(is_reached, time):
             raise Surprise(f'{otherwise} within {time:g} s')

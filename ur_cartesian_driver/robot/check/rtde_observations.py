@@ -25,11 +25,11 @@ from ur_cartesian_driver.robot.check.rtde_recorder import name_in, RtdeRecorder
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 from ur_cartesian_driver.robot.rtde.state_decoding import REQUIRED_FIELDS
 
-#: Oldest software that runs the robot program, by major version: the first that can add two lists.
+#: Oldest software that runs the robot program, by major version: older ones cannot add two lists.
 MIN_VERSIONS = {3: (3, 14, 3), 5: (5, 9, 4)}
 #: Outputs to record in addition to the driver's own recipe.
 EXTRA_OUTPUTS = ('target_speed_fraction', 'payload', 'payload_cog', 'payload_inertia')
-#: Input registers, of which the driver can take either half, by purpose.
+#: Input registers by purpose; instead of these (24 to 47), the driver can use 24 lower ones.
 REGISTER_GROUPS: Mapping[str, tuple[str, ...]] = {
     'SERVO registers': tuple(SERVO_INPUTS),
     'path offset registers': tuple(OFFSET_INPUTS),

@@ -80,7 +80,7 @@ class RtdeRecorder:
 
     async def wait_for(self, is_reached: Callable[[Mapping[str, Any]], bool], time: float) -> bool:
         """
-        Wait until the newest row meets a condition; return whether it did within a time [s].
+        Wait until the newest row meets a condition; return whether it did within ``time`` [s].
 
         :raises OSError: the connection ended before that.
         """

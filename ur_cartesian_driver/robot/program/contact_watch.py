@@ -39,7 +39,7 @@ class ContactWatch:
 
     @property
     def is_active(self) -> bool:
-        """Return whether the program watches for contact, as far as it has answered."""
+        """Whether a watch has begun and the program has not answered yet, even after its end."""
         return self._answer is not None
 
     def begin(self) -> Awaitable[bool]:
@@ -95,6 +95,7 @@ class ContactWatch:
         answer, self._answer = self._answer, None
         if answer is not None:
             answer.set_result(result)
-            # At contact the running goal ends, by a result that may come a little later.
+            # Contact also ends the running goal, which must still know of the watch when its
+            # result comes, perhaps a little later.
             if result is not ToolContactResult.SUCCESS:
                 self._changed(False)

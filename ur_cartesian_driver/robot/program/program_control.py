@@ -28,8 +28,8 @@ class ProgramControl:
     """
     Commands to the robot program and to the controller that runs it.
 
-    A connected program reads the reverse socket. The primary interface takes whole programs and a
-    few commands, also while the program is paused, stuck or gone.
+    Commands to a connected program go to the sockets that it reads. The primary interface takes
+    whole programs and a few commands, also while the program is paused, stuck or gone.
     """
 
     def __init__(
@@ -97,8 +97,8 @@ class ProgramControl:
         """
         Send a command to the primary interface; return False if there is no connection.
 
-        :param is_wanted: returns whether the command is still wanted; asked before the command is
-            sent again, because the first connection was read-only.
+        :param is_wanted: returns whether the command is still wanted; called before the command
+            is sent again, which happens if the first connection was read-only.
         """
         return self._primary.send(primary.encode_command(command), is_wanted)
 

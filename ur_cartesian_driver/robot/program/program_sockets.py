@@ -41,7 +41,7 @@ _HAS_OLDER_PROGRAM = 'wire_dialect is set to an older program; play that one on 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProgramCallbacks:
-    """Called on the event loop."""
+    """Callbacks of the program sockets; called on the event loop."""
 
     #: A robot program holds all its sockets.
     connected: Callable[[], None]
@@ -72,14 +72,14 @@ class ProgramSockets:
         self.feed = reverse.NO_OVERRIDE
         #: The goal uses the buffered servo: keepalives then repeat the message that enters it.
         self.servo = False
-        #: The program is paused and reads nothing. Keepalives pause, too, because otherwise a
-        #: START might wait behind an hour of them.
+        #: The program is paused and reads nothing. Keepalives pause, too: otherwise the resumed
+        #: program might have an hour of them to read before a START.
         self.is_paused = False
         #: The robot reports that no program runs: the client that holds the sockets is dead, for
         #: instance because a cable was cut, and another client may replace it.
         self.ended = False
         self.connected = False
-        #: The longest pause between two keepalives since the last reset of this number [s].
+        #: The longest pause between two keepalives since this number was last set to 0 [s].
         self.max_keepalive_gap = 0.0
         #: Time of the last keepalive to a connected program [s].
         self.last_keepalive = -inf
@@ -234,7 +234,8 @@ class ProgramSockets:
         while True:
             last, before = loop.time(), last
             self.max_keepalive_gap = max(self.max_keepalive_gap, last - before)
-            if not (self.is_paused and was_paused):  # one more: a read is waiting
+            # One keepalive is still sent in a pause, for the read that was waiting when it began.
+            if not (self.is_paused and was_paused):
                 self._send_keepalive()
             was_paused = self.is_paused
             due = max(due + self._settings.keepalive_period, loop.time())

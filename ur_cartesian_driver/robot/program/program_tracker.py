@@ -41,7 +41,8 @@ class ProgramTracker:
         #: inf = it does not report this now.
         self._dead_since = inf
         self._has_shown_itself = False
-        #: The last reported count of the robot program's connections, now and when it connected.
+        #: The newest reported count of the robot program's connections; the count that was newest
+        #: when the present program connected.
         self._run = self._run_at_connection = 0
         #: Set when it is known whether the program is ours: it has shown itself, or is gone.
         self._identified = asyncio.Event()
@@ -88,7 +89,7 @@ class ProgramTracker:
         return self.is_own
 
     def observe(self, robot: RobotState) -> None:
-        """Read a report; disconnect a program that has ended without closing its sockets."""
+        """Process a report; disconnect a program that has ended without closing its sockets."""
         sockets = self._sockets
         sockets.ended = ended = has_ended(robot)
         if not (sockets.connected and ended):

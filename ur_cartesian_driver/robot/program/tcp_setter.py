@@ -56,7 +56,7 @@ class TemporaryTcpSetter:
         we may not send programs, the robot program sets the TCP, rounded as on the wire.
 
         :param is_wanted: returns whether the TCP still has to be restored and no foreign program
-            runs; asked again if the first connection was read-only.
+            runs; called again before a repetition, if the first connection was read-only.
         """
         listens = self._program.connected and not is_paused(robot)
         if listens and (self._program_remembers or not self._headless_mode):

@@ -7,8 +7,8 @@ Inputs belong to the client that requested them, so they are held only while the
 controller frees the inputs of a client (perhaps of the previous goal) when it finds the connection
 closed; until then the request is repeated for a short while.
 
-The program's reports in registers arrive on the same connection, so the packets of other goals
-need not contain them.
+The program's reports in registers arrive on the same connection, so the packets of the robot
+state, which every goal needs, do not contain them.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ class _Attempt(RtdeConnection):
         """Serve the connection, and return the reason of its end."""
         try:
             await self.open(host, port)
-            # A close() before the connection was made had nothing to close.
+            # If close() was called before the connection was made, it had nothing to close.
             return await self.ended() if self._is_wanted else ''
         except OSError as error:
             return str(error)

@@ -28,7 +28,7 @@ WARNING_LEVEL = 2
 
 
 class RtdeConnection:
-    """A connection that is used once, from one event loop: open it, wait for its end, close it."""
+    """A connection, used once and from one event loop: open it, wait for its end, close it."""
 
     def __init__(
         self,

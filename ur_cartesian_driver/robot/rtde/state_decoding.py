@@ -29,7 +29,7 @@ from ur_cartesian_driver.motion.state.rtde_state import (
 from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType, OUTPUT_TYPES
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
 
-#: The rows of the table whose values come from RTDE, with their RTDE outputs.
+#: The rows of STATE_TABLE whose values come from RTDE, with their RTDE outputs.
 _ROWS = tuple((row, row.rtde) for row in STATE_TABLE if row.rtde is not None)
 REQUIRED_FIELDS = tuple(rtde.name for _, rtde in _ROWS if not rtde.optional)
 OPTIONAL_FIELDS = tuple(rtde.name for _, rtde in _ROWS if rtde.optional)

@@ -24,7 +24,7 @@ from ur_cartesian_driver.robot.transport import ignore
 
 
 class StateStream(RtdeConnection):
-    """A connection that is used once, from one event loop: open it, wait for its end, close it."""
+    """A stream, used once and from one event loop: open it, wait for its end, close it."""
 
     def __init__(
         self,
@@ -42,7 +42,7 @@ class StateStream(RtdeConnection):
         :param max_age: the connection ends when its states stay older than this [s]; 0 = never.
         :param on_state: called for each packet, possibly before :meth:`open` returns.
         :param lower_registers: whether the robot program reports in the registers from 0 on.
-        :param on_text: as for the connection.
+        :param on_text: as in :class:`RtdeConnection`.
         """
         super().__init__(
             RtdeClientCodec(

@@ -42,9 +42,9 @@ REPORT_TIMEOUTS: Mapping[str, float] = {
     'generate flight report': 180.0,
     'generate support file': 600.0,
 }
-#: The first software without a dashboard.
+#: The first major software version without a dashboard.
 POLYSCOPE_X = 10
-#: Alternatives to commands that the Robot API lacks; without an entry: the pendant.
+#: Alternatives to commands that the Robot API lacks; for all other commands it is the pendant.
 REPLACEMENTS: Mapping[str, str] = {
     **dict.fromkeys(
         ('power on', 'brake release', 'unlock protective stop'),
@@ -174,7 +174,7 @@ def _missing_in_robot_api(command: str, version: ControllerVersion) -> str:
 
 
 def is_too_early(command: str, answer: str) -> bool:
-    """Return whether a refused unlock may succeed later (for the Robot API: any conflict)."""
+    """Return whether a refused unlock may succeed later; the Robot API only reports a conflict."""
     return TOO_EARLY in answer or (command == UNLOCK and CONFLICT in answer)
 
 

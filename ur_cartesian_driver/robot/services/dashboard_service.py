@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Dashboard commands as calls: checked, sent, and confirmed by the robot state.
+Carries out dashboard calls: checks and sends a command, and waits for the state that confirms it.
 
-On PolyScope X they go through the Robot API instead.
+On PolyScope X the commands go through the Robot API instead.
 """
 
 from __future__ import annotations

@@ -35,9 +35,11 @@ async def write_outputs(
     host: str, port: int, outputs: Iterable[SafeOutput], before: dict[str, Any]
 ) -> OutputsSecured:
     """
-    Write the values of outputs; return the outputs that have changed, and the failures.
+    Write the values of outputs.
 
-    :param before: filled with the outputs before the first attempt; pass it to later attempts.
+    :param before: filled with the RTDE outputs reported before the first attempt; pass it to
+        later attempts.
+    :return: the outputs that have changed, with their old values, and the failures.
     """
     by_kind: dict[int, list[SafeOutput]] = {}
     for output in outputs:

@@ -39,9 +39,9 @@ from ur_cartesian_driver.robot.services.service_calls import (
     succeeded,
 )
 
-#: Longest wait for the robot while no step is possible [s].
+#: Longest wait for the robot while it allows no step [s].
 STEP_TIMEOUT = 35.0
-#: The same, for a robot that is not connected when the recovery begins [s].
+#: The same, for a robot that has not been connected since the recovery began [s].
 DISCONNECTED_TIMEOUT = 2.0
 #: Time in which the reports of a robot may contradict each other after a change [s].
 SETTLING_TIMEOUT = 0.3
@@ -119,7 +119,6 @@ class RecoveryRunner:
             if upcoming.step is RecoveryStep.OPERATOR:
                 return failed(_report(done, upcoming.text))
             if upcoming.step is RecoveryStep.WAIT:
-                # The wait is shorter for a robot that has not been connected.
                 timeout = STEP_TIMEOUT if was_connected else DISCONNECTED_TIMEOUT
                 if loop.time() - last_step_time > timeout:
                     return failed(_report(done, upcoming.text or describe_modes(self._link)))
@@ -206,7 +205,8 @@ class RecoveryRunner:
     async def _do_without_dashboard(
         self, step: RecoveryStep, effect: ExpectedEffect
     ) -> ServiceAnswer:
-        # An unlock is refused for 5 s after the stop: the first wait outlasts them.
+        # The robot refuses an unlock until 5 s after the stop. The wait for the effect is as
+        # long, so the second attempt comes late enough.
         for _ in range(2):
             if not self._link.control.send_primary(
                 PRIMARY_COMMANDS[step],

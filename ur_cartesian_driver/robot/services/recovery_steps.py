@@ -91,7 +91,7 @@ SAFETY_STEPS: Mapping[SafetyMode, RecoveryStep | str | None] = {
     SafetyMode.SAFETY_API_SAFEGUARD_STOP: _GUARD,
 }
 
-#: The step for each robot mode (power and brakes), in the same form.
+#: The step for each robot mode (power and brakes); the values are as in :data:`SAFETY_STEPS`.
 POWER_STEPS: Mapping[RobotMode, RecoveryStep | str | None] = {
     RobotMode.NO_CONTROLLER: 'The controller does not run: check the pendant.',
     RobotMode.DISCONNECTED: 'The arm is not connected to its controller: check the pendant.',

@@ -29,7 +29,7 @@ from ur_cartesian_driver.robot.services.service_calls import (
 )
 from ur_cartesian_driver.urscript import CompileError, parse
 
-#: Longest wait for the report of an error in a secondary program [s].
+#: Time after the sending of a secondary program in which the robot may report an error [s].
 REPORT_TIME = 0.3
 #: Longest waits for a primary program to begin, and to end when it is stopped [s].
 BEGIN_TIMEOUT, STOP_TIMEOUT = 2.0, 3.0
@@ -124,9 +124,10 @@ class ScriptRunner:
 
     async def _ends_within(self, longest: float) -> bool:
         """
-        Return whether the script ends, or our program replaces it, within a time [s].
+        Return whether the script ends, or our program replaces it, within ``longest`` [s].
 
-        Before the script starts, no program runs for a moment, which is not the script's end.
+        Before the script starts, no program runs for up to :data:`CHANGE_TIME`; this is not taken
+        for the end of the script.
         """
         end = asyncio.get_running_loop().time() + longest
         while (left := end - asyncio.get_running_loop().time()) > 0.0:

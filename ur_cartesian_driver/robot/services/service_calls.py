@@ -273,7 +273,7 @@ class SetSpeedSliderCall(_CheckedCall):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WatchContactCall:
-    """Stop every motion where the tool touches; answered at contact, or after the watch."""
+    """Stop every motion where the tool touches; answered at contact, or when the watch ends."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -221,7 +221,7 @@ class ServiceDispatcher:
         return None
 
     def _paused(self) -> ServiceAnswer | None:
-        """Return a refusal if the program is not playing, as it would carry out commands later."""
+        """Return a refusal if the program is not playing, because it would act at a later time."""
         robot = self._link.robot
         if robot is None or robot.runtime_state is RuntimeState.PLAYING:
             return None
@@ -350,7 +350,7 @@ class ServiceDispatcher:
         transition: float = 0.0,
     ) -> ServiceAnswer:
         """
-        Send a setting, and wait until the robot reports it with inputs and outputs.
+        Send a setting, and wait until the packets of inputs and outputs report it.
 
         :param sample: returns one of the reported numbers, NaN if the robot does not report them.
         :param transition: time over which the controller changes to the setting [s].
