@@ -93,7 +93,7 @@ def apply_leads(
     goal: FollowCartesianTrajectory.Goal, leads: Sequence[Lead], file: str
 ) -> FollowCartesianTrajectory.Goal:
     """
-    Replace the names of leads in a goal by earlier times, as a driver does; return the goal.
+    Shift the outputs that name a lead to their earlier times, as a driver does; return the goal.
 
     :param file: the file of the leads, for refusals.
     :raises InvalidGoal: as for :func:`~ur_cartesian_driver.motion.goal.leads.with_lead_times`.

@@ -90,7 +90,8 @@ class GoalAppender:
 
         def take(done: Future) -> None:
             response = done.result()
-            # Also if refused, because another client may have appended. 0 = there is no such goal.
+            # A refusal also has the count, because another client may have appended points. 0 =
+            # there is no such goal.
             self._points = response.points_received or self._points
             answer.set_result(response)
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Times, poses and vectors of ROS messages, in both directions; the classes of types."""
+"""Convert times, poses and vectors to and from ROS messages; find message classes by name."""
 
 from __future__ import annotations
 
@@ -93,7 +93,9 @@ def vector_message(vector: Sequence[float]) -> Vector3:
 
 def class_of(type_name: str) -> Any:
     """
-    Return the class of a type; None if its package is not installed, or lacks the type.
+    Return the class of a type such as ``control_msgs/action/FollowJointTrajectory``.
+
+    None if its package is not installed, or lacks the type.
 
     An installed package that is broken raises its own exception.
     """

@@ -192,7 +192,8 @@ class _LogBridge(logging.Handler):
     """
     Passes the log records of one driver to the logger of its node.
 
-    Records without a driver, such as a failed callback's, go to the oldest node of the process.
+    Records that belong to no driver, such as that of a failed callback, go to the oldest node of
+    the process.
     """
 
     _bridges: ClassVar[list[_LogBridge]] = []
@@ -289,7 +290,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _check_arguments(arguments: Sequence[str]) -> None:
-    """Exit if ROS does not take an argument: if it were ignored, another arm might move."""
+    """
+    Exit if help is requested, or if ROS does not take an argument.
+
+    If an argument were ignored, another arm might move.
+    """
     if arguments:
         rclpy.shutdown()
     if {'-h', '--help'} & set(arguments):

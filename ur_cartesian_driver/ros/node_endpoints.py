@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Common parts of topics, services and timers: QoS, the steady clock, the end of ROS."""
+"""Common parts of topics, services and timers: QoS, a steady timer, errors during shutdown."""
 
 from __future__ import annotations
 

@@ -33,7 +33,8 @@ class CellMarkerPublisher:
         """
         Publish the cell as it is now, unless the node is shutting down.
 
-        :param refusal: the refusal of the newest goal; its collision is shown at its place.
+        :param refusal: the refusal of the newest goal; the bodies that would touch are also shown
+            at the place of the collision, in red. None = show no collision.
         """
         self._shows_refusal = False
         driver, stamp = self._driver, self._clock.now().to_msg()

@@ -48,7 +48,7 @@ class DeferredActionServer(ActionServer):
             return
         # An executor that has been shut down has no guard condition any more, or an invalid one.
         with contextlib.suppress(AttributeError, InvalidHandle):
-            # A plain function: Python warns about a coroutine that is never awaited.
+            # A plain function and no coroutine, because Python warns if one is never awaited.
             executor.create_task(self._hand_over, goal_handle, callback)
 
     def _hand_over(self, goal_handle: GoalHandle, callback: Callable[[GoalHandle], Any]) -> None:

@@ -37,7 +37,8 @@ from ur_cartesian_driver.ros.goals.goal_context import GoalContext
 from ur_cartesian_driver.ros.message_fields import nanoseconds
 from ur_cartesian_driver.ros.node_endpoints import SHUT_DOWN_ERRORS
 
-#: Period in which a waiting goal reads the node's clock, which may be a simulated one [s].
+#: Period of the reads of the node's clock while a goal waits for its start time [s]; the clock
+#: may be a simulated one.
 CLOCK_PERIOD = 0.05
 #: How long rclpy may take from its cancel callback to the state CANCELING [s].
 CANCELING_TIMEOUT = 1.0
@@ -257,7 +258,7 @@ class GoalRun:
             )
 
     def _execute(self, plan: Plan) -> Outcome:
-        # Feedback and pictures show the plan that is executed.
+        # Feedback and markers show the renewed plan, which is the one that is executed.
         try:
             plan = self._context.driver.renewed(plan)
             motion = self._context.driver.start(plan, self._feedback_publisher(plan))

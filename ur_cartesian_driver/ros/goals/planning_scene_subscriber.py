@@ -69,7 +69,7 @@ class PlanningSceneSubscriber:
         self._thread.shutdown(cancel_futures=True)
 
     def _look_for_service(self) -> None:
-        """Ask for the whole scene once the service is there."""
+        """Ask for the whole scene each time the service appears."""
         has_service = self._client.service_is_ready()
         if has_service and not self._had_service:
             request: Any = self._service_kind.Request()
@@ -97,7 +97,8 @@ class PlanningSceneSubscriber:
         try:
             after = updated_scene(before, message, place)
             pairs, pairs_before = after.cell.may_touch, before.cell.may_touch
-            # change_cell() only adds pairs; a body loses its pairs when it is removed.
+            # change_cell() cannot take away a pair of bodies that may touch. So the bodies of such
+            # a pair are removed, which removes all their pairs, and added anew.
             anew = {name for pair in pairs_before - pairs for name in pair} & after.names
             changed = [
                 body

@@ -154,8 +154,8 @@ class LiveTargetSubscriber:
         stamp, now = nanoseconds(message.header.stamp), self._clock.now().nanoseconds
         with self._condition:
             if self._newest_stamp > now + self._max_age * 1e9:
-                # The target with this stamp is too far in the future to be followed, or a
-                # simulated clock was set back.
+                # No message is compared with this stamp any more: its target is too far in the
+                # future to be followed, or a simulated clock was set back.
                 self._newest_stamp = 0
             if 0 < stamp < self._newest_stamp:
                 return

@@ -41,7 +41,7 @@ def cell_markers(cell: Cell, tf_prefix: str, stamp: Time) -> MarkerArray:
     most = triangles_per_mesh(cell)
     for body in cell.bodies:
         frame, T_frame_body = body.frame, body.T_frame_body
-        if frame == BASE_LINK:  # not every driver publishes it
+        if frame == BASE_LINK:  # a frame that not every driver publishes
             frame, T_frame_body = BASE, T_BASE_BASE_LINK @ T_frame_body
         header = Header(stamp=stamp, frame_id=tf_prefix + frame)
         colour = CARRIED if body.is_carried else FIXED

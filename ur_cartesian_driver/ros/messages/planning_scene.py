@@ -92,8 +92,10 @@ class _Update:
 
     def of(self, item: Any, change: Callable[[], None]) -> None:
         """
-        Change an object.
+        Make a change to one object.
 
+        :param item: the object.
+        :param change: makes the change.
         :raises ValueError: the change is impossible; the text names the object.
         """
         try:
@@ -107,7 +109,7 @@ class _Update:
             raise ValueError(f'object "{shortened(item.id)}": {clause}') from None
 
     def forget(self, which: Callable[[CellBody], bool]) -> None:
-        """Remove the bodies of the scene that meet a condition."""
+        """Remove the bodies that came from the planning scene and meet a condition."""
         for body in self._own():
             if which(body):
                 self._remove(body.name)
@@ -221,7 +223,7 @@ def _operation(item: Any) -> _Operation:
 
 
 def _with_shapes(body: CellBody, shapes: Iterable[PlacedShape], T_body_new: Pose) -> CellBody:
-    """Return a body with more shapes, which are given in the frame ``new``."""
+    """Return a body with more shapes, given in a frame whose pose in the body is T_body_new."""
     more = (PlacedShape(each.shape, T_body_new @ each.T_body_shape) for each in shapes)
     return replace(body, shapes=(*body.shapes, *more))
 

@@ -110,7 +110,8 @@ def declared_values(
             parameter = node.declare_parameter(
                 declaration.name, declaration.default, declaration.descriptor()
             )
-        # For example of (), which rclpy takes for bytes, but check() for an empty list.
+        # Raised, for example, for (), which check() accepts as an empty list, but which rclpy
+        # takes for bytes.
         except (InvalidParameterException, InvalidParameterTypeException) as error:
             raise ParameterError(f'Parameter {declaration.name}: {error}.') from None
         values[declaration.name] = plain_value(parameter.value)

@@ -3,7 +3,7 @@
 """
 The service that changes the bodies of the cell.
 
-A separate thread reads the bodies, one request after the other: a mesh takes a while.
+A separate thread reads the bodies, one request after the other, because a mesh takes time.
 """
 
 from __future__ import annotations

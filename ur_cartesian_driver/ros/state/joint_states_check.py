@@ -11,7 +11,7 @@ from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 
-#: Enough for every publisher to send some [messages].
+#: Number of messages to listen to: enough for every publisher to have sent some.
 MESSAGES = 500
 
 

@@ -49,7 +49,8 @@ from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS, STATE_QOS, TF_QO
 from ur_cartesian_driver.ros.parameters.node_parameters import Settings
 from ur_cartesian_driver.ros.state.diagnostics import diagnostics_message
 
-#: Enough for all messages that a subscriber may not have received yet.
+#: Number of stamps of ``joint_states`` that are kept: enough for all messages that a subscriber
+#: may not have received yet.
 KEPT_STAMPS = 1000
 #: Period in which an unchanged status is published again [s].
 STATUS_PERIOD = 1.0

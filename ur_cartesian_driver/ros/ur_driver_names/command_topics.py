@@ -63,7 +63,7 @@ class _FreedriveSwitch:
         self._follow()
 
     def _end(self) -> None:
-        """Switch freedrive off, because nothing else will."""
+        """Switch freedrive off when the node ends, because nothing else will."""
         if self._may_be_on:
             self._driver.call(SetBool, self._row.source, SetBool.Request(data=False))
 

@@ -24,7 +24,7 @@ from ur_cartesian_driver.ros.node_endpoints import LATCHED_QOS, steady_timer
 ANSWER_TIMEOUT = 60.0
 #: How long a call waits for the discovery of the driver's service [s].
 DISCOVERY_TIMEOUT = 5.0
-#: Older statuses are ignored; the driver publishes one every second [s].
+#: Age above which a status is ignored [s]; the driver publishes one every second.
 STATUS_TIMEOUT = 5.0
 #: Period in which waiting calls are checked [s].
 CHECK_PERIOD = 0.2

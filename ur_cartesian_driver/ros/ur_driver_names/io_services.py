@@ -101,7 +101,7 @@ def _set_tool_voltage(driver: DriverNode, voltage: float) -> Future[ServiceAnswe
 
 
 def _set_payload(row: Service, driver: DriverNode, request: Message) -> Future[ServiceAnswer]:
-    """Set mass and centre of gravity, of either definition of the service."""
+    """Set the payload, requested by either of the service's two definitions."""
     if hasattr(request, 'mass'):
         return same_request(row, driver, request)
     load = request.payload

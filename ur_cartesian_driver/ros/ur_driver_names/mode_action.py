@@ -31,7 +31,8 @@ from ur_cartesian_driver.ros.ur_driver_names.offered_name import Served, UrName
 MODE_TIMEOUT = 30.0
 #: The modes that a goal may have.
 TARGETS = (RobotMode.POWER_OFF, RobotMode.IDLE, RobotMode.RUNNING)
-#: The dashboard's commands from one mode to another. The brakes cannot be engaged directly.
+#: The dashboard's commands from one mode to another. The brakes cannot be engaged directly, so
+#: the way from RUNNING to IDLE leads through POWER_OFF.
 COMMANDS: dict[tuple[RobotMode, RobotMode], tuple[str, ...]] = {
     (RobotMode.POWER_OFF, RobotMode.IDLE): ('power_on',),
     (RobotMode.POWER_OFF, RobotMode.RUNNING): ('brake_release',),
@@ -134,13 +135,13 @@ class ModeRun:
         self.thread = threading.Thread(target=self._execute, name='set_mode', daemon=True)
 
     def stop(self) -> None:
-        """End before the next step."""
+        """End the run before its next step."""
         with self._changed:
             self._is_stopped = True
             self._changed.notify_all()
 
     def look(self) -> None:
-        """Look at a new status."""
+        """Wake the thread of the run, to look at a new status or answer."""
         with self._changed:
             self._changed.notify_all()
 
