@@ -48,7 +48,7 @@ def length(text: str) -> float:
 
 
 def resume_length(text: str) -> float:
-    """Return a length [m] by which a goal is resumed before its stop, or approached."""
+    """Return the overlap or the approach length of a resumed goal [m]."""
     from ur_cartesian_driver.path.resumption import MAX_RESUME_LENGTH
 
     number = length(text)
@@ -154,7 +154,7 @@ def box(text: str) -> tuple[float, ...]:
 
 
 def place(text: str) -> Vector3:
-    """Return a place of three numbers [m]."""
+    """Return the position that three numbers give [m]."""
     try:
         x, y, z = map(float, text.split(','))
     except ValueError:
@@ -209,7 +209,7 @@ def count(text: str) -> int:
 
 
 def point_index(text: str) -> int:
-    """Return the index of a point, any number that fits into uint32."""
+    """Return the index of a point, 0 to 2**32 - 1."""
     number = _whole(text)
     if not 0 <= number < 2**32:
         raise argparse.ArgumentTypeError(f'{text} is not an index from 0')

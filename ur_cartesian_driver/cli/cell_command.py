@@ -33,7 +33,7 @@ from ur_cartesian_driver.sim.command_line.simulate import calibration
 
 
 def show_or_check(arguments: argparse.Namespace) -> int:
-    """Run ``cell show`` or ``cell check``; the status of the latter is 1 if anything touches."""
+    """Run ``cell show`` or ``cell check``; the latter returns 1 if any two are too close."""
     cell = read_cell(arguments.file)
     model = robot_model(arguments.model)
     arm = Arm(model, calibration(arguments, model))
@@ -119,7 +119,7 @@ def touching_lines(pairs: Sequence[tuple[Pair, float]], cell: Cell) -> list[str]
 def closest_lines(
     cell: Cell, arm: Arm, q: Joints, T_flange_tcp: Pose, tool_radius: float
 ) -> list[str]:
-    """Return the smallest distances of an arm that touches nothing."""
+    """Return lines with the smallest distance in each group of pairs, if no pair is too close."""
     lines = ['nothing touches']
     for title, group in groups_of_pairs(cell).items():
         distances = CellDistances(arm, T_flange_tcp, group, tool_radius)

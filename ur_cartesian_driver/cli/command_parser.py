@@ -125,7 +125,7 @@ def _add_demo(command: CommandParser) -> None:
     command.add_argument(
         '--picture',
         type=argument_types.picture_file,
-        default=Path('demo.png'),  # no text, which would be checked: matplotlib is optional
+        default=Path('demo.png'),  # argparse would check a text, which needs matplotlib
         help='picture of the planned and executed path',
     )
     command.add_argument(

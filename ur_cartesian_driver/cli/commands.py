@@ -50,7 +50,8 @@ def send(arguments: argparse.Namespace) -> int:
     """Send a goal, show its progress, and wait for its result."""
     from ur_cartesian_driver.ros import client
 
-    # Before the motion: the file may be edited while the arm moves. A pipe can be read only once.
+    # The digest is taken before the motion, because the file may be edited while the arm moves. A
+    # pipe has no digest, because it can be read only once.
     is_noted = arguments.file != '-' and goal_file(arguments.file).is_file()
     sent_file = digest(goal_file(arguments.file)) if is_noted else ''
     goal = whole = read_goal(arguments)

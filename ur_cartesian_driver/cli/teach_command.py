@@ -169,7 +169,7 @@ class Taught(Protocol):
 
 
 class Lesson:
-    """The points taken so far."""
+    """The lesson of a path: the points taken so far."""
 
     HELP: ClassVar[str] = HELP
 

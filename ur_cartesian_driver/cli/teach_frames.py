@@ -18,14 +18,15 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector3, vector3
 from ur_cartesian_driver.motion.goal.known_frames import BASE, TOOL0
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
-#: Least touches of the tip of a fixed tool, one more than its position needs; points of a part.
+#: Smallest number of touches of a fixed tool's tip, and of points of a held part. Each is one more
+#: than the frame needs, so that residuals show errors.
 MIN_TIPS, MIN_POINTS = 2, 4
 #: Points nearer than this give no direction [m].
 _MIN_DISTANCE = 0.005
 
 
 class _FrameLesson(ABC):
-    """Touches that make a frame."""
+    """A lesson whose touches make a frame."""
 
     @abstractmethod
     def report(self) -> list[str]:

@@ -4,11 +4,12 @@
 Two beads side by side, at two speeds, and the dead times of the valve that laid them.
 
 The output switches at the same two places of both beads. At the speed v, a valve with the dead
-times ``open`` and ``close`` begins a bead ``v * open`` behind the first place, and ends it
-``v * close`` behind the second. So the fast bead begins ``(fast - slow) * open`` behind the slow
-one, and ends ``(fast - slow) * close`` behind it. Only these two distances have to be measured:
-the places and the offset of the nozzle cancel out. The lengths of the beads do not suffice: they
-differ by ``(fast - slow) * (close - open)``, whatever ``open`` is.
+times ``open`` and ``close`` begins a bead ``v * open`` past the first place, and ends it
+``v * close`` past the second. So the fast bead begins ``(fast - slow) * open`` past the beginning
+of the slow one, and ends ``(fast - slow) * close`` past its end. Only these two distances have to
+be measured: the places and the offset of the nozzle cancel out. The lengths of the beads do not
+suffice, because they show only the difference of the dead times: they differ by
+``(fast - slow) * (close - open)``.
 """
 
 from __future__ import annotations
@@ -22,10 +23,10 @@ from ur_cartesian_driver.path import mm, Output, Path
 
 #: Acceleration of the beads, and speed between them [m/s^2], [m/s].
 ACCELERATION, TRAVEL_SPEED = 1.0, 0.05
-#: Constant speed before and behind a bead, and height above it on the way to the next one [m].
+#: Distance at constant speed before and after a bead; height above it on the way to the next [m].
 RUN, LIFT = mm(10), mm(20)
-#: Corner deviation at the ends of a bead, so that the arm passes them at full speed [m]: on a
-#: straight line it deviates by nothing. In a blend it would slow down.
+#: Corner deviation at the ends of a bead, with which the arm passes them at full speed [m]. On a
+#: straight line it causes no deviation. A blend would slow the arm down.
 PASSING = mm(0.1)
 #: Direction of a bead and of the second one beside it, by name: axes of the tool.
 DIRECTIONS = {
@@ -38,9 +39,10 @@ DIRECTIONS = {
 BEAD_POINTS = (1, 8)
 #: Shortest time of a bead [s], so that the speed of the arm, reported each 40 ms, is known in it.
 SHORTEST = 0.08
-#: A dead time below 0 by more standard uncertainties than this is a mistake of the measurement.
+#: A dead time this many standard uncertainties below 0 is a mistake of the measurement.
 _MAX_NEGATIVE = 3.0
-#: A ruler shows no distance below its uncertainty divided by this: a smaller one has another unit.
+#: A ruler shows no distance below its uncertainty divided by this; a smaller distance was given
+#: in a wrong unit.
 _FINEST = 4.0
 
 
@@ -80,7 +82,7 @@ class Beads:
 
     @property
     def run(self) -> float:
-        """The distance to gain speed before a bead, and to lose it behind the bead [m]."""
+        """The distance to gain speed before a bead, and to lose it after the bead [m]."""
         return self.fast**2 / (2.0 * ACCELERATION) + RUN
 
     @property
@@ -131,16 +133,16 @@ def dead_times(
     Return the dead times that two beads show.
 
     Each distance is the difference of two readings. In addition, each output switches up to half a
-    cycle before or behind its place. This deviation has a uniform distribution, whose standard
+    cycle before or after its place. This deviation has a uniform distribution, whose standard
     deviation is ``cycle / sqrt(12)``.
 
-    :param begins: distance by which the fast bead begins behind the slow one [m]; ``ends``:
-        distance by which it ends behind the slow one [m].
+    :param begins: distance by which the fast bead begins past the beginning of the slow one [m];
+        ``ends``: distance by which it ends past the end of the slow one [m].
     :param slow: speed of the slow bead [m/s]; ``fast``: of the fast one.
     :param reading: standard uncertainty of one reading of the ruler [m].
     :param cycle: the cycle time of the controller [s].
-    :raises ValueError: the fast bead begins or ends before the slow one, or too far behind it, or
-        a distance is not finite, or smaller than the ruler shows.
+    :raises ValueError: the fast bead begins or ends before the slow one, or too far past it, or a
+        distance is not finite, or smaller than the ruler shows.
     """
     difference = fast - slow
     switching = cycle / sqrt(12.0) * hypot(slow, fast)

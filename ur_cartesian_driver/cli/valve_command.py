@@ -37,7 +37,7 @@ HOW_TO_READ = (
     'reach farther.'
 )
 LATER = 'To measure later, press Ctrl-C now, and then run:'
-#: Below this fraction of its speed the arm was slowed down by the slider.
+#: Fraction of its planned speed below which the arm counts as slowed down by the slider.
 _FULL_SPEED = 0.99
 
 
@@ -87,7 +87,7 @@ def measure_valve(arguments: argparse.Namespace) -> int:
 
 def lay_beads(driver: Driver, beads: Beads, valve: Output, agrees: Callable[[str], bool]) -> bool:
     """
-    Lay the beads from the tool's place, if the person agrees; return whether they were laid.
+    Lay the beads from the tool's present pose, if the person agrees; return whether they were.
 
     :raises DriverError: the path was refused or not completed, or a bead cannot have its speed.
     :raises RobotNotReady: the robot reports no state, or its slider is below 100 % before or
