@@ -20,7 +20,7 @@ from ur_cartesian_driver.importing.import_format import Term, term_table, Treatm
 
 
 class Stage(IntEnum):
-    """The stage of its line in which a code acts, in the order of execution of RS274/NGC."""
+    """When a code acts among those of its line; the order is that of RS274/NGC."""
 
     MODE = 0
     OUTPUT = 1
@@ -40,11 +40,11 @@ class Code(Term):
     group: str = ''
     #: The letters that need no number on the line of the code.
     bare: str = ''
-    #: The rest of the line belongs to the code, even if it is not made of words.
+    #: The code owns its line: what follows are its arguments, whether they are words or not.
     alone: bool = False
-    #: The rest of the line is a text: a message, or the name of a file.
+    #: What follows is a text, a message or the name of a file, and is never read as words.
     text: bool = False
-    #: The code moves the tool to a place of the machine, which is not known here.
+    #: The place of the tool is not known after the code: it moves to a place of the machine, say.
     moves_away: bool = False
 
 
@@ -93,7 +93,7 @@ _HARMLESS = (
     *('BED_MESH_CLEAR', 'TEMPERATURE_WAIT', 'UPDATE_DELAYED_GCODE'),
 )
 
-#: The rows of the lines with which a printer with several heads takes one, and parks it.
+#: Commands of a printer with several heads, by their first letters: T takes a head, P parks it.
 TOOLS_OF_PRINTER = {'T': 'T S L', 'P': 'P S'}
 
 _MOTION = (
@@ -312,7 +312,7 @@ _PRINTERS = (
     _refused('printers', 'it restores modes', 'RESTORE_GCODE_STATE'),
 )
 
-#: Codes by name. A code whose meaning a word changes has a row with that word: ``G10 L20``.
+#: Codes by name. A code and a word that changes its meaning have a row together: ``G10 L20``.
 CODES: Mapping[str, Code] = term_table(
     *_MOTION, *_MODES, *_OFFSETS, *_OUTPUTS, *_TOOLS, *_PROGRAM, *_PRINTERS
 )
@@ -344,13 +344,14 @@ def code_on_line(name: str, words: Mapping[str, float], *, is_alone: bool) -> Co
         if name == 'G10' and 'L' in words:
             return CODES.get(f'G10 L{words["L"]:g}')
         if (
-            # A spline has a P, too; the H beside G80 can be that of a G43.
+            # With more words than P, G5 is a spline, and not the look-ahead of the row G5 P. In
+            # G80 G43 H1, the H belongs to G43, and the row G80 H does not apply.
             (name == 'G5' and words.keys() != {'P'})
             or (name == 'G80' and not is_alone)
             or (name == 'G92' and not words.keys().isdisjoint('XYZ'))
         ):
             return CODES[name]
-        # G50 X is refused, even with an S.
+        # X and Z first: G50 X S900 is refused as G50 X, and not left out as G50 S.
         for letter in sorted(words, key=lambda letter: letter not in 'XZ'):
             if row := CODES.get(f'{name} {letter}'):
                 return row
