@@ -66,8 +66,8 @@ def test_moves_that_no_recording_shows_are_predicted(identified):
     print(
         f'{5 * len(late)} moves: end {1e6 * np.max(late):.3g} us, place {1e6 * np.max(off):.3g} um'
     )
-    assert np.max(late) < 1e-3
-    assert np.max(off) < 1e-4
+    assert np.max(late) < 1e-4
+    assert np.max(off) < 5e-5
 
 
 @pytest.mark.random
