@@ -230,7 +230,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
 
     @property
     def gaps(self) -> LinkGaps:
-        """The longest recent gaps between messages of the connection."""
+        """The longest recent gaps between robot states and between keepalives."""
         return self._robot.gaps
 
     @property
@@ -244,7 +244,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         callback(self.status)
 
     def add_servo_listener(self, callback: Callable[[ServoReport], None]) -> None:
-        """Call back with each report of the servo."""
+        """Call back with each report on the streamed set-points of a motion."""
         self._robot.servo_listeners.append(callback)
 
     def add_pulse_listener(self, callback: Callable[[Pulse], None]) -> None:
@@ -288,9 +288,9 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
 
     def renewed(self, plan: Plan) -> Plan:
         """
-        Return the plan, or a new one if it begins with a travel and the arm has moved since.
+        Return the plan, or a new one if it begins with a travel and the arm moved meanwhile.
 
-        :raises GoalRefused: the goal fails a check from the arm's present place.
+        :raises GoalRefused: the goal fails a check from the present position of the arm.
         :raises RobotNotReady: the robot does not report its state.
         """
         if plan.travelled_goal is None:
@@ -453,7 +453,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
 
     def _goal_of(self, path: Path, state: RobotState) -> Goal:
         """
-        Return the goal of a path, for a state of the robot.
+        Return the goal of a path, with the frames resolved in a state of the robot.
 
         :raises InvalidGoal: a frame is unknown, or the arm is not at the start of the path.
         """
@@ -476,7 +476,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         return goal
 
     def _options_for(self, state: RobotState) -> PlanningOptions:
-        """Return the planning options, with the features of the connected robot."""
+        """Return the planning options, completed with what the connected robot reports."""
         status = self.status
         return self.options.for_program(
             self.config,
@@ -588,7 +588,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
     # ---- from the robot loop ------------------------------------------------------------------
 
     def _on_loop_lost(self) -> None:
-        # A robot program that somebody has stopped is not uploaded again.
+        # If somebody has stopped the robot program, the next loop must not upload it again.
         self._may_upload = self.status.program_running
         self._robot.set_status(
             ConnectionStatus(message=LOOP_LOST, last_error=timestamped(LOOP_LOST))

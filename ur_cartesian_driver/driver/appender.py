@@ -3,9 +3,10 @@
 """
 Append points to an open goal while it runs (keep_open).
 
-Points are planned here, in the thread that appends them, and offered to the robot loop. Only the
-loop knows whether the ending has been sent meanwhile, so the loop decides: it accepts all points
-or none. If the ending has been sent, the points are planned again, from rest.
+Points are planned here, in the thread that appends them, and offered to the robot loop. Meanwhile
+the loop may have sent the goal's ending, the records that bring the arm to rest. Only the loop
+knows, so the loop decides: it accepts all points or none. If the ending has been sent, the points
+are planned again, from rest.
 """
 
 from __future__ import annotations
@@ -48,9 +49,9 @@ MAX_AHEAD = 2
 class AppendResult:
     """The result of an append."""
 
-    #: The present number of points of the goal.
+    #: Number of points of the goal, including the new ones.
     points: int
-    #: The number of the first new point.
+    #: Index of the first new point in the goal, from 0.
     first: int
     #: The result as a sentence.
     text: str
@@ -102,9 +103,9 @@ class Appender:
         self._arm_and_options, self._send, self._progress = planning_inputs, send, progress
         self._goal: AppendableGoal = opened.next_goal
         self._is_open = True
-        # Requests run one after the other, because each begins where the previous one ends.
+        # Appends run one after the other, because each begins where the previous one ends.
         self._append_lock = threading.Lock()
-        # Guards the pending answers and the end.
+        # Guards the pending answers, and whether the goal has ended.
         self._lock = threading.Lock()
         self._pending_answers: dict[int, Future[AnswerAppend]] = {}
         #: Why nothing can be appended any more; empty = more points are possible.
@@ -257,7 +258,7 @@ class Appender:
             self._send(offer)
             return future.result(self._timeout)
         except TimeoutError:
-            # The loop may have accepted the points: it is unknown where further ones would begin.
+            # The loop may have accepted the points, so it is unknown where further ones begin.
             self._ended = 'The robot loop did not answer: nothing can be appended any more.'
             return AnswerAppend(number=number, refusal=self._ended)
         finally:
@@ -287,7 +288,7 @@ def _from_rest(timed: bool) -> str:
     """
     Return the sentence about points that continue from rest.
 
-    The sentence has no figure for the delay: the arm may have waited, or may still wait.
+    The sentence does not state the delay, because it is unknown how long the arm waits.
     """
     clause = ', later than their times' if timed else ''
     return f' The arm had come to rest before these points; it goes on from there{clause}.'

@@ -3,8 +3,9 @@
 """
 The cell of a driver; the owner and running goals change it.
 
-The options of the driver are replaced as a whole, so that every plan has one cell. A separate
-thread checks the rest of a running motion in the new cell; the robot loop never waits for it.
+A change replaces the planning options of the driver as a whole, so that a plan never sees half a
+change. A separate thread checks the rest of a running motion in the new cell; the robot loop never
+waits for that check.
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ class ChangeableCell(ABC):
     #: Guards the replacement of the options, and the attributes below; set by the driver.
     _cell_lock: threading.Lock
     _cell_listeners: list[Callable[[Cell], None]]
-    #: Number of changes; a check that sees a new one starts again.
+    #: Number of changes so far. If it has grown during a check of the running motion, the check
+    #: starts again.
     _cell_changes = 0
     _is_checking = False
 
@@ -58,7 +60,7 @@ class ChangeableCell(ABC):
 
     @abstractmethod
     def _end_session_for(self, motion: MotionHandle, by: str) -> None:
-        """End a motion if it is a live session; ``by``: its successor, as a noun phrase."""
+        """End a motion if it is a live session; ``by``: what preempts it, as a noun phrase."""
 
     @property
     def cell(self) -> Cell:
@@ -82,11 +84,11 @@ class ChangeableCell(ABC):
         Change the bodies of the cell; make all changes, or none.
 
         If the rest of a running goal would now touch a body, the goal soon ends as COLLISION. A
-        live session ends as PREEMPTED; the next target begins another one.
+        live session ends as PREEMPTED; the next target begins another session.
 
         :param bodies: bodies to add; they replace bodies of the same names. A ``Cell``
             brings its clearance for these bodies and its pairs that may touch.
-        :param remove: names of bodies to remove first.
+        :param remove: names of bodies to remove, before all other changes.
         :param attach: names of bodies that the tool picks up at their present poses.
         :param release: names of bodies that the tool leaves at their present poses.
         :param may_touch: pairs of names that may touch from now on.
@@ -130,7 +132,7 @@ class ChangeableCell(ABC):
     # ---- changes by goals ---------------------------------------------------------------------
 
     def _take_part_change(self, change: PartChange, q: Joints, T_flange_tcp: Pose) -> None:
-        """Apply the change at a point that the arm has passed; ``q``: the joints there [rad]."""
+        """Attach or release a body; ``q``: the joints at the point of the change [rad]."""
         with self._cell_lock:
             try:
                 cell = changed(self.options.cell, change, self.arm, q, T_flange_tcp)
@@ -146,7 +148,7 @@ class ChangeableCell(ABC):
 
     def _check_cell_of(self, plan: Plan, planned_in: Cell | None) -> Cell:
         """
-        Return the present cell, after checking a plan made in another one.
+        Return the present cell; check the plan in it first, if it was made in another one.
 
         :param planned_in: the cell of the plan; None = unknown.
         :raises GoalRefused: the plan would touch a body, or changes bodies that do not exist.
@@ -204,7 +206,7 @@ class ChangeableCell(ABC):
 
 def _with_bodies(cell: Cell, bodies: Cell | Iterable[CellBody]) -> Cell:
     """
-    Return a cell with more bodies.
+    Return a cell with bodies added; they replace bodies of the same names.
 
     :raises InvalidGoal: an item is no body.
     """
@@ -235,7 +237,7 @@ def _names(what: str, names: Iterable[str]) -> list[str]:
 
 def _made(what: str, make: Callable[..., Cell], *arguments: object) -> Cell:
     """
-    Return the cell after a change.
+    Return the cell that ``make`` returns; ``what`` names the change in the error.
 
     :raises InvalidGoal: the change cannot be made.
     """

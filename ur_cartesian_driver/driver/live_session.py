@@ -116,7 +116,7 @@ class InteractiveMotions(ABC):
         )
         self._live = LiveSession(motion, self._send_target)
         self._live.set_target(T_base_tcp, age=age)
-        if self.options.cell is not cell:  # it changed before the session was known
+        if self.options.cell is not cell:  # it changed before self._live was set
             self._end_session_for(motion, 'a session in the changed cell')
         return self._live
 
@@ -143,7 +143,7 @@ class InteractiveMotions(ABC):
 
         Needs ``allow_freedrive`` in the configuration with which the robot program was started.
 
-        :param on_active: called repeatedly, as soon as the arm can be guided.
+        :param on_active: called repeatedly while the arm can be guided.
         :raises RobotNotReady: freedrive is not allowed, or another motion runs.
         """
         state = self._state_for('enter freedrive')
@@ -216,8 +216,8 @@ def check_target(T_base_tcp: Pose, state: RobotState, options: PlanningOptions) 
     """
     Refuse a malformed or distant target.
 
-    :raises InvalidGoal: the target is malformed, or farther than ``max_approach_distance`` from
-        the tool.
+    :raises InvalidGoal: the target is malformed, or farther than ``max_approach_distance`` (0 = no
+        limit) from the tool.
     """
     check_pose(T_base_tcp)
     distance = T_base_tcp.distance_to(state.actual_tcp_pose)
@@ -258,8 +258,8 @@ def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
         ),
         workspace=LiveWorkspace(
             planes=parse_planes(options.workspace_planes),
-            # The cylinders around the links are thicker than the arm, so their clearance is
-            # checked only if goals are refused for it, too.
+            # The cylinders around the links are thicker than the arm, so that cylinders that
+            # touch need not mean a collision. They are checked only if goals are refused for it.
             min_clearance=options.min_clearance if options.self_collision == 'refuse' else None,
             tool_radius=options.tool_radius,
             cell=options.cell,
@@ -276,7 +276,7 @@ def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
 
 
 def stationary_plan(state: RobotState, safe_outputs: tuple[SafeOutput, ...] = ()) -> Plan:
-    """Return the plan of a motion without a planned path."""
+    """Return the plan of a motion without a planned path: its one point is the present pose."""
     here = state.target_tcp_pose
     return Plan(
         goal=Goal(

@@ -100,7 +100,7 @@ class LoopConnection:
 
     def send(self, request: Request) -> None:
         """
-        Send a request; if the loop is gone, the reader thread notices.
+        Send a request; a lost loop raises no error, because the reader thread replaces it.
 
         :raises LocalProtocolError: the request cannot be pickled.
         """

@@ -115,12 +115,13 @@ class MotionHandle:
         :param replace_from_point: the first point that the new points replace, together with all
             points after it (SPLINE and SERVO).
         :param replace_from_time: an alternative to ``replace_from_point``: the time [s], since the
-            start of the goal, from which the new points replace the old ones. The motion goes on
-            from its place at that time to the first new point.
+            start of the goal, from which the new points replace the old ones. The motion leaves
+            the old path at that time and goes to the first new point.
         :raises AlreadySent: the tail can no longer be replaced, because it was passed or sent; the
             error gives the first point and time that are still replaceable.
         :raises GoalRefused: a check or the robot loop refused the points, as the text explains; no
-            point was accepted, and the goal goes on.
+            point was accepted, and the goal goes on. Only if the loop did not answer, it is
+            unknown whether it accepted the points.
         """
         if self.appender is None:
             raise RobotNotReady('The goal was sent without keep_open: nothing can be appended.')
@@ -201,7 +202,7 @@ class MotionHandle:
         :raises TimeoutError: no outcome came within ``timeout`` [s]; the motion goes on.
         """
         if timeout is None:
-            self._make_report()  # done while the arm moves
+            self._make_report()  # now, because the arm moves and this thread has to wait
         return self._outcome.result(timeout)
 
     def add_done_callback(self, callback: Callable[[Outcome], None]) -> None:
@@ -257,8 +258,8 @@ class ActiveMotion:
         """
         Make the report of the plan, unless it is made or another thread is making it.
 
-        The report takes longer than sending the plan. If the motion has ended meanwhile, the
-        thread that made the report delivers the outcome.
+        The report takes longer than sending the plan, so it is made after the motion has started.
+        If the motion has ended meanwhile, the thread that made the report delivers the outcome.
         """
         with self._lock:
             plan, self._plan = self._plan, None

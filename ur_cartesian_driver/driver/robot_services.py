@@ -99,7 +99,7 @@ class RobotServices(ABC):
         return self.call(calls.WatchContactCall())
 
     def end_contact_watch(self) -> ServiceAnswer:
-        """End the contact watch, and so answer its call; do nothing if there is no watch."""
+        """End the contact watch, so that its call fails; do nothing if there is no watch."""
         return self.call(calls.EndContactWatchCall()).result()
 
     def hand_back_control(self) -> ServiceAnswer:

@@ -64,7 +64,11 @@ class RunningMotions:
             self._loop.send_packed(request)
 
     def call(self, call: ServiceCall) -> Future[ServiceAnswer]:
-        """Start a call; the future always gets an answer, never an error."""
+        """
+        Start a call; the future always gets an answer, never an error.
+
+        :raises LocalProtocolError: the call cannot be pickled.
+        """
         future: Future[ServiceAnswer] = Future()
         future.set_running_or_notify_cancel()
         number = next(self.numbers)
@@ -79,12 +83,12 @@ class RunningMotions:
 
     @property
     def handles(self) -> list[MotionHandle]:
-        """The running motion, or an empty list."""
+        """The handle of the running motion, in a list; empty = no motion runs."""
         return [active.motion for active in self.active]
 
     @property
     def active(self) -> list[ActiveMotion]:
-        """The driver's side of the running motion, or an empty list."""
+        """The driver's side of the running motion, in a list; empty = no motion runs."""
         with self._loop.lock:
             return list(self._motions.values())
 

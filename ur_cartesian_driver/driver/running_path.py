@@ -39,8 +39,8 @@ class RunningPath:
         """
         self._start, self._take_part_change = plan.start, take_part_change
         self._T_flange_active = plan.T_flange_active
-        #: Guards the attributes below. Reentrant: a change leaves the list in the same step in
-        #: which it is made, and a listener of the cell may append points during that step.
+        #: Guards the attributes below. Reentrant, because the cell is changed while the lock is
+        #: held, and a listener of the cell may append points in its callback.
         self._lock = threading.RLock()
         self._paths = [PathLeft.of(plan, spline or spline_of(plan))]
         #: The pending changes, each with the joints at its point [rad].
@@ -68,9 +68,9 @@ class RunningPath:
 
     def _pass_points(self, place: float) -> None:
         """
-        Change the cell at the points before a place.
+        Change the cell at the points that the arm has left.
 
-        :param place: a number ``k + u``: the fraction u of the segment to point k.
+        :param place: where the arm is: ``k + u`` is the fraction u of the segment to point k.
         """
         if not self._part_changes:
             return
@@ -94,7 +94,7 @@ class RunningPath:
 
     def check(self, arm: Arm, options_now: Callable[[], PlanningOptions]) -> None:
         """
-        Check the rest of the path in another cell.
+        Check the rest of the path in the present cell.
 
         :param options_now: returns the options, whose cell does not have the pending changes.
         :raises GoalRefused: the path would touch a body, or its joints are unknown.

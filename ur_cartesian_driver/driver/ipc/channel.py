@@ -88,14 +88,14 @@ class Configure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArmSetup:
-    """The arm, with its calibration and its limits, as far as they are known."""
+    """The arm's model and geometry, with the limits and the calibration that the robot reports."""
 
     model: RobotModel
     geometry: DhTable
 
     @classmethod
     def of(cls, arm: Arm) -> ArmSetup:
-        """Return the model and geometry of an arm; sending the arm itself would take long."""
+        """Return the model and geometry of an arm, which are sent faster than the arm itself."""
         return cls(model=arm.model, geometry=arm.geometry)
 
 
@@ -202,7 +202,7 @@ class Shutdown:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatusChanged:
-    """The status changed."""
+    """The status of the connection changed."""
 
     status: ConnectionStatus
 
@@ -367,7 +367,7 @@ def pack_parts(message: Request | Notification) -> list[Buffer]:
     try:
         refusal = pickle.dumps(refusal_of(message, UNREADABLE))
         body = pickle.dumps(message, protocol=5, buffer_callback=keep_inside)
-    except Exception as error:  # pickling calls methods of every object in the message
+    except Exception as error:  # pickling calls methods of all objects, which may raise anything
         raise LocalProtocolError(
             f'{type(message).__name__} cannot be sent to the robot process: {error}.'
         ) from error
@@ -396,7 +396,7 @@ def unpack(body: bytes) -> Request | Notification:
             arrays.append(whole[first : first + size])
             stream.seek(first + size)
         message: Request | Notification = pickle.load(stream, buffers=arrays)
-    except Exception as error:  # unpickling calls the functions that the bytes name
+    except Exception as error:  # unpickling calls functions that may raise anything
         raise Unreadable(f'{type(error).__name__}: {error}', refusal) from error
     return message
 
@@ -407,6 +407,7 @@ def receive(pipe: socket.socket) -> Request | Notification | None:
 
     :param pipe: a blocking socket; its timeout is the longest silence allowed.
     :returns: the message; None if the pipe was closed, or was silent for longer than its timeout.
+    :raises Unreadable: the message cannot be decoded.
     """
     head = _read(pipe, LENGTH.size)
     if head is None:

@@ -25,7 +25,7 @@ from ur_cartesian_driver.motion.state.rtde_state import RobotState, STATE_TABLE
 _COUNTER = struct.Struct('<Q')
 #: The number of values in the field types with more than one value.
 _SIZES = {Vector6: 6, Pose: 7}
-#: The data in the memory: a flag whether there is a state, then all fields of the table.
+#: The data in the memory: a flag whether there is a state, then all fields of ``STATE_TABLE``.
 _DATA = struct.Struct(
     '<?'
     + ''.join(
@@ -55,7 +55,7 @@ def _compile_pack() -> Callable[[RobotState], bytes]:
 
 
 def _readers() -> Iterator[tuple[int | slice, Callable[[Any], Any]]]:
-    """Yield the place of each field's numbers, and the function that converts them."""
+    """Yield for each field the index or slice of its numbers, and a function to convert them."""
     start = 1
     for row in STATE_TABLE:
         size = _SIZES.get(row.type, 1)

@@ -12,7 +12,7 @@ from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
 from ur_cartesian_driver.robot.services.service_calls import EndContactWatchCall, failed
 from ur_cartesian_driver.robot.services.service_dispatcher import ServiceDispatcher
 
-#: Largest number of concurrent calls; only a call that ends a watch may exceed it.
+#: Largest number of concurrent calls; only a call that ends a contact watch may exceed it.
 MAX_CALLS = 32
 
 
@@ -35,7 +35,7 @@ class CallRunner:
 
     def start(self, request: CallRobot) -> None:
         """Carry out a call, or refuse it if too many are being carried out."""
-        # Only this call can end a watch for contact.
+        # Nothing but an EndContactWatchCall ends a watch for contact, so it is never refused.
         if self._running < MAX_CALLS or isinstance(request.call, EndContactWatchCall):
             self._running += 1
             self._spawn(self._answer(request))

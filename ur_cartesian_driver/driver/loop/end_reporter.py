@@ -25,12 +25,12 @@ CODES_WITH_CAUSE = frozenset(
         ErrorCode.EXECUTION_FAILED,
     }
 )
-#: Outcomes whose cause the robot sends on another connection, in the same cycle or soon after.
+#: Outcomes whose cause the robot sends on another connection, at the same time or soon after.
 CODES_WITH_LATE_CAUSE = frozenset({ErrorCode.PROTECTIVE_STOP, ErrorCode.EMERGENCY_STOP})
 #: Longest wait for such a cause [s].
 CAUSE_TIMEOUT = 0.05
-#: Reports up to this long before the start of a motion can explain its end [s]: a program fails
-#: some cycles before its sockets close.
+#: An error of the robot up to this long before the start of a motion can explain its end [s],
+#: because a program that fails closes its sockets only some cycles later.
 CAUSE_LEAD = 0.1
 
 
@@ -45,7 +45,7 @@ class EndReporter:
         self._outputs = outputs
         #: The end that still waits for its cause, or for its outputs to be written; None = none.
         self._pending: MotionEnded | None = None
-        #: Only reports since this time can explain the end [s].
+        #: Only errors of the robot since this time can explain the end [s].
         self._since = -inf
 
     def begin(self) -> None:

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Make the machine of a motion, with the feeder of its execution mode.
+Make the goal machine of a motion, with the feeder of its execution mode.
 
 :data:`FEEDERS` has an entry for each execution mode. Live targets and freedrive have the mode
 SERVO.
@@ -61,14 +61,15 @@ def make_machine(request: StartMotion, config: DriverConfig) -> GoalMachine:
 
 
 def point_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
-    """Return the feeder for points that are all known, appended, or displaced by offsets."""
+    """Return the feeder of a goal in points: displaced by offsets, all known, or appended."""
     monitor = _monitor(request, config)
     if request.job.offset_band is not None:
         return OffsetPointFeeder(monitor, request.job.offset_band)
     if not request.job.keep_open:
         return PointFeeder(monitor)
-    # The last piece on the wire begins within the horizon of the feeder, and so ends within the
-    # horizon of the goal. Once no more points can come in time, the ending is sent.
+    # A piece is at most 1 / PIECES_PER_HORIZON of the replace horizon long. The last piece sent
+    # begins within the shorter horizon of the feeder, so it ends within the replace horizon. The
+    # margin is cut, too: the ending is sent only once no more points can come in time.
     horizon = (1.0 - 1.0 / PIECES_PER_HORIZON) * (request.job.replace_horizon or inf)
     return AppendFeeder(
         monitor,

@@ -24,7 +24,8 @@ from ur_cartesian_driver.driver.loop.robot_loop import serve
 
 #: The module that the process runs.
 MODULE = 'ur_cartesian_driver.driver'
-#: A robot loop that sends nothing for this long [s] hangs: it should send a heartbeat every 0.5 s.
+#: A robot loop that sends nothing for this long [s] counts as hanging: its heartbeats come every
+#: 0.5 s.
 SILENCE_TIMEOUT = 5.0
 #: Longest wait for a robot loop's first message [s]: a new process first imports modules.
 START_TIMEOUT = 20.0

@@ -88,7 +88,8 @@ from ur_cartesian_driver.robot.rtde.register_connection import (
     servo_exchange,
 )
 
-#: Data of this size [bytes] or more takes longer than a few milliseconds to unpack or prepare.
+#: Data of this size [bytes] or more is handled in a thread, because that takes longer than a few
+#: milliseconds.
 MIN_THREAD_SIZE = 1 << 18
 #: Longest wait at shutdown for the recording of the last motion [s].
 RECORD_TIMEOUT = 1.0
@@ -216,7 +217,11 @@ class MotionRunner:
             self._machine.can.displacing.set_offset(request.offset, request.age, _now())
 
     def set_feed_override(self, request: SetFeedOverride) -> None:
-        """Give the running motion another feed; ignore a feed for another motion."""
+        """
+        Give the running motion another feed.
+
+        A feed for another motion is ignored; with ``feed_override_input`` every feed is.
+        """
         is_open = not self._config.feed_override_input
         if is_open and request.motion == self._number and self._machine is not None:
             self._machine.can.overriding.set_feed(request.fraction, request.age, _now())
@@ -245,7 +250,11 @@ class MotionRunner:
     # ---- events and commands ------------------------------------------------------------------
 
     def handle_event(self, event: Event) -> None:
-        """Pass an event to the running motion's machine, and carry out the machine's commands."""
+        """
+        Pass an event to the running motion's machine, and carry out the machine's commands.
+
+        If no motion runs, a robot state goes to the :class:`TcpRestorer`.
+        """
         if self._machine is not None:
             self._step(self._machine, event)
         elif isinstance(event, StateReceived):
@@ -358,7 +367,7 @@ class MotionRunner:
             self._inputs = None
 
     def _set_temporary_tcp(self, T_flange_tcp: Pose) -> None:
-        """Set the TCP for a goal, and first tell the owner, in case this process dies."""
+        """Set the TCP for a goal; tell the owner first, so that the next loop can restore it."""
         assert self._machine is not None
         assert self._machine.temporary_tcp is not None
         temporary_tcp = self._machine.temporary_tcp

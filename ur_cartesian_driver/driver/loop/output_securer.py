@@ -20,7 +20,11 @@ RETRY_PERIOD, RETRY_TIMEOUT = 0.25, 5.0
 
 
 class OutputSecurer:
-    """Carries out one order after the other; a new order replaces all unwritten ones."""
+    """
+    Writes the outputs of one order after the other; a new order replaces all unwritten ones.
+
+    An order is one call of :meth:`secure`.
+    """
 
     def __init__(
         self,

@@ -20,7 +20,7 @@ class PointBuffer:
         return len(self._data) // POINT_SIZE
 
     def put(self, behind: int, data: bytes) -> None:
-        """Replace all records of the goal, except its first ``behind`` ones."""
+        """Keep the first ``behind`` records of the goal, and replace all others by ``data``."""
         del self._data[(behind - self._first) * POINT_SIZE :]
         self._data += data
 

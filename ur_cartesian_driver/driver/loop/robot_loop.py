@@ -3,10 +3,10 @@
 """
 The robot loop: one asyncio loop that owns the sockets and the machine of the running goal.
 
-The loop never imports ROS. If it runs in its own process, the owner cannot delay a message that
-the robot waits for: receiving a goal of 100,000 points holds Python's interpreter lock for
-seconds. The loop can also run in a thread. A pipe for messages and shared memory for the newest
-robot state connect the loop to its owner, see :mod:`~ur_cartesian_driver.driver.loop.loop_host`.
+The loop never imports ROS. In a process of its own, it sends the robot's messages on time while
+the owner receives a goal of 100,000 points, which holds Python's interpreter lock for seconds. The
+loop can also run in a thread. A pipe for messages and shared memory for the newest robot state
+connect the loop to its owner, see :mod:`~ur_cartesian_driver.driver.loop.loop_host`.
 
 When the pipe closes, the loop closes its sockets, and the robot program stops the arm and ends.
 When the owner is silent for too long, the loop stops the arm.
@@ -113,7 +113,7 @@ class RobotLoop:
             )
 
     async def run(self, requests: asyncio.StreamReader) -> None:
-        """Serve until the owner shuts down, hangs up or falls silent."""
+        """Serve until the owner sends :class:`Shutdown` or the pipe closes."""
         self._last_heartbeat = self._now()
         try:
             async with asyncio.TaskGroup() as tasks:
@@ -123,8 +123,8 @@ class RobotLoop:
                     await self._serve_requests(requests)
                 finally:
                     self._motion.close()
-                    # This needs the open link. Our robot program would restore the TCP by
-                    # itself, but another program may be running.
+                    # Only while the link is open can the TCP be restored. Our robot program would
+                    # restore it by itself, but another program may be running.
                     self._tcp_restorer.restore_if_due(self._newest.latest)
                 for task in (link, ticks, *self._tasks):
                     task.cancel()

@@ -3,7 +3,8 @@
 """
 A recording as comma-separated values: a row for each packet, with its deviation from the plan.
 
-The titles are the names of the columns with their units, in the form that the import reads.
+The titles are the names of the columns with their units, in the form that the driver's own import
+of CSV files reads.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from ur_cartesian_driver.driver.recordings.recording_format import EXECUTED_DTYP
 _POSE = ('x [m]', 'y [m]', 'z [m]', 'qx', 'qy', 'qz', 'qw')
 _TWIST = ('x [m/s]', 'y [m/s]', 'z [m/s]', 'rx [rad/s]', 'ry [rad/s]', 'rz [rad/s]')
 _WRENCH = ('fx [N]', 'fy [N]', 'fz [N]', 'tx [Nm]', 'ty [Nm]', 'tz [Nm]')
-#: For columns of several numbers: the suffixes of their titles, by the last word of the name.
+#: The suffixes of the titles of a column with several numbers, by the last word of its name.
 _PARTS = {
     'pose': _POSE,
     'twist': _TWIST,

@@ -3,8 +3,8 @@
 """
 A recording as MCAP with messages of ROS 2, for Foxglove, PlotJuggler, rosbag2 and others.
 
-Topics keep the names and types that the node uses, so one layout fits both. A message's time is
-the start of the recording plus the time of its packet or event.
+Topics have the names and types that the ROS node uses, so that one layout of a viewer fits both.
+The log time of a message is the start of the recording plus the time of its packet or event.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _INFO, _WARN, _ERROR = 20, 30, 40  # levels of rcl_interfaces/Log
 _WARNINGS = ('cancel', 'safety', 'robot')
 
 _Message: TypeAlias = dict[str, Any]
-#: A message with its log time: log time [ns], topic, type, message.
+#: Log time [ns], topic, type, message.
 _Record: TypeAlias = tuple[int, str, str, _Message]
 
 

@@ -141,8 +141,8 @@ class Recorder:
         # Buffers for rows: the buffer being filled, the bytes used in it, and the free buffers.
         self._buffer, self._used = bytearray(), 0
         self._free_buffers: SimpleQueue[bytearray] = SimpleQueue()
-        #: Start of the motion by the controller's clock [s]; since then, the time of the newest
-        #: packet, and the time at which the buffer is due [s].
+        #: Start of the motion by the controller's clock [s]. From then on: time of the newest
+        #: packet, and time at which the buffer must be written [s].
         self._start_time = self._time = self._flush_due = 0.0
         self._digital, self._analog = -1, (nan, nan)
         #: The previous goal's count of begun points, while the robot still reports it.
@@ -292,7 +292,8 @@ class Recorder:
 
     def _flush(self, folder: RecordingFolder) -> None:
         """Have the filled rows written, and go on in another buffer."""
-        # A writer that outlives close() must not return its buffer to the next recording.
+        # write() keeps this queue: a writer that outlives close() must not put its buffer into
+        # the queue of the next recording.
         buffer, used, free_buffers = self._buffer, self._used, self._free_buffers
         self._used, self._flush_due = 0, self._time + FLUSH_PERIOD
         try:
@@ -306,7 +307,7 @@ class Recorder:
             free_buffers.put(buffer)
 
         if self._writer is not None:
-            self._writer.submit(write)  # never more waiting jobs than buffers
+            self._writer.submit(write)  # at most one waiting job for each buffer
 
     def _submit(
         self, folder: RecordingFolder, work: Callable[[], None], *, always: bool = False

@@ -96,7 +96,7 @@ class Recording:
     analog_output: Floats = field(repr=False)
     #: (n,) digital outputs as bits: 0-7 standard, 8-15 configurable, 16-17 tool; -1 = unknown.
     digital_output: Int32s = field(repr=False)
-    #: (n,) counts of pulses, which :attr:`pulses` reads.
+    #: (n,) counts of pulses of all outputs in one number, which :attr:`pulses` takes apart.
     pulse_counts: Int32s = field(repr=False)
     #: (n,) number of motions that the robot program has begun; the goal's point to which the arm
     #: moves, -1 = unknown.
@@ -129,7 +129,7 @@ class Recording:
         except _NoRecording:
             raise
         except Exception as error:  # NumPy, zipfile, zlib and json each raise their own errors
-            # EINVAL: a corrupt file refers to a place before its beginning.
+            # EINVAL means damage, too: the file refers to an offset before its start.
             if isinstance(error, OSError) and error.errno != EINVAL:
                 raise
             raise ValueError(f'{path} is damaged: {error}') from error
@@ -166,7 +166,7 @@ class Recording:
     @property
     def pulses(self) -> dict[str, NDArray[np.int_]]:
         """
-        (k,) the packet that shows each pulse, by output, such as 'standard_digital 2'.
+        Indices (k,) of the packets that show a pulse, by output, such as 'standard_digital 2'.
 
         A packet that shows several pulses, because packets were lost, is listed once for each.
         """
@@ -230,7 +230,7 @@ class Recording:
 
     def deviation(self) -> RecordedDeviation:
         """
-        Compare with the plan, packet by packet.
+        Return the deviation from the plan, packet by packet.
 
         The target is followed along the path, only forwards; the measured pose is compared with
         the nearest place on the path around the target. So a path that crosses itself is followed

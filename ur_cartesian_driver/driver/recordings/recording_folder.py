@@ -71,7 +71,8 @@ class RecordingFolder:
         self._path = _new(self._directory / f'{recording_name(self._metadata)}{disk.PART_SUFFIX}')
         self._rows = disk.GrowingArray(self._path / disk.EXECUTED_FILE, disk.EXECUTED_DTYPE)
         # The lock shows that this process writes the folder; the system releases the lock when
-        # the process ends. A process of another arm holds it only for a short check.
+        # the process ends. The driver of another arm may hold the lock, but only for the moment
+        # in which it checks whether the folder is in use.
         fcntl.flock(self._rows.file, fcntl.LOCK_EX)
         self._plan = disk.GrowingArray(self._path / disk.PLANNED_FILE, disk.PLANNED_DTYPE)
         self._events = open(self._path / disk.EVENTS_FILE, 'xb', buffering=0)  # noqa: SIM115  # open until close()
@@ -108,7 +109,7 @@ class RecordingFolder:
         self._events.write(json.dumps([time, kind, text[: disk.MAX_EVENT_TEXT]]).encode() + b'\n')
 
     def close(self, outcome: dict[str, Any]) -> None:
-        """Write the outcome."""
+        """Write the outcome into the metadata; :meth:`finish` closes the files."""
         self._metadata.update(outcome=outcome, rows_left_out=self.lost_rows)
         if not (self.is_plan_whole or self._metadata['trouble']):
             self._metadata['trouble'] = (
@@ -147,7 +148,8 @@ class RecordingFolder:
             )
 
     def _write_metadata(self) -> None:
-        written = self._path / f'{disk.METADATA_FILE}.new'  # the old file is valid until then
+        # The old file stays valid until the new one replaces it.
+        written = self._path / f'{disk.METADATA_FILE}.new'
         written.write_text(json.dumps(self._metadata), encoding='utf-8')
         written.replace(self._path / disk.METADATA_FILE)
 

@@ -69,7 +69,7 @@ ADDED_COLUMNS = {'wrench': np.nan, 'pulse_counts': 0}
 #: One sample of the planned path.
 PLANNED_DTYPE = np.dtype([('time', '<f8'), ('pose', '<f8', 7), ('point', '<i4')])
 
-#: Suffix of a folder's name.
+#: Suffix of the folder of an unfinished recording.
 PART_SUFFIX = '.part'
 #: Names of the files in a folder.
 METADATA_FILE, EVENTS_FILE = 'metadata.json', 'events.jsonl'
