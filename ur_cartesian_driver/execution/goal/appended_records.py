@@ -25,7 +25,7 @@ _ACCEPTS_POINTS = frozenset(
 
 
 class AppendedRecords(Phrasing, Reporting):
-    """Counts the records that will certainly run, and the arm's stops for lack of more."""
+    """Counts the records that will certainly run, and the stops because no more points came."""
 
     def __init__(self, monitor: GoalMonitor) -> None:
         """Begin with the records of the goal's first points."""

@@ -67,6 +67,7 @@ class SendSafeOutputs(GoalCommand):
     """Have the robot program store, set or forget safe values, or restore outputs."""
 
     action: SafeOutputsAction
+    #: The robot program reports this number once it has carried out the command.
     token: int
     outputs: tuple[SafeOutput, ...]
 

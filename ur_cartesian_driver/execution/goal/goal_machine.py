@@ -106,7 +106,8 @@ class GoalMachine:
         self._monitor = feeder.monitor
         self._ignored_stops = RESUMABLE_STOPS if resume_after_stop else NO_STOP
         self._max_state_age = max_state_age or inf
-        #: The time of the robot's state in the newest packet [s]; None = not known yet.
+        #: When the state in the newest packet was measured, by the clock of :meth:`step` [s]; None
+        #: = not known yet.
         self._packet_time: float | None = None
         self._feedback_period = feedback_period
         self._next_report = -inf
@@ -367,8 +368,8 @@ class GoalMachine:
             self.outcome.decide(transition.code, text, signal, before)
         if self.state is before:
             return []
-        # If the feeder left its mode while the safe outputs are armed, the program would set them.
-        # After a success they are disarmed first, and the feeder leaves its mode in ENDED.
+        # If the program left the servo while the safe outputs are armed, it would set them. So
+        # after a success they are disarmed first, and the feeder makes it leave in ENDED.
         succeeds = self.outcome.succeeds
         disarms_first = self.state is GoalState.RESTORING and succeeds and self._guard
         commands = [] if disarms_first else self.feeder.enter(self.state, self._packet)

@@ -157,7 +157,7 @@ class GoalMonitor:
         """Find the position of the controller's target on the path."""
         begun, fastest = self._motions_begun, tracker_speed(state.target_tcp_twist)
         self._has_begun = self._has_begun or begun > self._motions_before or fastest > 0.0
-        if before is not None:  # the tool may have braked since that packet
+        if before is not None:  # the tool may have braked since the packet before
             fastest = max(fastest, tracker_speed(before.target_tcp_twist))
         running = self.records.running_waypoints(begun, behind)
         if running is not None and running[1] < running[0] and self._press() is not None:
@@ -422,7 +422,11 @@ class GoalMonitor:
         return Pose(add(planned.position, shift), planned.quaternion) if any(shift) else planned
 
     def _tracked(self, pose: Pose) -> Pose:
-        """Return a pose without path offset and yield; yield that may be progress stays."""
+        """
+        Return a pose without the path offset, and without the way that the tool gives in a press.
+
+        The share of that way that may be progress along the path is kept.
+        """
         pose, press = self._undisplaced(pose), self._press()
         if press is None or self._tracker.time() > press.end:
             return pose
@@ -432,7 +436,7 @@ class GoalMonitor:
         )
 
     def _stiff(self, pose: Pose) -> Pose:
-        """Return a pose as it would be without the path offset and the yield of the press."""
+        """Return a pose as it would be without the path offset and if the press were rigid."""
         pose, press = self._undisplaced(pose), self._press()
         return pose if press is None else press.without_yield(self._tracker.pose(), pose)
 

@@ -38,7 +38,7 @@ class GoalOutcome:
 
         :param before: the state before the transition.
         """
-        cause = cause.rstrip('.')  # robots and libraries write whole sentences
+        cause = cause.rstrip('.')  # the texts of robots and libraries are whole sentences
         if before is GoalState.PROGRAM_LOST:  # the new text says why the program ended
             cause = f'{cause}; before that, {self.cause}'
         if signal is not GoalSignal.UNCONFIRMED:

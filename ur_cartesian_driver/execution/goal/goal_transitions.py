@@ -15,8 +15,8 @@ state, and the error code if the signal decides the outcome of the goal.
   would not read our CANCEL; our own reasons to stop (cancel, preemption, tolerance, a change of
   the cell) lead to CANCELLING.
 * **RUNNING_OUT**: no more points came in time for an open goal (keep_open). The ending, which
-  brings the arm to rest at or after the last known point, has been sent, with the number of
-  records. Points that come now wait for the program's SUCCESS, and are executed from rest.
+  brings the arm to rest at or after the last known point, has been sent, and so has the number of
+  all records. Points that come now wait for the program's SUCCESS, and are executed from rest.
 * **AWAITING_POINTS**: the arm rests after the ending, and the program has no trajectory. APPENDED
   starts the next trajectory; NO_MORE_POINTS (the client closed the goal) leads to SETTLING. If
   neither comes within ``keep_open_timeout``, the goal was abandoned, and ends as CANCELLED.
@@ -25,8 +25,8 @@ state, and the error code if the signal decides the outcome of the goal.
   at the last point, the program skipped motions (DEVIATION).
 * A goal that ends when the tool touches (CONTACT) succeeds without SETTLING: the program has
   moved the arm back to the place of contact. If a watch beside the goal ends it at contact
-  (TOUCHED), the goal fails, even at rest between or after its trajectories. It is cancelled, too:
-  the program may have read START just after the contact, and then runs the trajectory.
+  (TOUCHED), the goal fails, even at rest between or after its trajectories. It is cancelled, too,
+  because the program may have read START just after the contact, and would run the trajectory.
 * **CANCELLING**: CANCEL has been sent. The program brakes, discards the points that it has not
   run and answers CANCELED. A SUCCESS in this state means that the last point was reached before
   the program read CANCEL; this is not the answer to CANCEL: CANCELED still follows.
@@ -36,8 +36,8 @@ state, and the error code if the signal decides the outcome of the goal.
   finds it, and until the program confirms the safe outputs. A goal that set no TCP and has no safe
   outputs ends at once.
 * **PROGRAM_LOST**: the robot program is gone. Often the cause is a safety stop, a power cut or a
-  dead controller, and all of these may be reported in any order; so for a moment a deeper reason
-  can still replace this one.
+  dead controller, and all of these may be reported in any order; so for ``CAUSE_TIMEOUT`` a deeper
+  reason can still replace the end of the program.
 * **ENDED**: the outcome has been reported. Later events are ignored.
 
 Nearly every state has a deadline (:mod:`~.missed_deadlines`). If CANCEL is not answered in time,

@@ -30,8 +30,8 @@ class PulseCounter:
         """
         Return the new pulses in a packet, by output and in the order of their numbers.
 
-        The packet shows the cycle of the newest one. After a loss of packets, only the times and
-        poses of the earlier ones are lost.
+        The newest pulse of each output has the time and pose of the packet. If packets were lost,
+        earlier pulses of that output get the same time, and no pose.
         """
         before, self._register = self._register, packet.pulse_counts
         if before == packet.pulse_counts or not self._outputs:

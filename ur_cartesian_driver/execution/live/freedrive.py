@@ -36,7 +36,7 @@ class FreedriveFeeder(ServoFeeder, Phrasing):
     def interpret(self, event: Event, state: GoalState) -> Meaning | None:
         """Return the meaning of a failure of freedrive, else of the servo's phase."""
         if isinstance(event, ServoReceived) and self.stream.failure:
-            # A program that is about to end first ends freedrive by itself.
+            # A program that is about to end first ends freedrive, so that is the likely cause.
             signal = GoalSignal.PROGRAM_STOPPED if self.stream.is_active else GoalSignal.FAILURE
             return signal, self.stream.failure
         return super().interpret(event, state)

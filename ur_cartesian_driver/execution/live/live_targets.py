@@ -66,7 +66,7 @@ class LiveTargets(Steerable, Ageing, Reporting):
         self._reasons: dict[str, str] = {}
 
     def set_target(self, T_base_tcp: Pose, age: float, now: float) -> None:
-        """Accept a target."""
+        """Accept a target, unless it is older than ``max_age`` or than a newer one."""
         self._last_came = now
         if not self.freshness.accept(age, now):
             return
@@ -74,7 +74,7 @@ class LiveTargets(Steerable, Ageing, Reporting):
         self.generator.set_target(T_base_tcp)
 
     def age(self, now: float) -> list[GoalCommand]:
-        """Drop a stale target, end the session after its timeout, warn of a limit."""
+        """Drop a stale target, end the session after its timeout, warn if the arm is blocked."""
         generator = self.generator
         if not generator.blocked:
             self._warnings.forget()

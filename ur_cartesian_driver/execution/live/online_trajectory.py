@@ -76,7 +76,7 @@ class LiveLimits:
     joint_velocity: Vector6 = (inf,) * 6
     #: Margins to the singularities: wrist [rad], elbow [rad], shoulder [m]; 0 = no limit.
     singularity_margins: Vector3 = (0.05, 0.05, 0.02)
-    #: Workspace planes and self-clearance.
+    #: Workspace planes, bodies of the cell and self-clearance.
     workspace: LiveWorkspace = field(default_factory=LiveWorkspace)
 
     def __post_init__(self) -> None:
@@ -164,8 +164,8 @@ class OnlineTrajectoryGenerator:
 
         :param dt: nominal time from the last set-point to this one [s].
         """
-        # The last speed was chosen so that the arm can brake in cycles of the last length; in
-        # shorter cycles it could not.
+        # The last speed was chosen so that the arm can brake with the change of velocity that a
+        # cycle of the last length allows. A shorter cycle would allow less, and may not suffice.
         change, self._dt = max(dt, self._dt), dt
         if self.blocked and self._is_target_new and self.at_rest:
             self._is_target_new = False
@@ -205,7 +205,7 @@ class OnlineTrajectoryGenerator:
     def _move(self, linear: Vector3, angular: Vector3, dt: float) -> None:
         """Take a step, shortened if a joint would be too fast."""
         pose, q = self._next_pose(linear, angular, dt)
-        if q is None:  # only by rounding, because earlier cycles have checked the way
+        if q is None:  # only by rounding, because earlier cycles have checked the braking path
             reason = explain_unreachable(self._arm, pose @ self._T_tcp_flange)
             self.blocked = self.blocked or reason or 'the joint positions jump'
             self.linear = self.angular = ZERO3
@@ -250,7 +250,7 @@ class OnlineTrajectoryGenerator:
         return self._bounds_check.violation(q, self.q)
 
     def _is_path_clear(self) -> bool:
-        """Return whether the tool can go towards the target again for a minimal distance."""
+        """Return whether the path to the target is clear for :data:`_MIN_RESTART_MOTION`."""
         if self.target is None:
             return False
         ratio = max(

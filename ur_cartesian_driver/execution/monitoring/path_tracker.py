@@ -83,7 +83,7 @@ class Edge(NamedTuple):
     length_squared: float
 
     def nearest(self, point: TrackerPoint, lowest: float, highest: float) -> tuple[float, float]:
-        """Return the fraction of the edge nearest to a point, and its distance."""
+        """Return the fraction nearest to a point, ``lowest`` to ``highest``, and its distance."""
         # Seven numbers written out take half the time of loops over them.
         px, py, pz, pa, pb, pc, pd = point
         ox, oy, oz, oa, ob, oc, od = self.origin
@@ -340,7 +340,11 @@ class PathTracker:
         return self._at(self._time)
 
     def direction(self) -> Vector3:
-        """Return the direction of the path ahead, a unit vector; zeros if the path only turns."""
+        """
+        Return the direction of the path ahead, a unit vector.
+
+        Zeros if the path only turns there, or has ended.
+        """
         row = self.path_position.row + (self.path_position.fraction > AT_END)
         while row < self.last_row:
             x, y, z, *turn = self._edge(row).vector
@@ -436,7 +440,7 @@ class PathTracker:
         away = np.array(point) - start
         length_squared = np.einsum('ij,ij->i', edge, edge)
         along = np.einsum('ij,ij->i', away, edge)
-        with np.errstate(over='ignore'):  # absurd reported positions: an edge's end is nearest
+        with np.errstate(over='ignore'):  # an absurd reported position: an edge's end is nearest
             fraction = np.divide(
                 along, length_squared, out=np.ones_like(along), where=length_squared > 0.0
             )

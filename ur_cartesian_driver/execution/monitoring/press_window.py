@@ -25,7 +25,7 @@ from ur_cartesian_driver.motion.geometry.pose import (
 from ur_cartesian_driver.motion.geometry.vectors import add, subtract, Vector3, vector3, Vector6
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
-#: Tolerance for the tracker's time at a point where the arm stands still [s].
+#: The tracker's time may be off by this at a point where the arm stands still [s].
 POINT_TIME_TOLERANCE = 0.01
 _YIELDS = (('m', 'along', 'max_yield'), ('rad', 'about', 'max_yield_angle'))
 

@@ -22,7 +22,7 @@ from ur_cartesian_driver.motion.plan.plan import ReferencePath
 
 #: The peak speed of a motion from rest to rest is at most twice its average speed.
 PEAK_TO_MEAN = 2.0
-#: Margins on the limits [m/s], [rad/s], so that a plan that hardly moves has limits, too.
+#: Margins on the limits [m/s], [rad/s], so that no limit is near 0 for a plan that hardly moves.
 SPEED_MARGINS = (0.02, 0.1)
 #: The longest duration is this multiple of the planned one, plus this time to begin [s].
 MAX_SLOWDOWN, MAX_START_DELAY = 20.0, 3.0

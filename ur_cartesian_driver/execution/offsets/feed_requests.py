@@ -5,7 +5,8 @@ The signal that overrides the feed of a goal: the newest value, its age, and a r
 
 The signal may come at any time, jump, stop or be nonsense. A valid value, 0 to 1, is cut to the
 bounds of the goal. Without a valid value the lower bound applies, because a higher feed might harm
-the process. Whichever side runs the motion changes the feed at the goal's rate.
+the process. The driver or the robot program, whichever times the motion, changes the feed at the
+goal's rate.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ class FeedRequests(Overridable, Ageing, Reporting):
         self.bounds, self._input = bounds, feed_input
         self._freshness, self._warnings = Freshness(bounds.timeout), RareWarnings()
         self._newest = bounds.minimum
-        #: Whether no value has come yet, which is no loss.
+        #: Whether no value has come yet: an invalid first value is warned of, but loses no signal.
         self._is_silent = True
         self._is_valid = False
         self._invalid = self._lost = 0

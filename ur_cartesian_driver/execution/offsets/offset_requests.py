@@ -72,7 +72,7 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
     def target(self, time: float) -> Vector3:
         """Return the offset to which the tool should move, at a time of the motion [s]."""
         if not self._band.opens(time):
-            if self._is_stale:  # the path may have turned by the time it opens again
+            if self._is_stale:  # the offset may not suit the path where it opens again
                 self._newest = ZERO3
             return ZERO3
         return ZERO3 if self._is_stale and self._fades else self._newest

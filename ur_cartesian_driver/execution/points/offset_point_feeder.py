@@ -71,7 +71,8 @@ class OffsetPointFeeder(PointFeeder, Prepared, Displaced):
 
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
         """Return START with the first points, CANCEL, or the command that releases the inputs."""
-        # Numbers that were written but not read would count for the next goal.
+        # Offsets are written only for a motion: a sequence number that the program does not read
+        # now would count for the next goal.
         self._moves = self._is_read = state is GoalState.MOVING
         commands = super().enter(state, packet)
         if state in (GoalState.RESTORING, GoalState.ENDED) and not self._is_closed:

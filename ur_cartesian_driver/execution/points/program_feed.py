@@ -55,6 +55,7 @@ class ProgramFeed(FeedRequests, Prepared):
         self.read_input(packet, now)
         if self._first_delay is None:
             self._first_delay = packet.feed_delay
-        # Until the program has read START, it reports the feed of an earlier goal.
+        # Until the program has read START, it reports the feed of an earlier goal, which may be
+        # below the minimum of this one.
         value = max(self.bounds.minimum, packet.feed_override)
         return self.noted(value, packet.feed_delay - self._first_delay)

@@ -105,6 +105,6 @@ class AppendServoFeeder(ServoFeeder, Appendable):
             packet = self.monitor.latest
             if state is GoalState.RUNNING_OUT and packet is not None and is_at_rest(packet):
                 return GoalSignal.SUCCESS, ''
-            if self._stop_time < inf:  # no arrival: `supply` signals STARVING with the next packet
+            if self._stop_time < inf:  # not at the end: `supply` signals STARVING at next packet
                 return NO_MEANING
         return super().interpret(event, state)

@@ -117,7 +117,7 @@ class OffsetSetpoints(Displaced):
         self._before = ZERO3
         #: Displacement of the newest set-point from the joints on the path [rad].
         self._change: Vector6 = ZERO6
-        # The newest set-points: joints, shift in the frame of the goal, offset along the path.
+        # The newest set-points: joints, shift of the tool, offset in the frame of the path.
         self._history: Floats = np.zeros((HISTORY, 12))
         self._count = self._seen = 0
 

@@ -28,7 +28,7 @@ MAX_RATE = 1.5
 CORRECTION_TIME = 0.05
 #: Bound on the change of the rate [1/s].
 MAX_RATE_CHANGE = 50.0
-#: Largest number of control steps that a set-point covers: above 1 for the clock to catch up.
+#: Largest number of control steps that a set-point covers: above 1, so that the clock catches up.
 MAX_STEPS = 2
 #: Largest number of control steps that the clock makes up for after late packets.
 MAX_PENDING_STEPS = 10

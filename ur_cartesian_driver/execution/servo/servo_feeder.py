@@ -147,9 +147,9 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
                 # No inputs are written in RESTORING, so the program must not wait for a write.
                 return self._leave()
             case GoalState.CANCELLING | GoalState.PROGRAM_LOST:
-                # A program that is started after this must not find set-points in the inputs.
-                # A program that still discards points has not read the request to leave: it would
-                # read the set-points of the next goal, and leave then.
+                # IDLE is written, so that a program started later finds no set-points in the
+                # inputs. A program with points reads IDLE only after it has discarded them: the
+                # stream waits for its CANCELED, or the program would leave in the next goal.
                 self.stream.may_leave = self._points is None or state is not GoalState.CANCELLING
                 commands = self._points.enter(state, packet) if self._points is not None else []
                 return commands + self._stop()
@@ -177,7 +177,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
             self._last_read, self._last_answer = event.feedback.last_sequence, now
         if not self.stream.may_leave:
             self._cancelled_at = now if self._cancelled_at is None else self._cancelled_at
-            # A program that is paused answers nothing, and takes no next goal.
+            # A paused program does not answer, but it takes no next goal either.
             is_late = now > self._cancelled_at + CANCEL_TIMEOUT
             self.stream.may_leave = is_late or not event.feedback.playing
         before = self.stream.phase
@@ -197,7 +197,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         return self._holds[0].begin if self._holds else inf
 
     def _end_hold(self) -> None:
-        """Go on once the robot program is done at a point; the time there is no delay."""
+        """End a hold once the robot program is done at its point; allow the goal that delay."""
         if not self.monitor.job.holds:
             return
         stream = self.stream
@@ -210,14 +210,14 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
     def interpret(self, event: Event, state: GoalState) -> Meaning | None:
         """Return the meaning of the servo's phase after a packet."""
         if self._points is None and isinstance(event, TrajectoryEnded):
-            # All others are the results of an earlier goal.
+            # This goal sends no points, so all results but TOUCHED belong to an earlier goal.
             return None if event.result is TrajectoryResult.TOUCHED else NO_MEANING
         if isinstance(event, TrajectoryEnded) and event.result is TrajectoryResult.CANCELED:
             self.stream.may_leave = True
         if not isinstance(event, ServoReceived):
             return None
         if self.stream.phase is ServoPhase.ARRIVED and state is GoalState.MOVING:
-            # The robot program may still have something to do.
+            # With points, the robot program itself reports SUCCESS, after its last action.
             return (GoalSignal.SUCCESS, '') if self._points is None else NO_MEANING
         if self.stream.phase is not ServoPhase.LEFT:
             return NO_MEANING

@@ -230,6 +230,7 @@ class ServoStream:
         self.feed_target, self.feed_rate = 1.0, 0.0
         #: Total delay of the motion by the feed override [s].
         self.feed_delay = 0.0
+        #: Whether a stall slows the motion, or has slowed it and the rate is still below 1.
         self._recovers = False
         self._last_write = -inf
         self._sent = self._underruns = 0
@@ -286,7 +287,8 @@ class ServoStream:
         """Make the arm follow the set-points from now on."""
         self._apply(ServoEvent.BEGUN)
         self._first_servo = self._sequence + 1
-        # The source may have been reset since, and the first write may precede its next set-point.
+        # The source may have been reset after it gave these joints, and the first write may come
+        # before its next set-point.
         self._joints = self._source.next(0.0)
 
     def go_on(self, rest: float, next_hold: float) -> None:
