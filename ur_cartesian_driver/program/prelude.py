@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The user's functions in the robot program: goals give their names, the program numbers them."""
+"""The user's functions in the robot program: goals call them by name, the program by number."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Prelude:
         return next((function for function in self.functions if function.name == name), None)
 
     def number(self, name: str, arguments: int) -> int:
-        """Return the number of the call of a function with this many arguments."""
+        """Return the number by which the program calls a function with so many arguments."""
         return self._calls().index((name, arguments))
 
     def dispatch(self) -> Iterator[str]:

@@ -76,7 +76,7 @@ SERVO_MAX_STEPS = 50
 #: and slower than this speed [rad/s]; both are norms over all joints.
 SERVO_END_TOLERANCE, SERVO_REST_SPEED = 1e-4, 1e-3
 #: The buffered servo counts as at rest, too, if the time of the motion, delayed by the lag of
-#: servoj, is within this time [s] of the set-point's time: nine lookahead times later.
+#: servoj, is within this time [s] of the set-point's time, which takes nine lookahead times.
 SERVO_SETTLED = 1e-5
 
 #: Placeholder, above any version, for a feature that no version is known to have.
@@ -151,13 +151,13 @@ OFFSET_CONSTANTS: dict[str, float] = {
     #: Time constant [s] of the controller's filter; at 500 Hz it gives the coefficient 0.1, which
     #: the manual calls a good compromise for welding.
     'FILTER_TIME': 0.018,
-    #: The controller's default limit [rad] of rotational offsets, none of which is used.
+    #: The controller's default limit [rad] of rotational offsets; no offset here turns the tool.
     'MAX_TURN': 0.52,
     #: Fraction of its acceleration with which an offset brakes, as in the driver.
     'BRAKING': BRAKING_FRACTION,
     #: Distance [m] from its target within which an offset has arrived, as in the driver.
     'TOLERANCE': ARRIVAL_TOLERANCE,
-    #: The offset's time runs at a rate that follows the motion's: largest change [1/s].
+    #: Largest change [1/s] of the rate of the offset's time, which follows the motion's rate.
     'RATE_CHANGE': 10.0,
     #: A step of the offset's time up to this [s] does not move the offset.
     'MIN_TIME': 1e-6,
@@ -167,7 +167,8 @@ OFFSET_CONSTANTS: dict[str, float] = {
 
 #: Cycles by which an output is switched early, because it takes effect at the end of a cycle.
 OUTPUT_LEAD = 1.5
-#: A tool that has moved by this much more [m] than its speed allows has coasted into a pause.
+#: A tool that has moved in a step by this [m] more than twice the distance that its speed explains
+#: has coasted into a pause.
 OUTPUT_JUMP = 1e-4
 #: The number of words that the program keeps for a pending output.
 OUTPUT_WORDS = 18
@@ -201,7 +202,8 @@ PULSE_COLUMNS = (
 #: The slowest motion that counts as one [m per cycle]. A slower tool is at a pulse if the pulse is
 #: no farther away than this [m].
 PULSE_TOLERANCE = 1e-6
-#: Planned speed [m/s or rad/s] below which the actual speed does not give the rate of the time.
+#: Planned speed [m/s or rad/s] below which the actual speed does not give the rate of the path's
+#: time.
 LEAD_MIN_SPEED = 2e-4
 
 

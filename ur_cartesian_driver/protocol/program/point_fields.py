@@ -357,7 +357,7 @@ def motion_type(primitive: Instruction) -> MotionType:
 
 def to_fields(primitive: Instruction) -> PointFields:
     """
-    Return the 21 numbers of a primitive, in SI units.
+    Return the 21 numbers of a primitive, a stop, an output or a law, in SI units.
 
     :raises LocalProtocolError: the class is unknown, or a joint target has a q_near.
     """
@@ -460,7 +460,8 @@ def _output_kind(output: SwitchOutput) -> int:
 
 def _law_fields(law: SpeedLaw) -> PointFields:
     numbers = (law.gain, law.offset, law.minimum, law.maximum, law.filter_time, 0)
-    # The value is 1: at a stop, the robot program executes pending outputs of value 0.
+    # At a stop, the robot program executes pending outputs of value 0. The value of a law is 1, so
+    # that the program does not take it for such an output.
     switch = (FollowKind.LAW, 0, 1, 0, 1, 0)
     return (*numbers, *ZERO6, *switch, 0, 0, MotionType.SWITCH_OUTPUT)
 
@@ -509,7 +510,7 @@ def _spline_fields(piece: Spline) -> PointFields:
 
 def check_fields(fields: PointFields) -> None:
     """
-    Refuse fields that URCL refuses to send: the robot would misunderstand or ignore them.
+    Refuse fields that URCL refuses to send, because the robot would misunderstand or ignore them.
 
     :raises LocalProtocolError: a value is out of bounds; the text names field, value and bound.
     """

@@ -44,10 +44,10 @@ The program's ints from 26 up are ours; a program that follows the guide lacks t
 27 to 31 start at 0 when the program enters the control mode ``BUFFERED_SERVO``. The doubles of
 path offsets are ours, too. They share numbers with the servo's, which are unused in a trajectory.
 
-The ints 32 to 34 prove to the driver that the program is its own. The program writes them, the
-count last, when it has read the first message on the reverse socket. Register values outlive
-programs, so version and number are valid only after the count has changed on this connection; so
-is the motion version, which the program writes before the count.
+The ints 32 to 34 prove to the driver that the program is its own. When the program has read the
+first message on the reverse socket, it writes version, number and motion version, and then the
+count. Register values outlive programs, so the driver trusts the other three only after the count
+has changed on this connection.
 """
 
 from __future__ import annotations

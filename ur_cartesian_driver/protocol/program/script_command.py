@@ -82,8 +82,9 @@ class SafeOutputsAction(IntEnum):
     ARM = 1
     #: Set the outputs now, and forget them.
     SET = 2
-    #: Give the outputs these values after a pause, or their last values from the goal, even if
-    #: another client has changed them since; the program still remembers the outputs.
+    #: After a pause, give the outputs the last values that the goal has given them, or else the
+    #: values in the command, even if another client has changed them since. The program still
+    #: remembers the safe values.
     RESTORE = 3
 
 
@@ -98,7 +99,7 @@ COMMAND_WORDS = 28
 COMMAND_SIZE = 4 * COMMAND_WORDS
 _COMMAND = struct.Struct('>28i')
 
-#: An unscaled number.
+#: A number that is sent raw, without scaling.
 Token: TypeAlias = int
 SafeOutputs: TypeAlias = tuple[SafeOutput, ...]
 

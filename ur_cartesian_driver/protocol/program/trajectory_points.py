@@ -54,7 +54,7 @@ from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, DIALECTS
 
 #: Number of outputs that may wait for their trigger poses at one time.
 MAX_PENDING_OUTPUTS = 64
-#: Number of outputs that may have passed their trigger poses and wait for their leads.
+#: Number of outputs that may be past their trigger poses and wait until their leads begin.
 MAX_LEADS = 8
 #: Number of outputs that may give pulses in one goal.
 MAX_PULSE_TRAINS = 4

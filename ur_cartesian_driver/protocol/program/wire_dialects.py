@@ -36,7 +36,7 @@ The library discusses a 22nd word, the number of a move (``move_id``, its change
 one more row: a dialect then also has the number of its words, which :mod:`~.trajectory_points` and
 the robot program (``POINT_FIELDS``) take from it. It is not built before the library has it.
 
-Three modules use more of a :class:`Dialect` than ``is_own``:
+Three modules use more of a program's :class:`Dialect` than ``is_own`` and ``older_program``:
 :mod:`~.trajectory_points` for the points,
 :mod:`~ur_cartesian_driver.robot.program.program_sockets` for the actions, and
 :mod:`~ur_cartesian_driver.planning.request.program_features` for the demands of goals.

@@ -23,9 +23,9 @@ The client opens no socket and has no clock. The owner of the socket sends ``dat
 after each ``feed()``, and gives up when ``state`` does not change for too long (the controller
 answers within a second).
 
-Real controllers send text messages at any time, and may send data before the reply to S; a data
-package is therefore taken as that reply. In each state of the handshake, up to five other
-unexpected packages are tolerated.
+Real controllers send text messages at any time, and may send data before the reply to S; so a data
+package counts as that reply. In each state of the handshake, up to five other unexpected packages
+are tolerated.
 
 The packages are in :mod:`~ur_cartesian_driver.protocol.rtde.rtde_packages`; the controller's side
 of the connection is in `rtde_server`.
@@ -126,7 +126,8 @@ class HandshakeDone:
     """
     The handshake is done; data follow.
 
-    :param frequency: requested or highest frequency [Hz]; protocol version 1 cannot request one.
+    :param frequency: the requested frequency, or the controller's highest [Hz]. Protocol version 1
+        does not send it, so the controller may use another one.
     :param outputs: the fields of the data packages.
     :param missing: optional outputs that this controller lacks.
     :param inputs: the fields of the packages to write, None without inputs.

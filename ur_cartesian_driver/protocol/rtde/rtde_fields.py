@@ -51,7 +51,7 @@ REGISTER = re.compile(r'(?:in|out)put_(?:int|double)_register_(\d+)')
 
 
 def in_lower_half(name: str) -> str:
-    """Return a field's name with its register, 24 to 47, moved to 0 to 23."""
+    """Return a register's name, 24 to 47, moved to 0 to 23; any other name stays as it is."""
     match = REGISTER.fullmatch(name)
     if match is None:
         return name

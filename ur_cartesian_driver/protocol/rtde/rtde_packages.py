@@ -407,7 +407,7 @@ def _require_min_size(data: bytes, payload: bytes, size: int) -> bytes:
 
 
 def _text_message(data: bytes, payload: bytes, version: int) -> RtdeTextMessage:
-    """Return a text; if its lengths do not fit version 2, it came before version 2 was agreed."""
+    """Return a text; it has the format of version 1 if its lengths do not fit version 2."""
     _require_min_size(data, payload, 1)
     end = 1 + payload[0]
     source_end = end + 1 + payload[end] if end < len(payload) else len(payload)

@@ -107,7 +107,7 @@ class Recipe:
             the type of its field.
         """
         flat: list[Any] = [] if self.recipe_id is None else [self.recipe_id]
-        value: Any  # a number has no length: caught below
+        value: Any  # len() of a number in place of a vector raises TypeError, caught below
         try:
             for value, length in zip(values, self._lengths, strict=True):
                 if length == 1:

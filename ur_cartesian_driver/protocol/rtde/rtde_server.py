@@ -9,8 +9,8 @@ clock, and decides when to send data packages, and with which values::
     for data in socket: events = server.feed(data); socket.send(server.data_to_send())
     if server.streaming and server.output: socket.send(server.output.recipe.pack(values))
 
-* A client has one output recipe; the manufacturer's guide mentions no more, in either protocol
-  version. A new recipe replaces it.
+* A client has one output recipe, because the manufacturer's guide mentions only one, in either
+  protocol version. A new recipe replaces it.
 * An unknown field makes the whole recipe invalid: the reply has ``NOT_FOUND`` as its type, and id
   0, and nothing is agreed.
 * An input belongs to one client, which may use it in several recipes, one for each kind of command
