@@ -15,8 +15,8 @@ import yaml
 from ur_cartesian_driver.goal_files.garbage import uncollected
 from ur_cartesian_driver.goal_files.goal_schema import FieldError, Message, with_defaults
 
-#: No goal is nested this deeply. At a thousand times this depth a loader crashes, raises an
-#: exception or refuses the text, depending on the loader.
+#: A text that is nested more deeply is refused. No goal is nested this deeply, and some loaders
+#: crash at a thousand times this depth.
 _MAX_DEPTH = 100
 #: Matches numbers that YAML 1.1 reads otherwise than people do: 010 is 8, and 1:30 is 90.
 _ODD_NUMBER = re.compile(r'[-+]?(?:0[0-7_]+|[0-9][0-9_]*(?::[0-5]?[0-9])+(?:\.[0-9_]*)?)')
@@ -95,7 +95,11 @@ def check_yaml(text: str) -> None:
 
 
 def _check_scalar(event: yaml.ScalarEvent, known: set[str] | None) -> None:
-    """Refuse a number in an odd notation, and a key that is known already; add a new key."""
+    """
+    Refuse a number in an odd notation, and a key that is known already; add a new key.
+
+    :param known: the keys of the mapping so far; None = the scalar is not a key.
+    """
     if event.implicit[0] and _ODD_NUMBER.fullmatch(event.value):
         raise _fault(event, f'{event.value} is octal or sexagesimal in YAML; write it decimal.')
     if known is not None:

@@ -5,9 +5,8 @@ Turns a goal message, or an object with the fields of one, into the goal itself.
 
 The table of goal fields determines which fields are read. A message has its points in one of two
 forms: as a list of messages, or in the flat arrays of a ``PackedPoints``. Either form is read
-directly into the arrays of the goal; for lists, looking up attributes takes most of the time. Only
-messages that cannot be read are refused here: a number that is not in its enumeration, points in
-both forms, or an array of the wrong length.
+directly into the arrays of the goal. Only messages that cannot be read are refused here: a number
+that is not in its enumeration, points in both forms, or an array of the wrong length.
 """
 
 from __future__ import annotations

@@ -29,9 +29,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TypeAlias
 
-#: Begin and end of a body along the joint's axis, from the origin of the nominal DH frame, and its
-#: radius [mm]. A tube whose begin and end differ is a cylinder about the joint's axis that is
-#: swept along the tube: the hull of two housings.
+#: Beginning and end of a body along the joint's axis, from the origin of the nominal DH frame, and
+#: its radius [mm]. A tube whose beginning and end differ is a cylinder about the joint's axis that
+#: is swept along the tube: the hull of two housings.
 BodyRow: TypeAlias = tuple[float, float, float]
 
 
@@ -41,6 +41,8 @@ class BodySizes:
     The bodies of one size of arm.
 
     :param connector: x and z [mm] of the middle of the connector, in ``base``.
+    :param rows: in the order of ``_BODIES`` in :mod:`~.collision_bodies`; None = the arm has no
+        such body.
     """
 
     connector: tuple[float, float]

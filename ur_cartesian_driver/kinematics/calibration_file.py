@@ -34,7 +34,7 @@ CALIBRATION_FIELDS = ('x', 'y', 'z', 'roll', 'pitch', 'yaw')
 _UPPER_ARM, _FOREARM = 1, 2
 # Decimals of the numbers in a file [m, rad].
 _DECIMALS = 12
-# Largest offset behind the last joint that is only rounding [m, rad].
+# A flange that is off the last axis by no more than this [m, rad] is taken to be on the axis.
 _ROUNDING = 1e-9
 # Constants of MurmurHash64A, and the seed of libstdc++.
 _MULTIPLIER, _SHIFT, _SEED = 0xC6A4A7935BD1E995, 47, 0xC70F6907
@@ -73,11 +73,12 @@ def joint_poses(geometry: DhTable) -> tuple[Pose, ...]:
             f'alpha = {geometry.alpha[5]:g} rad), which a file for ur_description cannot have.'
         )
     frames = table_frames(geometry)
-    # The upper arm is at the shoulder, the forearm where its axis crosses the upper arm's plane.
+    # The frame of the upper arm is moved along its axis to the shoulder, the frame of the forearm
+    # to the point where its axis crosses the x-y plane of the upper arm's frame.
     frames[_UPPER_ARM] @= Pose((0.0, 0.0, -geometry.d[_UPPER_ARM]))
     for k in (_UPPER_ARM, _FOREARM):
-        # The point where the next axis crosses the plane x y of this frame. x points away from it,
-        # as the lengths a2 and a3 are negative.
+        # The next axis crosses the x-y plane of this frame at (x, y). The frame is turned until
+        # its x axis points away from there, because the lengths a2 and a3 are negative.
         T = frames[k].inverse() @ frames[k + 1]
         along = -T.position[2] / rotate(T.quaternion, (0.0, 0.0, 1.0))[2]
         x, y, _ = T.apply((0.0, 0.0, along))

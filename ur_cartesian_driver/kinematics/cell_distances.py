@@ -54,7 +54,7 @@ _RIM = 16
 _FLAT = 2e-5
 # Rows that are bounded at a time, so few that their arrays stay in the CPU cache.
 _ROWS = 256
-# Added to a bound, so that rounding does not bring a distance that is cut off below it [m].
+# Distances are cut off this much above the bound, so that rounding brings none below it [m].
 _ROUNDING = 1e-9
 #: Number of carriers: the base and six links.
 CARRIERS = 7
@@ -81,7 +81,7 @@ class _Opponents(NamedTuple):
 
     #: The pair of each first body with each second one, (firsts, seconds).
     columns: Indices
-    #: The carrier of the second bodies, and the depths of points in them.
+    #: The carrier of the second bodies, and the distances of points from them.
     carrier: int
     depths: Depths
     #: The spheres that cover the first bodies, one body after the other: their indices and radii
@@ -103,7 +103,7 @@ def missing_coal(cell: Cell) -> str:
 
 
 class Pair(NamedTuple):
-    """Two bodies, by name, and the distance that they keep [m]."""
+    """Two bodies, by name, and the distance that they must keep [m]."""
 
     a: str
     b: str
@@ -153,7 +153,7 @@ class CellDistances:
         boxes = [_carrier_box(self._bodies, carrier) for carrier in range(CARRIERS)]
         #: Middles and half sides of the boxes around all bodies on a carrier, (carriers, 3) [m].
         self._middles, self._halves = (np.array(each) for each in zip(*boxes, strict=True))
-        #: Largest distance of anything on each carrier from the base, (carriers,) [m].
+        #: Bound on the distance from the base of anything on each carrier, (carriers,) [m].
         self.reaches = _reaches(arm, boxes)
         #: For each pair, the carriers of both bodies, (pairs, 2).
         self.carriers = np.array(
@@ -174,7 +174,7 @@ class CellDistances:
         Return middle and half axes of the boxes around all bodies on each carrier.
 
         A point of the box is the middle plus the three half axes, with factors from -1 to 1 on
-        each. So no point moves farther than these four vectors together.
+        each. So no point moves farther than the sum of the changes of these four vectors.
 
         :param poses: (n, carriers, 7).
         :returns: (n, carriers, 4, 3) [m].
@@ -219,10 +219,10 @@ class CellDistances:
         Return the distances of one pair.
 
         :param poses: (n, carriers, 7).
-        :param enough: larger distances may be replaced by smaller ones that are not below this
-            one [m], which is faster.
-        :param most: larger distances may be cut off here, which is faster, too, (n,) [m]; None =
-            ``enough``.
+        :param enough: a distance above this [m] need not be exact: a smaller value that is not
+            below ``enough`` may be returned, which is faster.
+        :param most: (n,) distances above this [m] may be cut off to it, which is faster, too;
+            None = ``enough``.
         :returns: (n,) [m]; at most 0 where the bodies touch.
         """
         a, b = (self._bodies[number] for number in self._numbers[column])
@@ -242,7 +242,7 @@ class CellDistances:
         Return the pairs that are closer than their clearance at one configuration.
 
         :param q: (6,) [rad].
-        :returns: each pair with its distance [m], the deepest first.
+        :returns: each pair with its distance [m], the one farthest below its clearance first.
         """
         poses = self.poses(np.asarray(q, dtype=np.float64)[None])
         lower = self.lower_bounds(poses)[0]
@@ -422,7 +422,7 @@ def _pair_numbers(bodies: Sequence[_Body], arm_count: int, cell: Cell) -> Indice
                 continue
             if frozenset((first.name, second.name)) in cell.may_touch:
                 continue
-            # The body that moves comes first; half-spaces do not move.
+            # The first body has to move. So it is never a half-space, which is always fixed.
             pairs.append((a, b) if first.carrier else (b, a))
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
@@ -439,7 +439,11 @@ def _reaches(arm: Arm, boxes: Sequence[tuple[Floats, Floats]]) -> Floats:
 
 
 def _cover(body: _Body) -> tuple[Floats, Floats]:
-    """Return centres (k, 3) in the carrier's frame and radii (k,) of spheres that cover a body."""
+    """
+    Return centres (k, 3) in the carrier's frame and radii (k,) of spheres that cover a body.
+
+    Spheres cannot cover a half-space, so it has none.
+    """
     if any(isinstance(solid.shape, HalfSpace) for solid in body.coarse):
         return np.empty((0, 3)), np.empty(0)
     spheres = [solid.spheres() for solid in body.coarse]

@@ -42,7 +42,7 @@ class WristSolution(NamedTuple):
     theta6: float
     #: theta2 + theta3 + theta4.
     theta234: float
-    #: Position of wrist 1 relative to the shoulder, in the plane of the arm [m]; also ``up``.
+    #: Position of wrist 1 relative to the shoulder, outward and up in the plane of the arm [m].
     outward: float
     up: float
 
@@ -108,7 +108,7 @@ def wrist_solutions(
         # Components of the flange axes along axis 2, which is (s1, -c1, 0).
         along_x, along_y, c5 = s1 * r11 - c1 * r21, s1 * r12 - c1 * r22, s1 * r13 - c1 * r23
         for theta5, theta6 in _wrist_angles(ideal, along_x, along_y, c5, theta6_if_singular):
-            # Axis y of frame 5 is the flange's y axis before theta6; axis 5 is opposite to it.
+            # Turned back by theta6, the flange's y axis is opposite to joint axis 5.
             s6, c6 = sin(theta6), cos(theta6)
             s234 = -(c1 * (s6 * r11 + c6 * r12) + s1 * (s6 * r21 + c6 * r22))
             c234 = s6 * r31 + c6 * r32

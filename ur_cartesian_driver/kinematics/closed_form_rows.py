@@ -39,9 +39,9 @@ class BranchMeasures:
     For a calibrated arm, its ideal arm is measured, so the measures are exact to its misfit.
     """
 
-    #: Distance of the wrist centre in front of the plane of axes 1 and 2 [m]. The centre cannot
-    #: enter the cylinder of radius d4 about axis 1: its distance from axis 1 is
-    #: hypot(d4, shoulder).
+    #: Distance of the wrist centre from the plane of axes 1 and 2 [m], positive on the side of
+    #: (cos theta1, sin theta1, 0). The centre cannot enter the cylinder of radius d4 about axis 1:
+    #: its distance from axis 1 is hypot(d4, shoulder).
     shoulder: Floats
     #: sin theta3: 0 where the arm is stretched or folded.
     elbow: Floats
@@ -81,7 +81,8 @@ class BranchSolution:
     q: Floats
     #: (n,) whether the pose has a solution in this branch; where two branches meet, both have one.
     exists: Flags
-    #: (n,) lower bound of the distance to the other branches, modulo full turns [rad].
+    #: (n,) lower bound of the joint distance to the solutions in other branches, modulo full turns
+    #: [rad].
     separation: Floats
 
 

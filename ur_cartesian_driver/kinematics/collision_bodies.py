@@ -227,7 +227,11 @@ class CollisionBodies:
         return result
 
     def _pair_distances(self, q: Floats, pairs: Flags, *, first_bound: bool = False) -> Floats:
-        """Return the distances (n, m) of some pairs; the first bounds are coarser, but cheaper."""
+        """
+        Return the distances (n, m) [m] of the m pairs that are marked in ``pairs``.
+
+        :param first_bound: whether to leave out the second direction: coarser, but cheaper.
+        """
         links, one, other = self._compared[:, pairs[self._compared[0]]]
         begins = np.flatnonzero(np.diff(links, prepend=-1))
         of_pair = np.repeat(np.arange(len(begins)), np.diff(begins, append=len(links)))
@@ -410,7 +414,7 @@ class _Cylinders(NamedTuple):
 
 
 def _separation(first: _Cylinders, second: _Cylinders) -> Floats:
-    """Return a lower bound (n,) of their distances [m]; -inf where they overlap."""
+    """Return a lower bound (n,) of their distances [m]; -inf where overlap gives no direction."""
     on_first = first.start + 0.5 * first.vector
     for _ in range(_PROJECTIONS):
         on_second = second.nearest(on_first)

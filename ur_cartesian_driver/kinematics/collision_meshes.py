@@ -117,11 +117,11 @@ class CollisionMeshes:
 
     def distances(self, pair: tuple[Link, Link], q: Floats) -> Floats:
         """
-        Return the distance of two links.
+        Return the distance of two links, less the tolerance of their meshes.
 
         :param pair: the two links, the one nearer to the base first.
         :param q: (n, 6) [rad].
-        :returns: (n,) [m]; 0 where they touch or overlap.
+        :returns: (n,) [m]; 0 where the links may touch or overlap.
         """
         result = np.empty(len(q))
         for row, joints in enumerate(q):
@@ -173,5 +173,5 @@ def _solid(shape: LinkShape) -> Any:
 
 @lru_cache
 def _mesh(file: str) -> Any:
-    """Return the tree of the triangles in a mesh file."""
+    """Return coal's bounding-volume tree of the triangles in a mesh file."""
     return coal().MeshLoader().load(file, np.ones(3))

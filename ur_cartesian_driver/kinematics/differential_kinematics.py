@@ -19,7 +19,8 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
-# Added to Jacobians; far below the smallest singular value at which the arm is allowed to move.
+# Added to the diagonal of Jacobians, so that they can be inverted in a singularity; far below the
+# smallest singular value at which the arm is allowed to move.
 _MIN_SINGULAR_VALUE = 1e-12
 
 # Rows per block, so that the intermediate arrays stay in the CPU cache.
@@ -29,7 +30,7 @@ _TRAVEL_AND_TURN = slice(0, 3), slice(3, 6)
 
 @dataclass(frozen=True, slots=True)
 class StandingPoint:
-    """A point fixed in the base, in place of a TCP; rates are the flange's, at this point."""
+    """A point fixed in base, in place of a TCP; twists are the flange's, taken at this point."""
 
     position: Vector3
 
@@ -62,7 +63,7 @@ def joint_rates(
         at = _jacobians(arm, T_flange_tcp, q[rows])
         # Avoid a division by zero for an arm at rest in a singularity.
         regular = at.jacobian + _MIN_SINGULAR_VALUE * np.eye(6)
-        # Two solutions take two thirds of the time of one inverse.
+        # Solving both systems takes two thirds of the time of inverting the Jacobians.
         qd[rows] = _solved(regular, twist[rows])
         qdd[rows] = _solved(regular, acceleration[rows] - _bias_acceleration(at, qd[rows]))
     return qd, qdd
@@ -76,7 +77,7 @@ def largest_joint_rates(
     accelerations: tuple[float, float],
 ) -> tuple[Floats, Floats]:
     """
-    Return bounds of the joint velocities [rad/s] and accelerations [rad/s^2] (n, 6).
+    Return upper bounds of the joint velocities [rad/s] and accelerations [rad/s^2] (n, 6).
 
     :param q: (n, 6) [rad].
     :param rates: greatest speed and turn rate of the TCP [m/s], [rad/s], in any direction.
@@ -89,7 +90,8 @@ def largest_joint_rates(
         for part in (inverse[:, :, columns] for columns in _TRAVEL_AND_TURN)
     )
     qd: Floats = rates[0] * travel + rates[1] * turn
-    # Constant joint rates accelerate the TCP by at most the square of their sum times its reach.
+    # At constant joint rates, the acceleration of the TCP is at most the square of the sum of the
+    # rates, times the distance of the TCP from the farthest joint axis's origin.
     bias = qd.sum(axis=1)[:, None] ** 2
     reach = np.linalg.norm(np.array(at.frames.origins) - at.tcp, axis=1).max(axis=0)[:, None]
     qdd: Floats = (accelerations[0] + reach * bias) * travel

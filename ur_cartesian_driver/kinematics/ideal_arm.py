@@ -89,7 +89,7 @@ def _fit(arm: Arm, lengths: Floats) -> tuple[Floats, Floats, float]:
 
 def _derivatives(frames: ChainFrames) -> Floats:
     """
-    Return the derivatives (6, 12) of the flange by d1 a2 a3 d4 d5 d6 and the joint positions.
+    Return the derivatives (6, 12) of the flange pose by d1 a2 a3 d4 d5 d6 and the joint positions.
 
     A length d moves the flange along its joint's axis. A length a moves the flange along its link,
     the line from the origin of its joint to the next joint's origin.

@@ -50,7 +50,7 @@ MIN_DAMPING = 1e-14
 _NEARLY_SINGULAR = 0.05
 # Another solution may be close if the sine of theta5 is below this.
 _NEARLY_STRAIGHT = 0.1
-# Largest distance of a twin that is searched [rad].
+# Largest distance from a solution to its twin (see _twins) at which the twin is searched [rad].
 _MAX_TWIN_DISTANCE = 0.6
 # Step of the numerical derivative of the Jacobian [rad].
 _DIFFERENCE = 1e-4
@@ -99,13 +99,13 @@ def solutions(arm: Arm, T_base_flange: Pose, seed: Joints | None = None) -> list
 
 
 def _is_far(T_base_flange: Pose) -> bool:
-    """Return whether a pose has a NaN, or a number whose squares could overflow."""
+    """Return whether a position is NaN or out of any arm's reach, so far that squares overflow."""
     return not all(abs(value) < _MAX_DISTANCE for value in T_base_flange.position)
 
 
 def nearest(arm: Arm, T_base_flange: Pose, q_near: Joints) -> Joints | None:
     """
-    Return the solution within the limits that is nearest to ``q_near`` [rad]; None if none is.
+    Return the solution within the limits nearest to ``q_near`` [rad]; None if there is none.
 
     All branches and full turns are searched; the distance is Euclidean in joint space.
     """
@@ -180,7 +180,7 @@ def explain_unreachable(arm: Arm, T_base_flange: Pose) -> str:
 
 
 def _refined(arm: Arm, T_base_flange: Pose, starts: list[Joints]) -> list[Joints]:
-    """Return the distinct solutions found from the starts."""
+    """Return the distinct solutions found from the starts, and from the twins of solutions."""
     found: list[Joints] = []
     pending = deque(starts)
     while pending:

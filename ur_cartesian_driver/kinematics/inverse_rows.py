@@ -35,7 +35,7 @@ from ur_cartesian_driver.motion.geometry.pose import pose_from_row
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 
 # Rows per block: more would leave the CPU cache. With fewer rows, calling numpy would cost more
-# than its arithmetic; a calibrated arm begins with one row in _STRIDE.
+# than its arithmetic, above all for a calibrated arm, which first solves one row in _STRIDE.
 _BLOCK = 8192
 # The same for Newton's method, which needs a hundred numbers for each row.
 _NEWTON_BLOCK = 4096

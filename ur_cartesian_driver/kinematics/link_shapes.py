@@ -87,7 +87,7 @@ _PACKAGE_ROOTS = {'airo-models': _airo_models, 'example-robot-data': _example_ro
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _MeshSource:
-    """The meshes of one model in a package: their files, and their places in the link frames."""
+    """The meshes of one model in a package: their files, and their poses in the link frames."""
 
     package: str
     #: Folder of the model inside the package.

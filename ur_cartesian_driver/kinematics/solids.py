@@ -4,8 +4,8 @@
 Solids in the frame of a carrier, and their distances for rows of poses.
 
 coal measures exactly; it is a part of pinocchio and optional. Without it, convex solids are
-measured here: the separation of two supports along a direction is never larger than the distance,
-and Gilbert's algorithm improves the direction (E. G. Gilbert, An iterative procedure for computing
+measured here: their separation along any direction is never larger than their distance, and
+Gilbert's algorithm improves the direction (E. G. Gilbert, An iterative procedure for computing
 the minimum of a quadratic form on a convex set, 1966). Half-spaces never need coal: the lowest
 point of the other solid decides.
 """
@@ -32,8 +32,8 @@ _TINY = 1e-300
 _TOUCH = 1e-9
 # Smallest bound for coal, which would miss contacts with a smaller one [m].
 _MIN_BOUND = 0.001
-# A long solid is divided until each part is at most this many times as long as wide, or there are
-# so many parts; a sphere covers each part.
+# To be covered by spheres, a long solid is divided into parts that are at most _STRETCH times as
+# long as wide, but into at most _MAX_SPHERES parts; a sphere covers each part.
 _STRETCH, _MAX_SPHERES = 1.5, 8
 
 
@@ -80,7 +80,7 @@ class Solid:
     """
     A shape in the frame of its carrier. Immutable.
 
-    :param T_carrier_shape: the place of the shape.
+    :param T_carrier_shape: the pose of the shape in the frame of the carrier.
     """
 
     def __init__(self, shape: SolidShape, T_carrier_shape: Pose) -> None:
@@ -128,7 +128,11 @@ class Solid:
         return centres @ self._rotation.T + self._position, np.full(count, radius)
 
     def supports(self, directions: Floats, frames: CarrierFrames) -> Floats:
-        """Return the farthest points (n, 3) along unit vectors (n, 3), for frames of the shape."""
+        """
+        Return the points (n, 3) in base that are the farthest along unit vectors (n, 3).
+
+        :param frames: the frames of the shape, from :meth:`frames`.
+        """
         along = np.einsum('nji,nj->ni', frames.rotation, directions)
         shape = self.shape
         if isinstance(shape, Box):
@@ -171,7 +175,7 @@ class Solid:
 
 class Depths:
     """
-    The depths of points in bodies on one carrier, for all bodies at once.
+    Signed distances of points from bodies on one carrier, negative inside; for all bodies at once.
 
     :param bodies: one or more solids of each body.
     """
@@ -200,7 +204,7 @@ class Depths:
 
     def of(self, points: Floats) -> Floats:
         """
-        Return lower bounds of the signed distances of points from the bodies.
+        Return lower bounds of the signed distances of points from the bodies, negative inside.
 
         :param points: (n, k, 3) in the frame of the carrier [m].
         :returns: (n, k, bodies) [m]; exact for boxes, cylinders, spheres and half-spaces, else
@@ -255,8 +259,8 @@ def distances(
     :param frames_a: n frames of the carrier, or one if it is fixed; the same for ``b``.
     :param most: larger distances may be replaced by this one (n,) [m]; far from a mesh, that is a
         thousand times as fast.
-    :returns: (n,) [m]; negative where solids overlap or meshes touch, but the true depth for
-        convex solids only. Without coal, a lower bound.
+    :returns: (n,) [m]; negative where solids overlap or meshes touch, and then the true depth only
+        if both solids are convex. Without coal, a lower bound of the distance.
     """
     own_a, own_b = a.frames(frames_a), b.frames(frames_b)
     for half_space, plane, other, place in ((a, own_a, b, own_b), (b, own_b, a, own_a)):
@@ -285,7 +289,8 @@ def _measured(
     measure = coal().distance
     found = []
     rows, other_rows = _transforms(frames_a, frames_b)
-    # Parts of a mesh that are no nearer than the least distance so far are left out.
+    # coal leaves out parts of a mesh that are no nearer than min_distance, the least distance so
+    # far. So the search begins with the bound there.
     bounds = np.broadcast_to(np.clip(most, _MIN_BOUND, result.min_distance), len(rows))
     for T_a, T_b, bound in zip(rows, other_rows, bounds.tolist(), strict=True):
         result.clear()
@@ -316,7 +321,8 @@ def _separations(a: Solid, frames_a: CarrierFrames, b: Solid, frames_b: CarrierF
     gap = frames_a.origin - frames_b.origin
     gap = np.where(np.abs(gap).max(axis=1, keepdims=True) > 0.0, gap, (0.0, 0.0, 1e-9))
     bound = np.full(count, -np.inf)
-    # Faces first: towards the wide face of a plate, the algorithm takes many rounds.
+    # The directions of all faces are tried first, because Gilbert's algorithm takes many rounds
+    # to find the direction of the wide face of a plate.
     axes = np.concatenate([frames_a.rotation, frames_b.rotation], axis=2).transpose(2, 0, 1)
     for axis in axes:
         direction = np.where(np.einsum('ni,ni->n', axis, gap)[:, None] < 0.0, -axis, axis)
@@ -369,7 +375,7 @@ def _vectors(points: Floats) -> Any:
 
 @lru_cache(maxsize=64)
 def _tree(mesh: Mesh) -> Any:
-    """Return the tree of the triangles of a mesh, without triangles that have no area."""
+    """Return coal's bounding-volume tree of a mesh, without the triangles that have no area."""
     corners = mesh.vertices[mesh.triangles]
     areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     used = mesh.triangles[np.abs(areas).max(axis=1) > 0.0]

@@ -21,7 +21,11 @@ _ROUNDING = 1e-6
 
 
 def slower_by(goal: Goal) -> float:
-    """Return the least deficit of a slow stretch, as a fraction of the requested speed."""
+    """
+    Return how far below the requested speed, as a fraction of it, a slow stretch begins.
+
+    It is small enough that every speed below ``min_speed_fraction`` makes a slow stretch.
+    """
     return min(SLOWER_BY, 1.0 - goal.min_speed_fraction + _ROUNDING)
 
 
@@ -29,6 +33,7 @@ def check_min_speed(goal: Goal, stretches: Sequence[SlowStretch]) -> None:
     """
     Refuse a goal whose tool is slower than demanded.
 
+    :param stretches: the slow stretches of the plan, found with :func:`slower_by`.
     :raises JointLimitExceeded: the tool is too slow because of joint limits.
     :raises InvalidGoal: the tool is too slow for another reason.
     """

@@ -93,7 +93,7 @@ class PlanningOptions:
     #: arm, or what it carries, too close to them are refused. The file is read once, at the start.
     #: A relative path begins at the folder in which the driver was started. Empty: no file.
     cell_file: str = ''
-    #: The bodies in cell_file, or the owner's bodies.
+    #: The bodies in cell_file, or bodies that were given in code.
     cell: Detected[Cell] = EMPTY_CELL
     #: Values that outputs take when a goal or live session ends without success, and when the arm
     #: stops in a pause or a protective stop, each 'kind pin value [current | voltage] [restore]'.
@@ -109,7 +109,7 @@ class PlanningOptions:
     #: once, at the start. A relative path begins at the folder in which the driver was started.
     #: Empty: no file.
     lead_file: str = ''
-    #: The leads of lead_file, or of the owner.
+    #: The leads in lead_file, or leads that were given in code.
     leads: Detected[tuple[Lead, ...]] = ()
     #: Smallest angle between wrist 2 and the straight wrist on lines and arcs [rad]; 0.0: no
     #: limit. Near a singularity joints move fast or have to flip. Does not apply to joint motions,
@@ -186,9 +186,9 @@ class PlanningOptions:
     allow_other_twin: bool = False
     #: The twin in twin_file.
     twin: Detected[Twin | None] = None
-    #: The files from which leads, twin and cell were read; '' = none, or the owner gave them.
+    #: The files from which leads, twin and cell were read; '' = none, or they were given in code.
     read_files: Detected[tuple[str, str, str]] = ('', '', '')
-    #: The robot for which goals are planned, as far as it is known.
+    #: Model, software and motion version of the robot for which goals are planned, if known.
     robot: Detected[ArmIdentity] = UNKNOWN_ARM
 
     #: Speed of the tool on lines and arcs [m/s].
@@ -277,9 +277,10 @@ class PlanningOptions:
     @property
     def laws(self) -> MotionLaws:
         """
-        The laws by which the robot moves: measured, or else assumed.
+        The laws of :attr:`used_twin`, or the assumed ones.
 
-        Begin and speed of a blend belong to its curve: if that is unknown, all three are assumed.
+        The beginning and the speed of a blend were measured for one curve of the blend. If the
+        twin does not know this curve, both are assumed, too.
         """
         laws = laws_of(self.used_twin, self.turn_ratio)
         if laws.blend_shape != 'unknown':
@@ -299,7 +300,11 @@ class PlanningOptions:
         return with_lead_times(commands, self.leads, self.lead_file)
 
     def for_program(self, settings: ProgramTraits, **detected: Any) -> PlanningOptions:
-        """Return the options for the robot program of a driver, with other fields replaced too."""
+        """
+        Return the options for the robot program of a driver.
+
+        :param detected: more fields to replace, such as features that the robot has.
+        """
         return replace(
             self,
             **detected,

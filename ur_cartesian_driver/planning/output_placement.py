@@ -39,13 +39,13 @@ def place_outputs(
     """
     Return the segments with the records of outputs switched during the motion, in order of time.
 
-    :param reference: the path of the tool along the segments, on the clock of ``start_time``.
+    :param reference: the path of the tool along the segments, which begins at ``start_time``.
     :param events: the output events by goal field, with waypoints numbered as in ``segments``.
     :param blend_halves: duration of the first half of the blend after each segment [s]; None =
         no blends.
     :param start_time: when the first segment begins [s].
-    :param point_times: when points are passed within a motion (n,) [s]; None = each point is at
-        the end of a motion.
+    :param point_times: (n,) time at which each point is passed, if a motion may lead through
+        several points [s]; None = each point is at the end of a motion.
     :param control_cycle: cycle of the controller [s], needed for pulses only.
     :param to_tcp: see :class:`TimedPath`.
     :raises InvalidGoal: no motion leads to a point, or too many outputs are pending at once.
@@ -60,7 +60,8 @@ def place_outputs(
         for kind in OUTPUT_EVENTS
         for found in kind.place_all(events.get(kind.field, ()), path)
     ]
-    # The end of a stretch comes first, because another event may begin at the same time.
+    # Where one stretch (on which a law drives an output) ends and the next begins, the end must
+    # come first.
     switches.sort(key=lambda found: (found.time, not found.ends_stretch))
     _check_stretches(switches)
     _check_leads(switches)
@@ -92,7 +93,8 @@ def _check_stretches(switches: Sequence[PlacedOutput]) -> None:
             stretch = begin.stretch
             if stretch is None or found.stretch is not None or found.field == begin.field:
                 continue
-            # With a slow tool, an output with a lead switches later, at the latest at its place.
+            # The slower the tool moves, the later an output with a lead is switched, but it is
+            # never switched after its place on the path.
             latest = found.time + found.lead
             if latest > begin.time + SAME_TIME and found.time < stretch.end - SAME_TIME:
                 where = 'at its end' if found.ends_stretch else 'at its place'
@@ -113,14 +115,14 @@ def _output(found: PlacedOutput) -> tuple[OutputKind, int]:
 
 def _check_leads(switches: Sequence[PlacedOutput]) -> None:
     """
-    Refuse too many simultaneous leads, and a lead that reverses two changes of one output.
+    Refuse too many simultaneous leads, and leads that swap two changes of one output.
 
     :param switches: the outputs in the order of time.
     """
     if not any(found.lead for found in switches):
         return
     running: list[float] = []
-    #: By output: the change with the latest place so far.
+    #: By output: of the changes so far, the one whose place the tool passes last.
     latest: dict[tuple[OutputKind, int], PlacedOutput] = {}
     for found in switches:
         output, place = _output(found), found.time + found.lead
@@ -149,7 +151,7 @@ def _check_leads(switches: Sequence[PlacedOutput]) -> None:
 
 
 def _waiting(records: Sequence[OutputRecord]) -> int:
-    """Return the number of records that wait for a trigger pose, laws included."""
+    """Return the number of records that the robot program keeps: laws, and triggered outputs."""
     return sum(
         not isinstance(each, SwitchOutput) or each.trigger_pose is not None for each in records
     )

@@ -270,7 +270,12 @@ def _checked_path(
     remarks: list[str],
     reasons: dict[int, list[str]],
 ) -> tuple[JointPathPlanner, SegmentGeometries, list[str]]:
-    """Return joint paths, geometries and clearance lines of a goal from point ``first`` on."""
+    """
+    Return the joint paths and geometries from point ``first`` on, and report lines on clearance.
+
+    :param remarks: gets the remarks on the path.
+    :param reasons: gets, by point, the reasons for unusual primitives.
+    """
     state = planner.state
     paths = JointPathPlanner(
         planner.goal, planner.targets, planner.kinematics, options, remarks, reasons
@@ -418,7 +423,9 @@ def _held_part_remark(plan: Plan, planner: GoalPlanner) -> str:
 
 class GoalPlanner:
     """
-    The input of the planners of all execution modes; collects the remarks for the goal's report.
+    One goal as input of the planners of all execution modes, and the last step of these planners.
+
+    The object collects the remarks for the report of the goal.
 
     :param retargeted: the checked goal, expressed for the TCP that is active while it runs.
     :param T_flange_active: the TCP that is active on the robot now.

@@ -26,7 +26,7 @@ MAX_STATIC_ERROR = 0.005
 
 
 def state_at_rest(arm: Arm, q: Joints, T_flange_tcp: Pose = IDENTITY) -> RobotState:
-    """Return the state of an arm at rest."""
+    """Return the state of an arm at rest in the configuration ``q`` [rad]."""
     pose = arm.forward(q) @ T_flange_tcp
     return RobotState(
         timestamp=0.0,
@@ -40,7 +40,7 @@ def state_at_rest(arm: Arm, q: Joints, T_flange_tcp: Pose = IDENTITY) -> RobotSt
 
 def at_set_point(state: RobotState, arm: Arm) -> RobotState:
     """
-    Return the state of an arm that rests exactly at its set-point.
+    Return the state of a resting arm, moved to its set-point.
 
     The controller's moves begin at its set-point, although friction holds the arm 0.2 to 0.4 mrad
     away from it (recorded on real arms). A state in which the arm is farther away than
@@ -77,6 +77,6 @@ def predict_stop(state: RobotState, arm: Arm, deceleration: float) -> RobotState
 
 
 def _tcp_at(state: RobotState, arm: Arm, q: Joints) -> Pose:
-    """Return the reported TCP pose, displaced by the model's motion from there to ``q``."""
-    # Forward kinematics alone is not enough: the arm may differ from its model.
+    """Return the TCP pose in ``q``: the reported one, moved as the model predicts."""
+    # The forward kinematics of ``q`` alone would ignore that the arm may differ from its model.
     return arm.forward(q) @ (arm.forward(state.actual_q).inverse() @ state.actual_tcp_pose)

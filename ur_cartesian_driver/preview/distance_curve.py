@@ -1,10 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The closest pair of bodies over time, as a picture in a page.
+The distance of the closest pair of bodies over time, as a picture in a page.
 
-A tool is always near the link beside it. Pairs that the arm carries have a curve of their own, so
-that they do not hide the distance of the arm from its surroundings.
+A body that the arm carries, such as a tool, is always near a link. So its distances from links and
+other carried bodies have a curve of their own, which does not hide the distance of the arm from
+its surroundings.
 """
 
 from __future__ import annotations
@@ -27,7 +28,12 @@ _MAX_LISTED = len(_COLOURS)
 
 
 def groups_of_pairs(cell: Cell) -> dict[str, Cell]:
-    """Return a cell for the pairs with fixed bodies, and one for pairs on the arm, by title."""
+    """
+    Return the cells to measure for each curve, by the title of the curve.
+
+    One cell leaves out the pairs of carried bodies with links and with each other; the other has
+    only the carried bodies.
+    """
     carried = [body.name for body in cell.bodies if body.is_carried]
     own = [(a, b) for a, b in product(carried, (*LINK_NAMES, *carried)) if a != b]
     groups = {

@@ -14,9 +14,10 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 
 #: Side of the square that stands for a half-space [m].
 SQUARE_SIDE = 1.6
-#: Largest number of triangles of all meshes of a cell together, and the least bound for one mesh.
+#: Largest number of triangles of all meshes of a cell together, which they share equally; but each
+#: may have this smaller number at least.
 MAX_TRIANGLES, _MIN_TRIANGLES = 20_000, 100
-#: Factor by which the raster of the vertices grows until a mesh has few enough triangles.
+#: Factor by which the cubes of the raster grow, from try to try, until few triangles are left.
 _COARSER = 1.3
 
 
@@ -30,8 +31,8 @@ def coarse_mesh(mesh: Mesh, most: int) -> tuple[Floats, Indices]:
     """
     Return vertices (n, 3) [m] and triangles (m, 3) of a mesh: its own, or fewer similar ones.
 
-    Vertices that share a cube of a raster become one, at their mean. If that leaves nothing, as
-    with a cloud of small triangles, some of the triangles are returned.
+    Vertices that share a cube of a raster become one, at their mean. If no triangle is left, as
+    of a cloud of small triangles, some of the mesh's own triangles are returned.
 
     :param most: the largest number of triangles.
     """
@@ -51,7 +52,8 @@ def _on_raster(mesh: Mesh, cubes: Indices, count: int) -> tuple[Floats, Indices]
     """
     Return vertices and triangles, with the vertices of each cube merged.
 
-    :param cubes: (n, 3) the cube of each vertex; ``count`` = one more than their largest number.
+    :param cubes: (n, 3) numbers, along each axis, of the cube that contains each vertex.
+    :param count: larger than all these numbers.
     """
     x, y, z = cubes.T
     _, of_vertex, counts = np.unique(
@@ -60,7 +62,7 @@ def _on_raster(mesh: Mesh, cubes: Indices, count: int) -> tuple[Floats, Indices]
     middles = np.stack([np.bincount(of_vertex, column) for column in mesh.vertices.T], axis=1)
     corners = of_vertex[mesh.triangles]
     a, b, c = np.sort(corners, axis=1).T
-    n = len(counts)  # at most a million or so, so that the keys do not overflow
+    n = len(counts)  # the keys below fit into 64 bits for up to two million
     _, first = np.unique((a * n + b) * n + c, return_index=True)
     first = first[(a[first] < b[first]) & (b[first] < c[first])]
     return middles / counts[:, None], corners[first]

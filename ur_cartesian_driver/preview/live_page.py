@@ -56,7 +56,7 @@ class LivePage:
         self._text.content = _text(state, self._plan)
 
     def say_lost(self, reason: str) -> None:
-        """Report that the connection is lost; the arm is still drawn at its last place."""
+        """Report that the connection is lost; the arm is still drawn at its last known joints."""
         self._text.content = f'**Not connected**: {reason}. The arm is drawn where it last was.'
 
 
@@ -86,7 +86,7 @@ def live_page(
 
 def path_deviation(path: Floats, place: Floats) -> float:
     """
-    Return the distance of a place from a path.
+    Return the distance [m] of a place (3,) [m] from the nearest point of a path.
 
     :param path: (m, 3) the corners of the path [m].
     """

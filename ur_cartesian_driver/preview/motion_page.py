@@ -84,7 +84,8 @@ aside .distance svg { width: 100%; }
 aside i { display: inline-block; width: .8em; height: .8em; margin: 0 .4em 0 .8em; }
 </style>
 """
-#: Script that puts the scene named in the page's address where viser's page looks for it.
+#: Script that puts the scene whose name is in the page's address, behind the #, where viser's page
+#: looks for the scene.
 _CHOICE = """
 <script>
 window.__VISER_EMBED_DATA__ = (SCENES => SCENES[location.hash.slice(1)] || SCENES.type)(%s);
@@ -125,9 +126,9 @@ def motion_page(plan: Plan, arm: Arm, options: PlanningOptions = NO_BODIES) -> s
 
 
 def _cells(plan: Plan, preview: Preview, arm: Arm, cell: Cell) -> dict[int, Cell]:
-    """Return each state of the cell by the first row of the samples in which it holds."""
+    """Return the cell by the row of the preview from which it holds, until a part change."""
     cells = {0: cell}
-    if not cell:  # the options of the plan are not known: nothing of its cell is drawn
+    if not cell:  # no cell was given, so the changes of its parts are not drawn
         return cells
     for change in sorted(plan.goal.part_changes, key=lambda each: each.waypoint):
         cell = changed(cell, change, arm, joints_at(plan, change.waypoint), plan.T_flange_active)
@@ -140,7 +141,7 @@ def _cells(plan: Plan, preview: Preview, arm: Arm, cell: Cell) -> dict[int, Cell
 def _closest_pairs(
     plan: Plan, preview: Preview, cells: dict[int, Cell], arm: Arm, options: PlanningOptions
 ) -> str:
-    """Return the curves of the closest pairs over time."""
+    """Return HTML with a curve of the closest pair for each of :func:`groups_of_pairs`."""
     active = plan.T_flange_active
     tip = plan.T_flange_tcp or active
     known = ~np.isnan(preview.joints.sum(axis=1))
@@ -196,7 +197,7 @@ def refusal_page(
     If the arm would touch something there, it is drawn at that place, and the bodies that touch
     are drawn in red, too.
 
-    :param q: the joint positions of the arm [rad].
+    :param q: the joint positions of the arm at the start [rad].
     :param options: the options whose planes and bodies of the cell are drawn.
     :raises ImportError: viser is not installed; the text says how to get it.
     """
@@ -207,7 +208,8 @@ def refusal_page(
         cell = refusal.cell if isinstance(refusal.cell, Cell) else cell
     # A path on a held part is drawn on the part; any other path begins at the start of the arm.
     seen_from = q_start if goal.moving_frame is None else q
-    # Only positions, as an orientation may be the fault; points given by joints have none.
+    # Only positions are used, because an orientation may be the fault. Points that are given by
+    # joints have no position (NaN).
     path = np.array(_places(goal, arm.forward(seen_from), tcp))
     has_place = np.isfinite(path).all(axis=1)
     with serve(parse_planes(options.workspace_planes)) as server:
@@ -225,7 +227,7 @@ def refusal_page(
 
 
 def _places(goal: Goal, T_base_flange: Pose, tcp: Pose) -> list[Vector3]:
-    """Return the positions in base of tool and points; for a held part, at the given flange."""
+    """Return the positions in base of tool and points, with a held part at the given flange."""
     start, frame = (T_base_flange @ tcp).position, goal.T_base_frame
     if goal.moving_frame is not None:
         start = goal.moving_frame.T_base_tool.position
@@ -344,7 +346,7 @@ def _legends(colourings: Iterable[_Colouring]) -> str:
 
 
 def _waypoints(plan: Plan) -> Iterator[tuple[int, Floats]]:
-    """Yield the points with their places."""
+    """Yield the number and the position of each point, in the frame of the path."""
     for point, waypoint in enumerate(plan.goal.waypoints):
         pose = plan.goal.T_base_frame @ waypoint.pose
         yield point, np.array(pose.position)
@@ -370,7 +372,7 @@ def _outputs(plan: Plan) -> Iterator[tuple[str, Floats]]:
 
 
 def _on_path(plan: Plan, T_base_tcp: Pose) -> Pose:
-    """Return the pose of the tool on the path for a pose of the TCP."""
+    """Return the tool's pose in the frame of the path (base, or a held part) for a TCP pose."""
     frame, tcp = plan.goal.moving_frame, plan.T_flange_tcp or plan.T_flange_active
     return T_base_tcp if frame is None else frame.tool(T_base_tcp @ tcp.inverse())
 

@@ -53,7 +53,7 @@ _ASIDE = np.array((0.65, 0.65, 0.4))
 
 
 class Scene:
-    """The arm, its tool, its cell and its path on a server, which shows or records them."""
+    """The arm, its tool, its cell and its path on a viser server, which shows or records them."""
 
     def __init__(
         self,
@@ -133,7 +133,7 @@ class Scene:
         return node
 
     def _place(self, cell: Cell) -> None:
-        """Put the bodies at their places in a cell."""
+        """Move the drawn bodies to their poses in ``cell``, which may be on other carriers."""
         self._cell = cell
         #: Node, link and ``T_link_body`` of each body that the arm carries.
         self._carried = []

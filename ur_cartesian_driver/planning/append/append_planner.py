@@ -90,9 +90,9 @@ class AppendPlan:
 
     #: The plan, including the ending; the times of its reference path are motion times.
     plan: Plan
-    #: Number of the goal's records that precede this plan.
+    #: Number of records of the goal, on the trajectory socket, before the records of this plan.
     records_before: int
-    #: Motion time at which these records end [s].
+    #: Motion time at which those earlier records end [s].
     start_time: float
     #: Number of records of this plan that belong to the ending.
     ending_records: int
@@ -100,7 +100,7 @@ class AppendPlan:
     end_time: float | None
     #: The joints over motion time; None = the goal is no spline.
     spline: JointSpline | None = None
-    #: Motion time at which a spline leaves the previous plan [s]; None = at its last point.
+    #: Motion time at which a spline leaves the plan before [s]; None = at that plan's last point.
     cut_time: float | None = None
     #: The answer to the client.
     text: str
@@ -183,7 +183,7 @@ def plan_append(
 
 
 class _PartPlanner:
-    """Plans one part of a goal."""
+    """Plans one part of a goal, of robot motions or of spline pieces."""
 
     def __init__(
         self,
@@ -236,7 +236,7 @@ class _PartPlanner:
         return self.moves_part(plan, records_before, start_time)
 
     def _pending_commands(self, first: int, start_time: float) -> tuple[IOCommand, ...]:
-        """Return the commands of a part, and the earlier commands that are still due."""
+        """Return the part's commands, and earlier ones still due; waypoints count from first."""
         old = []
         # Row of the replanned point whose motion is already committed; negative = none.
         committed = len(self._before.replannable) - 2
@@ -294,8 +294,9 @@ class _PartPlanner:
         """
         Return the commands whose records belong to the ending; the next part places them again.
 
-        Records that precede the last motion are committed, even if they are due during it. Among
-        equal commands, the earlier ones have the earlier records.
+        Records that precede the last motion are committed, even if they are due during it. Equal
+        commands have their records in the order of time, so the committed records belong to the
+        earliest of these commands.
         """
         rows = plan.rows
         ends = _end_times(rows.waypoints, rows.durations, start_time)
@@ -364,7 +365,7 @@ class _PartPlanner:
         return self.spline_part(plan, begin, found.end, records_before)
 
     def _spline_goal(self, start: SplineState) -> GoalTable:
-        """Return the checked goal of the appended points, for the TCP and with motion times."""
+        """Return the checked goal of the appended points, with motion times and for the TCP."""
         before, appended = self._before, self._appended
         points = WaypointRows.of(appended.waypoints)
         # The points are checked as a goal of their own, with times since the point before them.
@@ -407,6 +408,7 @@ class _PartPlanner:
         ending: the outputs follow that piece on the wire, and their triggers depend on the next
         points.
 
+        :param begin: the state at the beginning of the plan; ``end``: at its last point.
         :param pulses: the pulses that begin in this part.
         """
         start_time = begin.time
@@ -470,7 +472,11 @@ class _PartPlanner:
         start_time: float,
         pulses: Sequence[PulseTrain],
     ) -> tuple[Plan, list[tuple[float, IOCommand]]]:
-        """Return a plan with its stop and outputs, and the commands with their due times [s]."""
+        """
+        Return a plan with its stop and outputs, and the commands with their due times [s].
+
+        :param closing: the stopping piece with its path; None = the plan has no such piece.
+        """
         rows, reference = plan.rows, plan.reference
         waypoints = rows.waypoints
         if closing is not None:
@@ -607,7 +613,12 @@ class _PartPlanner:
 
 
 def _renumber_plan(plan: Plan, first: int, waypoint: int, start_time: float) -> Plan:
-    """Return a plan from a waypoint on, renumbered by ``first`` and shifted in time."""
+    """
+    Return the plan of the points from ``waypoint`` on, which begins at ``start_time`` [s].
+
+    :param first: the goal's number of the plan's point 0, from which the result counts points.
+    :param waypoint: a number of the goal.
+    """
     left_out = int(np.searchsorted(plan.rows.waypoints, waypoint - first))
     begin, rows = sum(plan.rows.durations[:left_out].tolist()), plan.rows[left_out:]
     path = plan.reference
@@ -629,12 +640,12 @@ def _renumber_plan(plan: Plan, first: int, waypoint: int, start_time: float) -> 
 
 
 def _renumber_text(text: str, first: int) -> str:
-    """Return a text with its points renumbered from the start of the goal."""
+    """Return a text with ``first`` added to its numbers of points and segments."""
     return _NUMBER.sub(lambda found: f'{found[1]}{int(found[2]) + first}', text)
 
 
 def _renumber_commands(text: str, first: int) -> str:
-    """Return a text with its output commands renumbered."""
+    """Return a text with ``first`` added to its numbers of output commands."""
     return _COMMAND.sub(lambda found: f'{found[1]}{int(found[2]) + first}', text)
 
 

@@ -45,7 +45,7 @@ from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
 
 class Replacement(IntEnum):
-    """The kind of replacement by appended points, if any; values as in ``AppendPoints``."""
+    """Whether appended points replace planned ones, and from where; values of ``AppendPoints``."""
 
     APPEND = 0
     REPLACE_FROM_POINT = 1
@@ -65,7 +65,7 @@ class AppendedPoints:
     last: bool = False
     #: The first point that is replaced; None = no such request.
     replace_from_point: int | None = None
-    #: The time from which the motion is replaced, on the clock of the points' times [s]; None = no
+    #: The client time (as in the points' times) from which the motion is replaced [s]; None = no
     #: such request.
     replace_from_time: float | None = None
 
@@ -89,7 +89,7 @@ class AppendedPoints:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplannablePoint:
-    """A point that can be planned again, with joints and client time at the point before it."""
+    """A point whose motion can be planned again, with joints and client time where it begins."""
 
     waypoint: Waypoint
     segment: Segment
@@ -101,12 +101,13 @@ class ReplannablePoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AppendableGoal:
-    """The state of a goal that stays open for points, without the points passed so far."""
+    """A goal that stays open for points, with the data needed to plan more of them."""
 
     #: The goal without its points.
     goal: Goal
     T_flange_active: Pose
     T_flange_tcp: Pose | None
+    #: Number of planned points.
     points: int = 0
     #: Number of planned records.
     records: int = 0
@@ -128,7 +129,8 @@ class AppendableGoal:
     #: Pieces up to ``state``, with their path, that are sent (again) together with the next part,
     #: because outputs follow these pieces or a new tail begins in the middle of one of them.
     replanned: tuple[PlannedRows, ReferencePath] | None = None
-    #: Commands that may not have been carried out, each with the motion time when it is due [s].
+    #: Commands whose records the next part places again, each with the motion time when it is due
+    #: [s].
     outputs: tuple[tuple[float, IOCommand], ...] = ()
     #: The planned parts of a spline that are not passed, in the order of planning; each is valid
     #: until the next one begins.
@@ -202,12 +204,18 @@ def numbered(appended: AppendedPoints, first: int) -> tuple[IOCommand, ...]:
 def _check_times(
     appendable: AppendableGoal, appended: AppendedPoints, options: PlanningOptions
 ) -> None:
-    """Refuse points that are not later, or much later, than the point before, in client time."""
+    """
+    Refuse wrong client times of appended points.
+
+    Each must be later than the time before it, by ``max_segment_time`` at most. A goal whose
+    points have no times gets no points with times.
+    """
     is_tail = appended.replace_from_time is not None
     times, first = WaypointRows.of(appended.waypoints).times, appendable.points
     if appendable.last_client_time == 0.0 and not times.any():
         return
-    # The time 0 of a single point can also mean that the arm was there at the start.
+    # A goal whose only point has the time 0 can be a goal with times: then the arm was at this
+    # point at the start, and did not move.
     moved = any(
         known.planned.length > SAME_POSITION or known.planned.angle > SAME_ANGLE
         for known in appendable.replannable

@@ -23,7 +23,11 @@ _DIGITS, _TIME_DIGITS = 12, 6
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlannedPart:
-    """The spline pieces of one append plan; a new tail can begin at any time on these pieces."""
+    """
+    The spline pieces of one append plan.
+
+    The tail of the goal can be replaced from any time on these pieces.
+    """
 
     #: The joints over motion time, including the stop after the last point, if there is one.
     spline: JointSpline
@@ -42,7 +46,7 @@ class PlannedPart:
         return max(int(np.searchsorted(times, time + SAME_TIME, side='right')) - 1, 0)
 
     def state(self, row: int, time: float) -> SplineState:
-        """Return the state at a time [s] on a piece; the acceleration is 0 on a cubic piece."""
+        """Return the state at a motion time [s] on piece ``row``; on a cubic one, qdd is 0."""
         coefficients = self.spline.coefficients[row : row + 1]
         rows = evaluate(coefficients, np.array([time - self.begin(row)]))
         q, qd, qdd = (vector6(values[0].tolist()) for values in rows)

@@ -36,7 +36,7 @@ _TIME_DIGITS = 6
 
 def cut_time(before: AppendableGoal, new_points: AppendedPoints) -> float:
     """
-    Return the beginning of a new tail in motion time [s]; infinite = at the last point.
+    Return the motion time [s] at which the new tail begins; infinite = nothing is replaced.
 
     :raises GoalRefused: the request names both a point and a time, the point does not exist, the
         time is not finite, or the goal is no spline.
@@ -97,6 +97,8 @@ def cut_tail(before: AppendableGoal, time: float, arm: Arm) -> AppendableGoal:
     """
     Return a goal without its motion after a time [s]; ``before`` itself if nothing is cut off.
 
+    The cut is made a little later where it would leave a piece shorter than ``MIN_PIECE_TIME``.
+
     :raises AlreadySent: a piece that would have to be sent again is no longer available.
     """
     if time == inf:
@@ -110,8 +112,8 @@ def cut_tail(before: AppendableGoal, time: float, arm: Arm) -> AppendableGoal:
     if found is None:
         raise AlreadySent(*first_replaceable(before, before.parts[0].begin(0)))
     part, row = found, found.row_at(time)
-    # Outputs due on the rest of the cut piece follow the piece before it on the wire, so the piece
-    # before is sent again, too.
+    # The records of outputs that are due on the rest of the cut piece follow the piece before it
+    # on the wire. To take these records back, the piece before is sent again, too.
     first = row - any(
         time - SAME_TIME <= due < part.begin(row + 1) - SAME_TIME for due, _ in before.commands
     )
@@ -163,7 +165,7 @@ def _part_at(before: AppendableGoal, time: float) -> PlannedPart | None:
 
 
 def _end_time(before: AppendableGoal, point: int) -> float:
-    """Return the motion time [s] at which a point is reached; -inf = before all parts kept."""
+    """Return the motion time [s] at which a point is reached; -inf = before the kept parts."""
     for part in reversed(before.parts):
         if part.waypoints[0] <= point:
             row = int(np.searchsorted(part.waypoints, point, side='right'))
@@ -184,7 +186,7 @@ def _away_from_ends(part: PlannedPart, time: float) -> float:
 def _path(
     before: AppendableGoal, part: PlannedPart, first: int, time: float, arm: Arm
 ) -> ReferencePath:
-    """Return the path along the pieces that are sent again, from ``first`` to a time [s]."""
+    """Return the path along the pieces sent again: from piece ``first`` to a motion time [s]."""
     begin = part.begin(first)
     times = np.linspace(begin, time, ceil((time - begin) / _ROW_PERIOD) + 1)
     rows = np.searchsorted(part.spline.times, times - SAME_TIME) - 1

@@ -153,7 +153,7 @@ def choose_rotations(
 
 
 def _search_without_collisions(lattice: RotationLattice, path: _FreePath) -> RotationPath:
-    """Return the best way without collisions; if no search finds one, the last way found."""
+    """Return the best way through the lattice without collisions, or else the last way found."""
     least = path.options.min_clearance
 
     def too_close(q: Floats, more: float) -> Flags:
@@ -214,7 +214,7 @@ class _FreePath:
         seen = state if goal.moving_frame is None else goal.moving_frame.seen(state)
         self.start = seen.actual_tcp_pose @ T_tcp_controlled
         starts = np.concatenate([[self.start.row()], poses[:-1]])
-        # At the ends of FIXED arcs, the poses become the poses of arrival.
+        # goal_arcs() also turns the poses at the ends of FIXED arcs, in place, as the arcs arrive.
         self.arc_rows, self.arcs, _ = goal_arcs(goal.segments, goal.T_base_frame, starts, poses)
         self.poses = poses
         self.references, self.rotations = self._references()
@@ -289,7 +289,7 @@ class _FreePath:
         )
 
     def _knots(self, lengths: Floats, tilts: Floats) -> Indices:
-        """Return the rows whose rotations are searched; the rows between are interpolated."""
+        """Return the points whose rotations are searched; the others are interpolated."""
         extent = np.maximum(lengths / _KNOT_LENGTH, tilts / _KNOT_TILT)
         full = np.diff(np.floor(np.cumsum(np.minimum(extent, 1.0))), prepend=0.0) > 0.0
         after_any = np.append(self.is_any[1:] & ~self.is_joint[1:], False)
@@ -297,7 +297,7 @@ class _FreePath:
 
     def _layers(self, ends: Indices, whole: Floats, tilts: Floats) -> list[Layer]:
         postures = self.goal.waypoints.postures
-        # If the rotation is not free, the change that the goal prescribes must be allowed.
+        # Where a rotation has limits, the change from point to point in the goal must be allowed.
         commanded = np.abs(np.diff(self.rotations, prepend=0.0))
         bound = ~self.is_any | np.append(False, ~self.is_any[:-1])
         tilted = tilts * self.sizes  # the axis deviates by tilt x turn / 8
@@ -365,7 +365,7 @@ class _FreePath:
         return np.where(self.free, turns, 0.0)
 
     def _smoothed(self, layers: Sequence[Layer], rotations: Floats) -> Floats:
-        """Return rotations (layers,) without the discrete steps of the search."""
+        """Return rotations (layers,) smoothed over the discrete steps of the search."""
         low, high = rotations - _MAX_SMOOTHING, rotations + _MAX_SMOOTHING
         for number, layer in enumerate(layers):
             if not layer.is_any:

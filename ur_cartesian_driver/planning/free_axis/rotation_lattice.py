@@ -5,10 +5,10 @@ Search for the rotation about a free axis along a path by dynamic programming ov
 
 A *layer* is a place at which the rotation can be chosen, and its *nodes* are rotations. An *edge*
 connects nodes of two layers; along an edge, the rotation changes linearly, as on a line of the
-robot, and the arm is solved at the *samples* between the layers. Each branch has a closed-form
-solution, so all rotations of all samples are solved at once into a table, in which edges look up
-their joints. Each node keeps the joints of the best way to it, so that full turns are tracked and
-joint limits hold along that way.
+robot, and the arm is solved at the *samples* between the layers. Each branch of the arm has a
+closed-form solution, so all rotations of all samples are solved at once into a table, in which
+edges look up their joints. Each node keeps the joints of the best way to it, so that full turns
+are tracked and joint limits hold along that way.
 
 The search is first coarse, over all rotations, then finer and finer around the best way.
 
@@ -69,11 +69,11 @@ _EVENNESS = 2.0
 #: Distances from joint limits [rad] and from singularities (as fractions of their scales) that are
 #: below this add a cost.
 _WIDE_MARGIN = 0.6
-#: Weight of the cost of these distances, per unit of the path.
+#: Weight of the cost of these distances, per unit of path (``RotationSamples.sizes``).
 _NEARNESS = 1.0
-#: Penalty per unit of the path where the planner would refuse the nearness to a singularity.
+#: Penalty per unit of path where the arm is so near a singularity that the planner would refuse.
 _REFUSED = 50.0
-#: Penalty for the part of a turn that exceeds the speed limit of a joint [1/rad].
+#: Penalty per radian by which a joint turns farther than its speed limit allows in the time.
 _TOO_FAST = 50.0
 #: Penalty for a distance from the posture of a point [1/rad].
 _OFF_POSTURE = 20.0
@@ -168,7 +168,11 @@ class _Tables:
     cost: Floats
 
     def look_up(self, sample: int | Int64s, rotations: Floats) -> Int64s:
-        """Return the indices, in the table, of the nearest rotations; one sample, or many."""
+        """
+        Return the indices of the table's rotations that are nearest to ``rotations``.
+
+        :param sample: the sample of all rotations, or the sample of each.
+        """
         index: Int64s = np.rint((rotations - self.first[sample]) / self.step).astype(np.int64)
         count = self.q.shape[3]
         return np.mod(index, count) if self.is_round else np.clip(index, 0, count - 1)
@@ -194,7 +198,8 @@ class RotationLattice:
     _coarse: _Tables | None = None
     _speeds: Floats = field(init=False)
     _ranges: tuple[Floats, Floats] = field(init=False)
-    #: The layers as columns: first samples, then the number of samples; which are joint moves.
+    #: The first sample of each layer, with the number of samples appended; whether each layer is
+    #: reached by a joint move.
     _begins: Int64s = field(init=False)
     _is_joint: Flags = field(init=False)
     #: (n,) the layer of each sample.
@@ -349,7 +354,7 @@ class RotationLattice:
                 nodes[number] = np.clip(nodes[number], layer.low + turns, layer.high + turns)
         ends = self._begins[1:] - 1
         joints = _taken(tables.q[ends], tables.look_up(ends[:, None], nodes[1:]))
-        # As many full turns as on the path.
+        # Choose the full turns that bring the joints nearest to the joints on ``path``.
         joints += tau * np.rint((path.joints.T[:, :, None] - joints) / tau)
         start = np.broadcast_to(np.array(self.q_start)[:, None, None], (6, 1, len(offsets)))
         joints = np.concatenate([start, joints], axis=1)
@@ -394,6 +399,7 @@ class RotationLattice:
         turn[:, ends[is_joint]] = (q_targets - q_sources)[:, is_joint]
         here = np.cumsum(turn, axis=1)
         here += (q_sources - (here - turn)[:, begins])[:, layer]
+        # An edge must end at the joints of its target node, not a full turn away from them.
         jumps: Flags = np.any(np.abs(here[:, ends] - q_targets) > _MAX_JOINT_STEP, axis=0)
         turn = np.abs(turn)
         is_joint = is_joint[:, None, None]
@@ -536,7 +542,7 @@ def _column(joints: Sequence[float]) -> Floats:
 
 
 def _taken(table: Floats, entry: Int64s) -> Floats:
-    """Return entries (n, ...) of a branch's table (n, k, 1, rotations) as (k, n, ...)."""
+    """Return the values of a one-branch table (n, k, 1, rotations) at ``entry`` as (k, n, ...)."""
     rows = table[:, :, 0].swapaxes(0, 1)
     taken: Floats = np.take_along_axis(rows, entry.reshape(1, len(entry), -1), axis=2)
     return taken.reshape(len(rows), *entry.shape)

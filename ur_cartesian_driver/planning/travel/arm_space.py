@@ -19,12 +19,12 @@ from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_chan
 
 #: No joint turns farther than this from one checked configuration to the next [rad].
 _ROW_STEP = radians(1.0)
-#: Stride of the first look at these configurations.
+#: At first, only each eighth of these configurations is checked.
 _FIRST_STRIDE = 8
 #: Distance between two configurations on a line along the axis of the tool [m], and the largest
 #: turn of a joint between them [rad]: a greater one leads to another branch.
 _LINE_STEP, _MAX_TURN = 0.002, 0.2
-#: The least weight of a joint [m]: wrist 3 turns a tool without length about its own axis.
+#: The least weight of a joint [m/rad]. Wrist 3 would weigh nothing if the tool has no length.
 _MIN_WEIGHT = 0.05
 
 
@@ -33,7 +33,7 @@ class ArmSpace:
     The configurations of an arm, with checks that it is clear of itself and of its cell.
 
     :param kinematics: the arm and its TCP.
-    :param options: the options for :class:`~.clearance.Clearance`.
+    :param options: the cell, planes and distances that :class:`~.clearance.Clearance` checks.
     """
 
     def __init__(self, kinematics: TcpKinematics, options: PlanningOptions) -> None:
@@ -46,11 +46,12 @@ class ArmSpace:
         self._cell = Clearance(arm, T_flange_tcp, only_cell)
         #: Lowest and highest position of each joint, (2, 6) [rad].
         self.limits: Floats = np.array(model.position_limits).T
-        # A joint moves the lengths across its axis and all lengths after it, none along its axis.
+        # A joint moves its link's length across the joint axis, but not the length along it, and
+        # moves all lengths of the links beyond.
         across, along = np.abs(model.geometry.a), np.abs(model.geometry.d)
         beyond = np.cumsum((across + along)[::-1])[::-1] - along
         length = float(np.linalg.norm(kinematics.T_flange_tcp.position))
-        #: Greatest displacement of the arm by each joint, (6,) [m/rad].
+        #: Greatest displacement of the arm for each radian of a joint, (6,) [m/rad].
         self.weights: Floats = np.maximum(beyond + length, _MIN_WEIGHT)
 
     def free(self, q: Floats) -> Flags:
@@ -58,9 +59,9 @@ class ArmSpace:
         return ~self._clearance.too_close(q)
 
     def seems_free(self, a: Floats, b: Floats) -> bool:
-        """Return whether a straight joint motion is clear in all rows but its beginning."""
+        """Return whether configurations at small steps from ``a`` (left out) to ``b`` are clear."""
         rows = _rows(a, b)
-        # A few rows reveal most motions that are not free.
+        # A few of them reveal most motions that are not free.
         return not any(
             self._clearance.too_close(some).any()
             for some in (rows[::-_FIRST_STRIDE], rows)
@@ -71,20 +72,22 @@ class ArmSpace:
         """
         Return whether a straight joint motion that seems free is clear of the cell everywhere.
 
-        Self-collisions and planes are checked in rows only, which :meth:`seems_free` has done.
+        Self-collisions and planes are checked only at the steps of :meth:`seems_free`, which must
+        have been called before.
         """
         start = vector6(a.tolist())
         return self._cell.check(_rows(a, b), start, closest=False).violation is None
 
     def violation(self, q: Floats, q_start: Joints) -> Violation | None:
-        """Return the first violation in configurations (n, 6) [rad] on the way from a start."""
+        """Return the first violation in configurations (n, 6) [rad] after ``q_start``, or None."""
         return self._clearance.check(q, q_start, closest=False).violation
 
     def touching(self, q: Joints) -> Violation | None:
         """
         Return the violation in a configuration; None if the arm is clear of everything.
 
-        A travel also avoids violations of which the planner only warns.
+        This includes violations of which the planner would only warn, because a travel avoids
+        them, too.
         """
         return self._clearance.violation_at(q)
 
@@ -113,7 +116,7 @@ class ArmSpace:
 
     def configurations(self, T_base_tcp: Pose, q_near: Joints) -> list[Joints]:
         """
-        Return the configurations in which the arm reaches a pose, the nearest first.
+        Return the configurations in which the arm reaches a pose, the nearest to q_near first.
 
         Whole turns bring each joint as near to ``q_near`` as its limits allow.
         """
@@ -131,7 +134,7 @@ class ArmSpace:
 
 
 def _rows(a: Floats, b: Floats) -> Floats:
-    """Return the configurations on a straight joint motion, without its beginning."""
+    """Return the configurations (n, 6) at small steps from ``a`` to ``b``, without ``a``."""
     count = max(1, ceil(float(np.abs(b - a).max()) / _ROW_STEP))
     rows: Floats = a + np.linspace(0.0, 1.0, count + 1)[1:, None] * (b - a)
     return rows

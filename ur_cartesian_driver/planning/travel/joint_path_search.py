@@ -6,11 +6,12 @@ Search for a joint path from a configuration to one of several others, and short
 The straight joint motion is tried first. Then two trees of configurations grow towards each other
 (RRT-Connect: J. Kuffner and S. LaValle, "RRT-Connect: an efficient approach to single-query path
 planning", ICRA 2000), one from the start, one from all goals. A :class:`JointSpace` decides which
-motions are free, so the search knows neither arm nor obstacles. The number of samples bounds the
-search, not the time, and a seed draws the samples: the same question has the same answer on every
-machine.
+motions are free, so the search knows neither arm nor obstacles. The search ends after a number of
+samples, not after a time, and a seed determines the samples. So equal inputs lead to the same path
+on every machine.
 
-Proving that a motion is free takes much longer than checking places on it. So trees grow by
+Proving that a motion is free takes much longer than checking single configurations on it. So trees
+grow by
 motions that seem free, and a connection from the start to a goal is proved when it is found
 (R. Bohlin and L. Kavraki, "Path planning using lazy PRM", ICRA 2000, do likewise). If a motion is
 not free, all nodes beyond it are cut off, and the search goes on.
@@ -26,11 +27,11 @@ import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 
-#: Length of the motion by which a tree grows, as a fraction of the greatest weight: the joint that
-#: moves the arm most turns by this angle [rad].
+#: A tree grows by motions of equal weighted length: a motion of only the joint with the greatest
+#: weight turns this joint by this angle [rad].
 _STEP = 0.35
-#: Smallest and largest margin around the box of start and goals in which samples are drawn [rad]:
-#: most ways round an obstacle are near, and some need another turn of a joint.
+#: Samples are drawn from the box around start and goals, enlarged by a random margin between these
+#: two [rad]: most ways round an obstacle are near the box, but some need another turn of a joint.
 _MIN_MARGIN, _MAX_MARGIN = 0.2, pi
 #: Rounds of shortening, and random chords that are tried in each.
 _ROUNDS, _CHORDS = 3, 30
@@ -47,13 +48,13 @@ class JointSpace(Protocol):
 
     @property
     def weights(self) -> Floats:
-        """Displacement of the arm by each joint, (6,) [m/rad]."""
+        """Displacement of the arm for each radian of a joint, (6,) [m/rad]."""
 
     def free(self, q: Floats) -> Flags:
         """Return whether the arm touches nothing in each configuration (n, 6) [rad]."""
 
     def seems_free(self, a: Floats, b: Floats) -> bool:
-        """Return whether the arm touches nothing at places on the straight motion from a to b."""
+        """Return whether the arm touches nothing at steps of the straight motion from a to b."""
 
     def is_free(self, a: Floats, b: Floats) -> bool:
         """Return whether the arm touches nothing anywhere on a motion that seems free."""
@@ -94,7 +95,7 @@ def search_joint_path(
 
 
 def path_length(space: JointSpace, waypoints: Floats) -> float:
-    """Return the length of a joint path, weighted by the weights of the joints [m]."""
+    """Return the length [m] of a joint path (k, 6) [rad], weighted by the joints' weights."""
     return float(_lengths(space, np.diff(waypoints, axis=0)).sum())
 
 
@@ -120,9 +121,9 @@ class _Tree:
         self._space = space
         self._rows = np.empty((max(64, 2 * len(roots)), 6))
         self._rows[: len(roots)] = roots
-        #: The number of the node before each node; -1 = it is a root.
+        #: The number of each node's parent; -1 = the node is a root.
         self._before = [-1] * len(roots)
-        #: The nodes to which the motion is proved to be free.
+        #: The nodes with a motion from their parent that is proved to be free.
         self._proved: set[int] = set()
 
     def nearest(self, q: Floats) -> int:
@@ -134,7 +135,8 @@ class _Tree:
         """
         Grow by one step from a node towards a configuration.
 
-        :returns: the new node, -1 if the step is not free; whether it reaches the configuration.
+        :returns: the number of the new node, or -1 if the step is not free; and whether the new
+            node is at the configuration.
         """
         here = self._rows[node]
         length = float(_lengths(self._space, (q - here)[None])[0])
@@ -156,7 +158,7 @@ class _Tree:
         return row
 
     def prove(self, node: int) -> bool:
-        """Return whether a node is connected to its root by free motions; cut it off if not."""
+        """Return whether all motions from the root to a node are free; cut off nodes if not."""
         nodes = []
         while self._before[node] >= 0:
             nodes.append(node)
@@ -170,7 +172,7 @@ class _Tree:
         return True
 
     def _cut(self, node: int) -> None:
-        """Cut off a node and all nodes beyond it: at infinity, they are never the nearest."""
+        """Move a node and all nodes beyond it to infinity, where they are never the nearest."""
         gone = {node}
         for k in range(node + 1, len(self._before)):
             if self._before[k] in gone:
@@ -190,7 +192,7 @@ class _Tree:
 def _grow(
     space: JointSpace, start: Floats, goals: Floats, max_samples: int, random: np.random.Generator
 ) -> FoundPath | None:
-    """Return the first path that is found between two trees."""
+    """Return the first path found from the start to a goal; None after ``max_samples``."""
     from_start, from_goals = _Tree(space, start[None]), _Tree(space, goals)
     one, other = from_start, from_goals
     hull = np.vstack([start, goals])
@@ -222,7 +224,7 @@ def _connected(tree: _Tree, q: Floats) -> int:
 
 
 def _shortened(space: JointSpace, path: Floats, random: np.random.Generator) -> Floats:
-    """Return a path from which detours are cut off by free straight motions."""
+    """Return the path with detours replaced by free straight motions."""
     for _ in range(_ROUNDS):
         path = _without_corners(space, path)
         if len(path) == 2:
@@ -233,7 +235,7 @@ def _shortened(space: JointSpace, path: Floats, random: np.random.Generator) -> 
 
 
 def _without_corners(space: JointSpace, path: Floats) -> Floats:
-    """Return a path whose rows go straight to the farthest later row that is free."""
+    """Return the path without the rows that free straight motions can skip."""
     kept, k = [0], 0
     while k < len(path) - 1:
         later = range(len(path) - 1, k + 1, -1)
@@ -243,7 +245,11 @@ def _without_corners(space: JointSpace, path: Floats) -> Floats:
 
 
 def _cut(space: JointSpace, path: Floats, random: np.random.Generator) -> Floats:
-    """Return a path with a chord between two random places of it, if it is free and shorter."""
+    """
+    Return the path with a chord between two random places.
+
+    If the chord is not free, or not shorter by ``_WORTHWHILE``, the path is returned unchanged.
+    """
     lengths = _lengths(space, np.diff(path, axis=0))
     ends = np.concatenate([[0.0], np.cumsum(lengths)])
     places = np.sort(random.uniform(0.0, ends[-1], 2))

@@ -25,9 +25,9 @@ from ur_cartesian_driver.planning.travel.joint_path_search import search_joint_p
 
 #: The largest retract and approach [m]; larger numbers must be millimetres by mistake.
 MAX_RETRACT = 1.0
-#: The fractions of a length that are tried if it may be shortened.
+#: The fractions of retract or approach that are tried in turn if they may be shortened.
 _SHORTER = (1.0, 0.4, 0.0)
-#: The largest number of samples.
+#: The largest ``max_samples`` that is accepted.
 MAX_SAMPLES = 1_000_000
 
 
@@ -70,7 +70,7 @@ class Transfer:
 
     #: (k, 6) [rad]; between two rows the joints move straight.
     waypoints: Floats
-    #: The configuration in which the transfer ends: one of the requested ones [rad].
+    #: The requested configuration to which the approach leads [rad].
     goal: Joints
     #: The number of samples that the search took.
     samples: int
@@ -88,7 +88,8 @@ def find_transfer(
     """
     Return a transfer to one of several configurations.
 
-    :param goals: at least one, the preferred one first.
+    :param goals: at least one; if none of them has a free approach, the refusal of the first one
+        is raised.
     :param where: the beginning of a refusal, such as ``The travel to point 0``.
     :raises CollisionPredicted: the arm touches something at the start, on the retract, or in each
         goal or on its approach; or no path was found.
@@ -136,7 +137,7 @@ def _line_end(
 
 
 def _along_tool(space: ArmSpace, q: Joints, distance: float, what: str, setting: str) -> Floats:
-    """Return the configuration (6,) at the end of a line along the tool, which is checked."""
+    """Return the configuration (6,) at the end of a line along the tool, if the line is free."""
     if not distance:
         return np.array(q)
     rows = space.along_tool(q, distance)

@@ -3,8 +3,9 @@
 """
 Begin the plan of a goal with a travel from the present position of the arm (``allow_travel``).
 
-The travel is planned as a goal of its own that ends, at rest, in front of the first point. Then
-the client's goal is planned as if the arm stood there. So all texts name points as the client
+The travel is planned as a goal of its own that ends, at rest, where the approach to the first
+point begins. Then the client's goal is planned as if the arm stood there, so that its first motion
+is the approach. All texts name points as the client
 numbers them, and in the joined plan the travel is a part of the segment to point 0.
 """
 
@@ -60,7 +61,7 @@ def plan_with_travel(
     goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions, plan: PlanGoal
 ) -> Plan:
     """
-    Return the plan of a goal, which begins with a travel if the direct way is refused.
+    Return the plan of a goal; it begins with a travel if the arm cannot go directly to point 0.
 
     :param plan: plans the goal from a state, and ignores ``allow_travel``.
     :raises GoalRefused: the goal is refused, or no travel to it was found.
@@ -83,9 +84,9 @@ def plan_with_travel(
 
 def blend_radii(poses: Sequence[Pose], largest: float) -> list[float]:
     """
-    Return the blend radius at the end of each motion through some poses [m]; 0 at the last.
+    Return the blend radius [m] at the end of each motion from pose to pose; 0 at the last.
 
-    :param poses: the beginning of the first motion, and the end of each.
+    :param poses: the beginning of the first motion, then the end of each motion.
     """
     lengths = [a.distance_to(b) for a, b in pairwise(poses)]
     radii = [
@@ -96,14 +97,14 @@ def blend_radii(poses: Sequence[Pose], largest: float) -> list[float]:
 
 
 class _Stop(NamedTuple):
-    """The end of a motion of a travel."""
+    """A motion of a travel: the configuration [rad] in which it ends, and its type."""
 
     q: Joints
     type: SegmentType
 
 
 class _Travel:
-    """A travel to a checked goal."""
+    """Plans a checked goal with a travel to it."""
 
     def __init__(
         self,
@@ -144,7 +145,8 @@ class _Travel:
             except GoalRefused as error:
                 if refusal is None:
                     refusal = error
-                    # Planning the goal takes less time than another search.
+                    # Planning the goal from each remaining entry takes less time than a search
+                    # for a way to an entry from which the goal is refused.
                     entries = [q for q in entries if self._can_begin(q)]
             else:
                 if travel is None:
@@ -156,6 +158,8 @@ class _Travel:
     def _entries(self) -> list[Joints]:
         """
         Return the configurations of the arm at the first point, the nearest first.
+
+        If the point has a posture, only the solutions that it selects are returned.
 
         :raises Unreachable: there is none.
         """
@@ -230,7 +234,7 @@ class _Travel:
 
 
 def _goal_like(goal: Goal, waypoints: Sequence[Waypoint], segments: Sequence[Segment]) -> Goal:
-    """Return a goal with other points in the same frames."""
+    """Return a PRIMITIVES goal with other points in the frames of ``goal``."""
     return Goal(
         frame_id=goal.frame_id,
         controlled_frame=goal.controlled_frame,
