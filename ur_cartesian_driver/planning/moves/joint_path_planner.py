@@ -229,7 +229,7 @@ class JointPathPlanner:
         )
 
     def _entry(self, k: int) -> Floats:
-        """Return the row (1, 3) of the unsolved piece before segment k; (0, 3) = none is left."""
+        """Return the unsolved piece before segment k as a row for _curve_pieces(), or no row."""
         if k > 0 and self._path.radius[k - 1] > 0.0:
             return np.array([(2.0 * k - 1.0, 0.0, 1.0)])
         if k > 0 and self._drafts.solved_until[k - 1] < 1.0:
@@ -237,7 +237,7 @@ class JointPathPlanner:
         return np.empty((0, 3))
 
     def _curve_pieces(self, pieces: Floats) -> CurvePieces:
-        """Return the curve pieces of rows (n, 3): curve number, begin and end of each piece."""
+        """Return the curve pieces of rows (n, 3): curve number, first and last parameter."""
         number, begin, end = pieces.T
         found = CurvePieces.of(self._path, self._drafts.begin, number.astype(np.intp), begin, end)
         check_sample_count(

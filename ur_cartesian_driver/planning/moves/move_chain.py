@@ -4,12 +4,12 @@
 The timing of a chain of moves as the controller executes them, with a row for each move.
 
 The controller looks one move ahead, and plans each move to come to rest at its waypoint. Where the
-blend begins, the next move is called: the current path is cut there, the rate of the blend's
-parameter changes linearly over time, and after the blend the next move continues at the speed with
-which the blend ends. So a move depends on the previous one only through the handover
-(:class:`Handover`), and most moves hand over the same state whatever they received. All rows are
-computed at once; then the rows that received a changed handover are computed again, until no
-handover changes.
+blend begins, the next move is called: the current path is cut there. Along the blend, a parameter
+``s`` runs from 0 to 1, and its rate changes linearly over time. After the blend, the next move
+continues at the speed with which the blend ends. So a move depends on the previous one only
+through the handover (:class:`Handover`), and most moves hand over the same state whatever they
+received. All rows are computed at once; then the rows that received a changed handover are
+computed again, until no handover changes.
 
 Lengths are measured as by the robot: in metres, or in radians if the turn or a joint leads.
 """
@@ -89,12 +89,13 @@ class Moves(_Columns):
     entry_rate: Floats
     #: Time that the controller loses before the move [s].
     idle: Floats
-    #: Rate half-way through the blend before the move, relative to the rate of an even change.
+    #: Rate half-way through the blend before the move, relative to the rate there if it changed
+    #: linearly over time all along the blend; 1 = it does.
     bend: Floats
 
     @property
     def accelerations(self) -> Floats:
-        """Accelerations; of a move with a time, the acceleration to meet it from rest to rest."""
+        """Accelerations; of a move with a time, the one that it needs from rest to rest."""
         p = self.ramp_part
         by_time = self.length / np.maximum(p * (1.0 - p) * self.time**2, _TINY)
         return np.where(self.time > 0.0, by_time, self.acceleration)
@@ -217,7 +218,8 @@ def ramp_time(begin: Floats, end: Floats, s: Floats | float, bend: Floats) -> Fl
     """
     Return the times (n,) [s] to reach ``s`` in blends.
 
-    Their rates change linearly over time, or in two halves: see :attr:`Moves.bend`.
+    Their rates change linearly over time, on the whole blend or on each half of it: see
+    :attr:`Moves.bend`.
     """
     even = _even_ramp_time(begin, end, s)
     if (bend == 1.0).all():
@@ -371,6 +373,7 @@ def _carry_out(moves: Moves, handed: Handover) -> MoveTimes:
         time - ramp_time(begin, end, 1.0, moves.bend),
         time * rest / (moves.length + moves.head) / _MAX_CATCH_UP,
     )
+    # Durations of the ramp to rest, and of the ramp to the cruising speed.
     last = np.where(timed, moves.ramp_part * left, 1.0)
     first = np.minimum(last, rest / np.maximum(enter, _TINY))
     even = (rest - 0.5 * enter * first) / np.where(timed, left - 0.5 * (first + last), 1.0)

@@ -121,8 +121,8 @@ def speed_bounds(
         joint=joint[on_blend],
         tool_distance=distance / step[on_blend],
     )
-    # A sample in a blend adds half its time to each of the two segments, and bounds the rate of
-    # neither: joints may reverse there.
+    # A sample in a blend adds half its time to each of the two segments. It does not bound their
+    # rates, because the joints may reverse in a blend.
     joint_time[on_blend] *= 0.5
     local_time[on_blend], rate[on_blend] = np.inf, 0.0
     rows = np.concatenate([np.arange(len(rate)), on_blend])

@@ -26,8 +26,8 @@ def reference_path(start: Pose, begin: int, path: BlendedPath, times: MoveTimes)
     """
     Return the path that the robot is expected to follow, blends included.
 
-    Lines are sampled at their ends and where the acceleration changes. Other curves are sampled so
-    that chords between the samples stay close to the curve (see
+    Lines are sampled at their ends, where the acceleration changes, and once on each ramp of the
+    speed. Other curves are sampled so that chords between the samples stay close to the curve (see
     :mod:`~ur_cartesian_driver.planning.geometry.curves`). Successive rows differ by at most
     10 degrees.
 
@@ -71,7 +71,8 @@ def _places(path: BlendedPath, times: MoveTimes) -> tuple[Indices, Floats]:
     inside[:, 1:] &= knots[:, 1:] > knots[:, :-1]
     own = np.repeat(rows, inside.sum(axis=1))
     at_knots = (begin[:, None] + span[:, None] * knots)[inside]
-    # The arm stands still before these lines: they begin later than the segments before them end.
+    # The arm stands still before these segments. So each gets a row of its own at its beginning,
+    # which is later than the row at the end of the segment before.
     late = np.flatnonzero((times.idle > 0.0) & ~curves.is_joint_line)
     own, at_knots = np.append(own, late), np.append(at_knots, begin[late])
     if len(row):

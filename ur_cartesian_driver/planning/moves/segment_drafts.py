@@ -58,7 +58,7 @@ class SegmentDrafts:
 
     :param targets: poses of all waypoints in the frame of the path (n, 7).
     :param begin: index of the first waypoint with a motion.
-    :param start: pose of the tool in the frame of the path.
+    :param start: pose of the tool in the frame of the path at the start.
     :param remarks: list to which remarks on ignored or changed fields are appended.
     :raises InvalidGoal: the points define no line or arc, or the first blend is too large.
     """
@@ -115,7 +115,12 @@ class SegmentDrafts:
         self._find_blends()
 
     def make_joint_move(self, row: int) -> None:
-        """Replace a line or an arc by a joint move; the next curve then begins at the waypoint."""
+        """
+        Replace a line or an arc by a joint move.
+
+        The next curve then begins in the waypoint's own orientation, even if the replaced segment
+        was a FIXED arc, which arrives in another one.
+        """
         self.kinds[row], self.is_joint_move[row] = _JOINT, True
         self._find_blends()
         after = row + 1
@@ -174,7 +179,7 @@ class SegmentDrafts:
     # -- radii -----------------------------------------------------------------------------------
 
     def _radii(self, remarks: list[tuple[int, str]]) -> Floats:
-        """Return the blend radii that the wire carries (n,) [m]."""
+        """Return the blend radii (n,) [m], rounded as the wire carries them."""
         radii = self.segments.blend_radii.copy()
         radii[-1] = 0.0
         rounded, found = round_radii(radii, self.begin, self._options)

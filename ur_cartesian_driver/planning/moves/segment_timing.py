@@ -244,8 +244,8 @@ class SegmentTimings:
         begin, end = times.begin_rate[after], times.end_rate[after]
         # A measured law may slow a blend, but never make the arm faster than the assumed law does.
         bend = np.maximum(times.bend[after], 1.0)
-        # If a measured law makes the blend faster, the rate has a peak half-way: take the end of
-        # each sample that is nearer to the peak.
+        # If a measured law makes the blend faster, the rate has a peak half-way. So the rate is
+        # taken at the end of each sample's step that is nearer to this peak.
         nearer = np.clip(0.5, samples.s - samples.half_step, samples.s + samples.half_step)
         at_sample = ramp_rate(begin, end, np.where(bend > 1.0, nearer, samples.s), bend)
         over = at_sample * np.maximum(
@@ -289,7 +289,7 @@ class SegmentTimings:
         )
 
     def _is_ramp(self, row: int) -> bool:
-        """Return whether the ramps from rest to rest need more time than the speed limit."""
+        """Return whether acceleration, not speed, limits a timed segment from rest to rest."""
         if not self._timed[row]:
             return False
         requests, limits = self.requests, self.requests.limits
@@ -317,7 +317,8 @@ class SegmentTimings:
         least = shortest_duration(between, speed, acceleration, ramps)
         greatest = shortest_duration(moves.length, speed, acceleration, 2.0)
         tool_speed = speed * np.maximum(path.curves.length, 1e-9) / moves.length
-        # A blend with legs of length r and a chord c is at most r + c / 2 long, which bounds c.
+        # A blend with legs of length r and a chord c is at most r + c / 2 long. So its length
+        # gives a lower bound of c.
         across = np.where(after, 2.0 * np.maximum(path.blend_length - path.reach, 0.0), 0.0)
         least[:-1] += across[:-1] / np.maximum(tool_speed[:-1], tool_speed[1:])
         return (
@@ -406,7 +407,7 @@ class SegmentTimings:
         )
 
     def _too_small(self, row: int, speed: float) -> InvalidGoal:
-        """Return the refusal of a blend that the robot would skip to stop at the point (C171)."""
+        """Return the refusal of a blend that the robot would skip, with the message C171."""
         return InvalidGoal(
             segment_field(self._geometries.begin + row, 'blend_radius'),
             f'is {1e3 * self._geometries.path.radius[row]:g} mm, less than the '

@@ -55,9 +55,10 @@ def unknown_speeds(geometries: SegmentGeometries) -> tuple[list[int], list[int]]
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
 class SlowStretches(Rows[SlowStretch]):
     """
-    Slow stretches in columns (n,) named like their fields: a long goal can have several per point.
+    Slow stretches in columns (n,), because a long goal can have several per point.
 
-    Reasons have ``{point}`` and ``{speed}`` in place of numbers.
+    The columns have the names of the fields of a :class:`SlowStretch`. Reasons have ``{point}``
+    and ``{speed}`` in place of numbers.
     """
 
     first: Indices
@@ -121,6 +122,7 @@ class _SlowMoves:
         self._asked = np.where(self._carries, requests.asked, np.nan)
         #: Distance that the tool moves per unit of the length that the robot uses.
         self._ratio = curves.length / np.maximum(timings.chain.moves.length, _TINY)
+        #: The lowest speed that is not too slow, in the unit of the length that the robot uses.
         self._wanted = (1.0 - slower_by) * self._asked / np.maximum(self._ratio, _TINY)
         self._too_slow = self._carries & (times.cruise < self._wanted)
 
@@ -153,7 +155,12 @@ class _SlowMoves:
         return turns
 
     def _ramps(self) -> tuple[Floats, Floats]:
-        """Return the profile distances (n,) at which moves become fast enough, and slow again."""
+        """
+        Return the profile distances (n,) at which moves become fast enough, and slow again.
+
+        Of a move whose cruising speed is too low, these are the ends of its cruise, or of its
+        whole profile if the segment is too short or turns the tool.
+        """
         times = self._timings.chain.times
         full = times.length - times.tail
         slow = (1.0 - self._slower_by) * times.cruise
@@ -347,7 +354,7 @@ class _SlowMoves:
         """
         Return the stretches at places (n,): first row and fraction, last row and fraction.
 
-        :param points: rows of the segments to the points that are named; None = the first ones.
+        :param points: rows of the segments to the points that the reasons name; None = ``first``.
         """
         first, begin, last, end = place
         base, shape = self._geometries.begin, first.shape

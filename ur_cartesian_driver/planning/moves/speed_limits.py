@@ -123,7 +123,8 @@ class SpeedLimits:
         """Return the greatest speeds of the leading quantities that max_tool_speed allows."""
         if self._options.max_tool_speed <= 0.0:
             return np.full(len(self.length), inf)
-        # Some joint is always at its limit, so the tool is fastest where joints turn least.
+        # In an OPTIMIZED move, some joint is always at its limit. So the tool is fastest where the
+        # joints turn least.
         shortest = np.maximum(self._bounds.shortest_times, _MIN_LENGTH)
         travel = curves.length * 1.0
         for row in rows_where(curves.is_joint_line):

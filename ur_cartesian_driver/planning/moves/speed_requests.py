@@ -35,8 +35,9 @@ from ur_cartesian_driver.planning.request.goal_fields import (
 from ur_cartesian_driver.planning.request.program_features import takes_times
 
 #: If a move has a time T, the robot stretches the trapezoid of its speed and acceleration to T
-#: (recorded on a UR3). We send 1.5 d/T and 4.5 d/T^2, for which accelerating, cruising and braking
-#: take T/3 each; we assume these thirds also of robots that ignore speed and acceleration.
+#: (recorded on a UR3). For a length d we send 1.5 d/T and 4.5 d/T^2, for which accelerating,
+#: cruising and braking take T/3 each. We also assume these thirds of robots that ignore speed and
+#: acceleration.
 RAMP_SHARE = 1.0 / 3.0
 #: Assumed acceleration of an OPTIMIZED move at fraction 1 [rad/s^2]; the robot's own limits are
 #: not published. It is only used to estimate the time of such a move.
@@ -230,7 +231,7 @@ class SpeedRequests:
     # -- speeds ----------------------------------------------------------------------------------
 
     def _by_speed(self) -> None:
-        """Request speeds."""
+        """Request the speeds of the goal, or the default ones, within the limits."""
         options, limits = self._options, self.limits
         at_speed_of_tool = self.turn_leads_line & limits.translates
         bound = np.where(at_speed_of_tool, options.max_tool_speed or inf, limits.speed)
@@ -338,7 +339,7 @@ class SpeedRequests:
     # -- times -----------------------------------------------------------------------------------
 
     def _by_time(self) -> None:
-        """Request times."""
+        """Request the times of the goal."""
         geometries, limits, timed = self.geometries, self.limits, self.has_wire_time
         # The speed of these motions has not been measured if the turn leads.
         unmeasured = ~timed & limits.is_turn & IS_ARC_OR_PROCESS[self._kinds]

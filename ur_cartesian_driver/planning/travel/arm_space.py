@@ -19,7 +19,7 @@ from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_chan
 
 #: No joint turns farther than this from one checked configuration to the next [rad].
 _ROW_STEP = radians(1.0)
-#: At first, only each eighth of these configurations is checked.
+#: At first, only one in this many of these configurations is checked.
 _FIRST_STRIDE = 8
 #: Distance between two configurations on a line along the axis of the tool [m], and the largest
 #: turn of a joint between them [rad]: a greater one leads to another branch.
@@ -59,7 +59,7 @@ class ArmSpace:
         return ~self._clearance.too_close(q)
 
     def seems_free(self, a: Floats, b: Floats) -> bool:
-        """Return whether configurations at small steps from ``a`` (left out) to ``b`` are clear."""
+        """Return whether configurations at small steps from a (left out) to b are clear."""
         rows = _rows(a, b)
         # A few of them reveal most motions that are not free.
         return not any(

@@ -11,10 +11,9 @@ samples, not after a time, and a seed determines the samples. So equal inputs le
 on every machine.
 
 Proving that a motion is free takes much longer than checking single configurations on it. So trees
-grow by
-motions that seem free, and a connection from the start to a goal is proved when it is found
-(R. Bohlin and L. Kavraki, "Path planning using lazy PRM", ICRA 2000, do likewise). If a motion is
-not free, all nodes beyond it are cut off, and the search goes on.
+grow by motions that seem free, and a connection from the start to a goal is proved when it is
+found (R. Bohlin and L. Kavraki, "Path planning using lazy PRM", ICRA 2000, do likewise). If a
+motion is not free, all nodes beyond it are cut off, and the search goes on.
 """
 
 from __future__ import annotations
@@ -158,7 +157,11 @@ class _Tree:
         return row
 
     def prove(self, node: int) -> bool:
-        """Return whether all motions from the root to a node are free; cut off nodes if not."""
+        """
+        Return whether all motions from the root to a node are free.
+
+        If one of them is not free, the nodes beyond it are cut off.
+        """
         nodes = []
         while self._before[node] >= 0:
             nodes.append(node)

@@ -5,8 +5,8 @@ Begin the plan of a goal with a travel from the present position of the arm (``a
 
 The travel is planned as a goal of its own that ends, at rest, where the approach to the first
 point begins. Then the client's goal is planned as if the arm stood there, so that its first motion
-is the approach. All texts name points as the client
-numbers them, and in the joined plan the travel is a part of the segment to point 0.
+is the approach. All texts name points as the client numbers them, and in the joined plan the
+travel is a part of the segment to point 0.
 """
 
 from __future__ import annotations
