@@ -151,7 +151,7 @@ def test_a_program_that_is_paused_between_two_moves_makes_two(laws):
     assert [move.piece.resumed for move in found.moves] == [False, False]
 
 
-@pytest.mark.parametrize('name', ['blend_shape', 'speed_noise'])
+@pytest.mark.parametrize('name', ['speed_noise'])
 def test_no_experiment_is_recommended_that_does_not_show_the_law(laws, name):
     found = identify([interrupted(laws, None)]).results[name]
     assert found.experiment == 'no experiment shows it yet'

@@ -95,6 +95,8 @@ def drawn_twin(model, random):
         'timed_linear_acceleration': random.uniform(0.5, 2.0),
         'timed_linear_speed': random.uniform(0.1, 0.3),
         'idle_between_moves': random.uniform(0.0, 0.02),
+        'blend_begin': random.uniform(0.4, 1.0),
+        'blend_speed_ratio': random.uniform(0.5, 2.0),
         'lag': random.uniform(3e-4, 1.3e-3),
         'friction': random.uniform(1e-4, 3e-4),
         'static_error': random.uniform(5e-5, 4e-4),
@@ -126,6 +128,13 @@ LEFT = '\n'.join(CALL.format(0.2 + turned) for turned in [0.02 * i for i in rang
 LEFT += '\nsleep(1)'
 LINES = """movel(pose_trans(get_target_tcp_pose(), p[0, 0, 0, 0.3, 0.2, 0.5]), a=0.5, v=0.1)
 movel(pose_add(get_target_tcp_pose(), p[0.02, -0.05, 0.12, 0, 0, 0]))"""
+BLENDED_LINES = """
+movel(pose_add(get_target_tcp_pose(), p[0, 0.12, 0, 0, 0, 0]), a=1, v=0.1, r=0.02)
+movel(pose_add(get_target_tcp_pose(), p[0.04, 0.04, -0.12, 0, 0, 0]), a=1, v=0.08, r=0.03)
+movel(pose_add(get_target_tcp_pose(), p[0.1, -0.1, 0, 0, 0, 0.2]), a=1, v=0.12)"""
+BLENDED_JOINTS = """movej([0.9, -1.1, 1.2, -1.6, -1.5, 0.2], a=1, v=0.2, r=0.02)
+movej([0.5, -1.3, 1.0, -1.4, -1.5, 0.4], a=1, v=0.25, r=0.02)
+movej([0.6, -1.0, 1.4, -1.6, -1.5, 0.2], a=1, v=0.2)"""
 LONG = 'movej([{}, -1.2, 1.4, -1.6, -1.5, 0.2], a=3, v=0.5)'
 
 
@@ -139,7 +148,9 @@ def recordings(recorder):
         'pause': lambda controller: controller.programs.pause(),
         'protective': lambda controller: controller.safety_event(SafetyEvent.PROTECTIVE_STOP),
     }
-    calls = [CHAIN, SERVO, LEFT, BACK, LINES]
+    blended = {'blends': BLENDED_LINES, 'joint blends': BLENDED_JOINTS}
+    calls = [CHAIN, SERVO, LEFT, BACK, LINES, *blended.values()]
+    found += [recorder.run(name, body) for name, body in blended.items()]
     for i, (name, event) in enumerate(events.items()):
         body = LONG.format(-1.4 if i % 2 == 0 else 1.6)
         found.append(recorder.run(name, body, event, after=1.0))
@@ -189,10 +200,11 @@ def test_the_ramps_of_motion_version_2_are_said_to_be_another_law(rise):
         assert results[name].value == pytest.approx(twin.estimates[name].value, rel=CLOSE), name
 
 
-def test_a_blend_is_named_and_not_used():
+def test_a_blend_without_its_calls_is_named_and_not_used():
     twin = Twin(arm=ArmIdentity(model='ur5e', software='5.21.0'), date='2026-11-27')
     blended = 'movel(pose_add(get_target_tcp_pose(), p[{}, 0.1, 0, 0, 0, 0]), a=1, v=0.1{})'
     body = blended.format(0.0, ', r=0.03') + '\n' + blended.format(0.1, '')
     found = identify([Recorder('ur5e', twin).run('blend', body)])
     assert found.summary() == '1 move: 1 of another shape (not used).'
     assert isinstance(found.results['start_time'], Unknown)
+    assert 'calls that are known' in found.results['blend_begin'].reason

@@ -68,10 +68,10 @@ def start_time(moves: Sequence[FoundMove]) -> Result:
     ]
     starts = [profile.start for profile in profiles if profile.start]
     steps = sum(profile.step > 0.0 for profile in profiles)
-    return _result(
+    return result_of(
         'start_time',
         starts,
-        f'{_plural(len(starts), "start")} of programs'
+        f'{plural(len(starts), "start")} of programs'
         + (f', {steps} with a rate that changes once a cycle' if steps else ''),
         _misfits(moves) or 'no move sets out as the first one of a program does',
         'record a program from its start, with a move of a second or more',
@@ -109,11 +109,11 @@ def turn_ratio(moves: Sequence[FoundMove]) -> Result:
                 continue
         found.append(min(ratios, key=lambda ratio: ratio.error))
         profiles.append(turn)
-    return _result(
+    return result_of(
         'turn_ratio',
         found,
-        f'{_plural(len(found), "line")} in which the turn leads',
-        f'{_plural(odd, "turn")} of lines followed no law that is known'
+        f'{plural(len(found), "line")} in which the turn leads',
+        f'{plural(odd, "turn")} of lines followed no law that is known'
         if odd
         else 'no line whose turn leads, with a and v that are known',
         'record a movel that turns the tool by 45 degrees on the spot, and name its a and v',
@@ -159,20 +159,20 @@ def left_out(moves: Sequence[FoundMove], kind: Kind) -> tuple[Result, Result]:
             profiles.append(move.profile)
     reason = f'no {call} without a, v and t among the calls'
     if odd:
-        reason = f'{_plural(odd, call)} without a and v followed no law that is known'
+        reason = f'{plural(odd, call)} without a and v followed no law that is known'
     elif turning:
-        reason = f'{_plural(turning, call)} turned the tool so far that the turn may lead'
+        reason = f'{plural(turning, call)} turned the tool so far that the turn may lead'
     elif quotients:
         whole = combined(quotients)
         reason = (
-            f'{_plural(len(quotients), call)} with t show only v^2/a, {whole.value:.5g} +- '
+            f'{plural(len(quotients), call)} with t show only v^2/a, {whole.value:.5g} +- '
             f'{whole.half_width:.1g} {"rad" if kind is Kind.JOINT else "m"}'
         )
     experiment = f'record a {call} without a, v and t that cruises, and name the call'
-    evidence = f'{_plural(len(profiles), call)} without a and v'
+    evidence = f'{plural(len(profiles), call)} without a and v'
     return (
-        _result(names[0], accelerations, evidence, reason, experiment, left_over=_rms(profiles)),
-        _result(names[1], speeds, evidence, reason, experiment, left_over=_rms(profiles)),
+        result_of(names[0], accelerations, evidence, reason, experiment, left_over=_rms(profiles)),
+        result_of(names[1], speeds, evidence, reason, experiment, left_over=_rms(profiles)),
     )
 
 
@@ -219,10 +219,10 @@ def idle_between_moves(moves: Sequence[FoundMove]) -> Result:
         for chain in chains
     ]
     number = sum(len(chain) - 1 for chain in chains)
-    return _result(
+    return result_of(
         'idle_between_moves',
         gaps,
-        f'{_plural(number, "pair")} of moves in a row',
+        f'{plural(number, "pair")} of moves in a row',
         'no two moves in a row whose profiles are known',
         'record a program of three joint moves without blends',
         left_over=_rms([profile for chain in chains for profile in chain]),
@@ -273,13 +273,13 @@ def stop_ramp(moves: Sequence[FoundMove], ending: Ending) -> Result:
     event, experiment = STOPS[ending]
     reason = f'no {event} in motion'
     if odd:
-        reason = f'{_plural(odd, "stop")} followed no even ramp'
+        reason = f'{plural(odd, "stop")} followed no even ramp'
     elif unsteady:
-        reason = f'{_plural(unsteady, "stop")} came while the arm did not move at constant speed'
+        reason = f'{plural(unsteady, "stop")} came while the arm did not move at constant speed'
     elif slowed:
-        reason = f'{_plural(slowed, "stop")} came while the speed slider was below 100 %'
-    return _result(
-        ending.value, ramps, _plural(len(ramps), 'stop') + ' at constant speed', reason, experiment
+        reason = f'{plural(slowed, "stop")} came while the speed slider was below 100 %'
+    return result_of(
+        ending.value, ramps, plural(len(ramps), 'stop') + ' at constant speed', reason, experiment
     )
 
 
@@ -316,18 +316,18 @@ def servo_filter(moves: Sequence[FoundMove]) -> dict[str, Result]:
     if beyond:
         factors = f'{beyond[0].gain_factor.value:.3g} and {beyond[0].lookahead_factor.value:.3g}'
         reason = (
-            f'{_plural(len(beyond), "joint")} followed servoj by another law: factors of '
+            f'{plural(len(beyond), "joint")} followed servoj by another law: factors of '
             f'{factors} fit best'
         )
     elif others:
         reason = (
-            f'{_plural(len(others), "joint")} followed servoj by another law: '
+            f'{plural(len(others), "joint")} followed servoj by another law: '
             f'{1e6 * max(others):.3g} urad are left'
         )
     elif motions and not filters:
-        reason = f'{_plural(motions, "motion")} of servoj turned no joint by a degree'
+        reason = f'{plural(motions, "motion")} of servoj turned no joint by a degree'
     stepped = sorted({each.step for each in filters if each.step})
-    evidence = f'{_plural(len(filters), "joint")} in {_plural(motions, "motion")} of servoj' + (
+    evidence = f'{plural(len(filters), "joint")} in {plural(motions, "motion")} of servoj' + (
         f', by a law that is stepped every {1e3 * stepped[0]:g} ms' if len(stepped) == 1 else ''
     )
     experiment = (
@@ -340,7 +340,7 @@ def servo_filter(moves: Sequence[FoundMove]) -> dict[str, Result]:
         ('servo_gain_factor', [each.gain_factor for each in filters]),
         ('servo_lookahead_factor', [each.lookahead_factor for each in filters]),
     ):
-        result = _result(name, parts, evidence, reason, experiment, left_over=left_over)
+        result = result_of(name, parts, evidence, reason, experiment, left_over=left_over)
         results[name] = _unless_wide(name, result, parts, lambda value: 0.1 * value, experiment)
     return results
 
@@ -376,13 +376,13 @@ def set_point_deceleration(moves: Sequence[FoundMove]) -> Result:
             ramps.append(ramp.deceleration)
     reason = 'no program goes on after calls of servoj that leave the arm in motion'
     if odd:
-        reason = f'{_plural(odd, "stop")} behind servoj followed no even ramp'
+        reason = f'{plural(odd, "stop")} behind servoj followed no even ramp'
     elif unsteady:
-        reason = f'{_plural(unsteady, "motion")} of servoj was not steady at its end'
-    return _result(
+        reason = f'{plural(unsteady, "motion")} of servoj was not steady at its end'
+    return result_of(
         'set_point_deceleration',
         ramps,
-        f'{_plural(len(ramps), "motion")} of servoj without a further set-point',
+        f'{plural(len(ramps), "motion")} of servoj without a further set-point',
         reason,
         'let calls of servoj turn a joint evenly at 30 degrees/s for two seconds, then sleep(1); '
         'record runtime_state, and name the calls',
@@ -438,14 +438,14 @@ def arm_figures(recordings: Sequence[ArmSamples]) -> dict[str, Result]:
     for name, most in _MAX_WIDTH.items():
         used = [errors for errors in found if name not in _RINGING or errors.cycle < MAX_CYCLE]
         parts: list[Measured] = [getattr(errors, name) for errors in used]
-        evidence = _plural(sum(errors.joints for errors in used), 'moving joint')
+        evidence = plural(sum(errors.joints for errors in used), 'moving joint')
         left = f'{1e6 * max((errors.rms for errors in used), default=0.0):.3g} urad rms'
-        result = _result(name, parts, evidence, reason, experiment, left_over=left)
+        result = result_of(name, parts, evidence, reason, experiment, left_over=left)
         results[name] = _unless_wide(name, result, parts, most, experiment)
-    results['position_noise'] = _result(
+    results['position_noise'] = result_of(
         'position_noise',
         noises,
-        _plural(len(noises), 'recording'),
+        plural(len(noises), 'recording'),
         'no measured joint that moves',
         experiment,
     )
@@ -492,7 +492,7 @@ def _why_no_errors(
         return 'no recording with measured joints that move and rest again'
     worst = max(odd, key=lambda errors: errors.rms)
     return (
-        f'the joints follow their targets by another law in {_plural(len(odd), "recording")}: '
+        f'the joints follow their targets by another law in {plural(len(odd), "recording")}: '
         f'{1e6 * worst.rms:.3g} urad are left, of which {1e6 * worst.noise:.3g} are noise'
     )
 
@@ -520,7 +520,7 @@ def packet_gaps(recordings: Sequence[ArmSamples]) -> dict[str, Result]:
         packets += len(missing)
         single += int((missing == 1.0).sum())
         several += int((missing > 1.0).sum())
-    evidence = _plural(packets, 'packet')
+    evidence = plural(packets, 'packet')
     experiment = 'record a minute of RTDE at its full rate'
     results: dict[str, Result] = {}
     for name, count in (('single_gaps', single), ('long_gaps', several)):
@@ -548,7 +548,7 @@ def _wilson(count: int, total: int) -> tuple[float, float]:
 # ---- results -----------------------------------------------------------------------------------
 
 
-def _result(
+def result_of(
     name: str,
     parts: Sequence[Measured],
     evidence: str,
@@ -589,7 +589,7 @@ def _misfits(moves: Iterable[FoundMove]) -> str:
     if not odd:
         return ''
     return (
-        f'{_plural(len(odd), "move")} followed no trapezoid: {1e6 * max(odd):.3g} um or urad are '
+        f'{plural(len(odd), "move")} followed no trapezoid: {1e6 * max(odd):.3g} um or urad are '
         'left'
     )
 
@@ -600,5 +600,6 @@ def _rms(profiles: Sequence[Profile]) -> str:
     return f'{1e6 * max(profile.fit.rms for profile in profiles):.2g} um or urad rms'
 
 
-def _plural(count: int, noun: str) -> str:
+def plural(count: int, noun: str) -> str:
+    """Return a number with its noun."""
     return f'{count} {noun}{"s" * (count != 1)}'

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from ur_cartesian_driver.identification import estimators
 from ur_cartesian_driver.identification.arm_samples import ArmSamples
+from ur_cartesian_driver.identification.blends.blend_laws import blend_laws
 from ur_cartesian_driver.identification.estimators import Result, Unknown
 from ur_cartesian_driver.identification.geometry import Kind
 from ur_cartesian_driver.identification.moves import (
@@ -24,9 +25,6 @@ from ur_cartesian_driver.motion.twin.laws import LAWS
 
 #: Laws that no recording identifies so far.
 _LATER = {
-    'blend_begin': 'blends are not evaluated',
-    'blend_shape': 'blends are not evaluated',
-    'blend_speed_ratio': 'blends are not evaluated',
     'speed_noise': 'measured speeds are not evaluated',
 }
 _NO_EXPERIMENT = 'no experiment shows it yet'
@@ -46,7 +44,7 @@ class Identification:
 
     def summary(self) -> str:
         """Return a line that counts the moves, and one for each move that fits no trapezoid."""
-        kinds = Counter(move.kind for move in self.moves)
+        kinds = Counter(move.kind for move in self.moves if len(move.chain) < 2)
         parts = [
             f'{kinds[kind]} {name}{"s" * (kinds[kind] != 1)}{what}'
             for kind, name, what in (
@@ -57,8 +55,11 @@ class Identification:
             )
             if kinds[kind]
         ]
-        if kinds[Kind.OTHER]:
-            parts.append(f'{kinds[Kind.OTHER]} of another shape (not used)')
+        chains = sum(len(move.chain) > 1 for move in self.moves)
+        if chains:
+            parts.append(f'{chains} chain{"s" * (chains != 1)} with blends')
+        if others := kinds[Kind.OTHER]:
+            parts.append(f'{others} of another shape (not used)')
         count = len(self.moves)
         text = f'{count} move{"s" * (count != 1)}: {", ".join(parts)}.' if parts else 'No moves.'
         for move in self.moves:
@@ -98,6 +99,7 @@ def identify(
         'set_point_deceleration': estimators.set_point_deceleration(moves),
         **estimators.servo_filter(moves),
         'idle_between_moves': estimators.idle_between_moves(moves),
+        **blend_laws(moves),
         **estimators.arm_figures(recordings),
         **estimators.packet_gaps(recordings),
     }

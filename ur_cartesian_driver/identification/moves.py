@@ -31,7 +31,8 @@ class FoundMove:
 
     :param profile: of the joints, of the tool's travel or else of its turn; None = not looked
         for, or too little data.
-    :param command: the call that made it; None = not known.
+    :param command: the call that made it; None = not known, or several.
+    :param chain: the calls that made it: several where moves are joined by blends.
     """
 
     samples: ArmSamples
@@ -39,6 +40,7 @@ class FoundMove:
     travel: Travel
     profile: Profile | Misfit | None
     command: MotionCommand | None = None
+    chain: tuple[MotionCommand, ...] = ()
 
     @property
     def kind(self) -> Kind:
@@ -66,11 +68,12 @@ class FoundMove:
         """The calls of servoj that made it; None = others, or not known."""
         return self.command.set_points if self.command is not None else None
 
-    def with_command(self, command: MotionCommand) -> FoundMove:
-        """Return the move with the call that made it."""
-        if command.set_points is not None:
+    def with_calls(self, chain: tuple[MotionCommand, ...]) -> FoundMove:
+        """Return the move with the calls that made it."""
+        command = chain[0] if len(chain) == 1 else None
+        if command is not None and command.set_points is not None:
             return replace(self, command=command, travel=Travel(kind=Kind.SERVO), profile=None)
-        return replace(self, command=command)
+        return replace(self, command=command, chain=chain)
 
     def continued(self, by: FoundMove) -> FoundMove:
         """Return the move with another one behind it, which the same calls made."""
@@ -122,36 +125,59 @@ def join_commands(
     moves: Sequence[FoundMove], commands: Sequence[MotionCommand], name: str
 ) -> list[FoundMove]:
     """
-    Give each move the call that made it; what calls of servoj in a row made is one move.
+    Give each move the call that made it.
+
+    What calls of servoj in a row made is one move, and so are moves that blends join.
 
     :param name: of the file with the calls, for error texts.
     :raises ValueError: their numbers or kinds differ.
     """
+    found, is_matched = _joined(moves, commands, True)
+    if not is_matched:  # A radius without a blend, as at the end of a program.
+        found, is_matched = _joined(moves, commands, False)
+    if not is_matched:
+        number = sum(not move.piece.resumed for move in found)
+        motions = 1 + sum(not command.r for command in commands[:-1])
+        raise ValueError(
+            f'motions in {name}: {motions}, moves in the recordings: {number}; write one call for '
+            'each move (of servoj and of blends, all calls of a motion), in the order of the '
+            'recordings'
+        )
+    for i, move in enumerate(found, 1):
+        kind, call = move.travel.kind, move.command or next(iter(move.chain), None)
+        if call is not None and kind is not Kind.OTHER and kind not in _KINDS[call.name]:
+            raise ValueError(
+                f'{name} says {call.name} for move {i}, but the recording '
+                f'{move.samples.name} shows a {kind.value} at '
+                f'{move.samples.time[move.piece.moving[0]]:.2f} s'
+            )
+    return found
+
+
+def _joined(
+    moves: Sequence[FoundMove], commands: Sequence[MotionCommand], straight: bool
+) -> tuple[list[FoundMove], bool]:
+    """
+    Return moves with their calls, and whether each has some and none are left.
+
+    :param straight: whether moves that show no corner may have several calls with radii, too.
+    """
     found: list[FoundMove] = []
-    number = 0
+    taken = 0
     for move in moves:
         if found and _goes_on(found[-1], move):
             found[-1] = found[-1].continued(move)
             continue
         if not move.piece.resumed:
-            if number < len(commands):
-                move = move.with_command(commands[number])
-            number += 1
+            end = taken + 1
+            while (straight or move.travel.kind is Kind.OTHER) and end < len(commands):
+                if commands[end - 1].r is None:
+                    break
+                end += 1
+            chain, taken = tuple(commands[taken:end]), end
+            move = move.with_calls(chain) if chain else move
         found.append(move)
-    if number != len(commands):
-        raise ValueError(
-            f'motions in {name}: {len(commands)}, moves in the recordings: {number}; write one '
-            'call for each move (of servoj, all calls of a motion), in the order of the recordings'
-        )
-    for i, move in enumerate(found, 1):
-        kind, command = move.travel.kind, move.command
-        if command is not None and kind is not Kind.OTHER and kind not in _KINDS[command.name]:
-            raise ValueError(
-                f'{name} says {command.name} for move {i}, but the recording '
-                f'{move.samples.name} shows a {kind.value} at '
-                f'{move.samples.time[move.piece.moving[0]]:.2f} s'
-            )
-    return found
+    return found, taken == len(commands)
 
 
 def _goes_on(before: FoundMove, move: FoundMove) -> bool:

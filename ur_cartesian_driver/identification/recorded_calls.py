@@ -59,16 +59,17 @@ class MotionCommand:
     """
     A call of ``movej`` or ``movel``, or a motion of ``servoj``.
 
-    What was left out is None [m or rad, s]. A blend radius is checked, but not kept: blended moves
-    are no trapezoids.
+    What was left out is None [m or rad, s].
 
-    :param set_points: of ``servoj``, which has no a, v and t here.
+    :param r: blend radius at its end [m].
+    :param set_points: of ``servoj``, which has no a, v, t and r here.
     """
 
     name: str
     a: float | None = None
     v: float | None = None
     t: float | None = None
+    r: float | None = None
     set_points: SetPoints | None = None
 
 
@@ -129,10 +130,14 @@ def _calls_below(node: tree.SyntaxNode) -> Iterator[tree.CallExpression]:
 
 
 def _command(call: tree.CallExpression, name: str) -> MotionCommand:
-    """Return a call of movej or movel; 0 s is as good as left out."""
+    """Return a call of movej or movel; 0 s and 0 m are as good as left out."""
     found = _numbers(call, name, may_be_0='tr')
     return MotionCommand(
-        name=call.function, a=found.get('a'), v=found.get('v'), t=found.get('t') or None
+        name=call.function,
+        a=found.get('a'),
+        v=found.get('v'),
+        t=found.get('t') or None,
+        r=found.get('r') or None,
     )
 
 

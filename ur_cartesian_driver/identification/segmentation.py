@@ -80,10 +80,12 @@ def pieces(samples: ArmSamples) -> list[Piece]:
     """Return the pieces of a recording in the order of time, without those across long gaps."""
     speed = _speeds(samples)
     stretches = _stretches(samples, speed)
+    # In a sharp blend one joint may pass zero, but not all of them.
+    together = np.linalg.norm(np.diff(samples.target_q, axis=0), axis=1) / np.diff(samples.time)
     cuts = [
         (begin, end, i, len(parts))
         for begin, last in stretches
-        for parts in [_split(samples.time, speed, begin, last)]
+        for parts in [_split(samples.time, together, begin, last)]
         for i, (begin, end) in enumerate(parts)
     ]
     found: list[Piece] = []
