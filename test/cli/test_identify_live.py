@@ -5,6 +5,7 @@
 import asyncio
 from dataclasses import replace
 from io import StringIO
+from math import pi
 from random import Random
 import sys
 
@@ -51,6 +52,8 @@ def hidden_laws(seed):
         'single_gaps': 0.01,
         'servo_gain_factor': random.uniform(0.7, 1.5),
         'servo_lookahead_factor': random.uniform(0.8, 1.3),
+        'blend_begin': random.uniform(0.5, 1.0),
+        'blend_speed_ratio': random.uniform(0.6, 1.6),
     }
     return Twin(
         arm=ArmIdentity(model='ur5e', software='5.21.0'),
@@ -124,6 +127,7 @@ def test_the_command_alone_finds_the_laws_of_a_hidden_arm(identify, ur_sim, tmp_
         margin = max(margin, 2e-4) if name.endswith(('_time', '_moves')) else margin
         assert low - margin <= estimate.value <= high + margin, name
     assert begin.distance_to(ur_sim.state().T_base_tcp) < 1e-4
+    assert found.estimates['blend_shape'].value == 'parabola'
     # The same files, later and without the robot.
     files = [str(tmp_path / 'found' / name) for name in found.files]
     calls = str(tmp_path / 'found' / 'calls.script')
@@ -133,7 +137,7 @@ def test_the_command_alone_finds_the_laws_of_a_hidden_arm(identify, ur_sim, tmp_
 
 
 #: Experiments in which the tool travels, and where the fault happens [m].
-TRAVELS = ('line', 'movel_without_speed', 'pause', 'stop')
+TRAVELS = ('line', 'movel_without_speed', 'blend', 'pause', 'stop')
 
 
 @pytest.mark.slow
@@ -280,14 +284,31 @@ def test_an_arm_that_is_faster_than_allowed_is_stopped(identify, ur_sim):
 
 
 @pytest.mark.slow
+@pytest.mark.ur_sim(
+    polyscope='5.21.0',
+    rate=4.0,
+    q=HOME,
+    twin=replace(
+        HIDDEN, estimates={'blend_speed_ratio': Estimate(value=5.0, interval=(5.0, 5.0))}
+    ),
+)
+def test_an_arm_that_is_faster_than_allowed_in_a_blend_is_stopped(identify, ur_sim):
+    status, _, outcomes = identify('--only', 'blend', speed='0.06')
+    assert status == 1
+    assert outcomes['blend'].startswith('ended: the tool was too fast: 0.')
+    rests(ur_sim)
+
+
+@pytest.mark.slow
 @hidden_arm
 def test_yes_answers_for_moves_only(identify, ur_sim):
     status, printed, outcomes = identify(
-        '--yes', '--only', 'wrist_slow,pause,stop', terminal=False
+        '--yes', '--only', 'wrist_slow,blend,pause,stop', terminal=False
     )
     assert status == 0, printed
     assert outcomes == {
         'wrist_slow': 'done',
+        'blend': 'skipped: not wanted',
         'pause': 'skipped: not wanted',
         'stop': 'skipped: not wanted',
     }
@@ -398,6 +419,31 @@ def test_experiments_are_slow_first_and_interrupted_last():
     kinds = [each.interruption is not Interruption.NONE for each in LAW_EXPERIMENTS]
     assert kinds == sorted(kinds)
     assert LAW_EXPERIMENTS[0].speed == min(each.speed for each in LAW_EXPERIMENTS if each.wrist)
+
+
+def test_the_triangle_of_blends_has_room_for_any_curve_within_the_radius():
+    pose = Pose((0.5, 0.1, 0.3), Pose.from_rotation_vector((0, 0, 0, pi, 0, 0)).quaternion)
+    state = RobotState(
+        timestamp=0.0,
+        actual_q=(0.0,) * 6,
+        actual_tcp_pose=pose,
+        target_tcp_pose=pose,
+        T_flange_tcp=Pose((0.0, 0.0, 0.2)),
+    )
+    blend = next(each for each in LAW_EXPERIMENTS if each.name == 'blend')
+    assert blend.question.startswith(
+        'The tool moves 40 mm against its z axis, 40 mm along its x axis and straight back, at up '
+        'to 40 mm/s, with blends of 10 mm, in which its speed is up to the robot.'
+    )
+    assert [call.count('movel') for call in blend.calls(state)] == [3]
+    bounds = MotionBounds(low=(0.48, 0.09, 0.29), high=(0.56, 0.11, 0.36), max_speed=0.05)
+    assert blend.refusal(state, bounds) == ''
+    tight = replace(bounds, high=(0.54, 0.11, 0.36))
+    assert blend.refusal(state, tight).startswith('it would leave the box: x = 0.550 m')
+    tight = replace(bounds, high=(0.56, 0.11, 0.345))
+    assert blend.refusal(state, tight).startswith('it would leave the box: z = 0.350 m')
+    # It turns back between both corners.
+    assert blend.places(state)[-1] == pytest.approx((0.52, 0.1, 0.34))
 
 
 def test_a_tool_beside_the_axis_of_the_wrist_moves_on_a_circle():

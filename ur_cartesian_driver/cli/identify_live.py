@@ -14,7 +14,6 @@ import sys
 from ur_cartesian_driver.cli.check_robot import address_of, ask, observe_and_show
 from ur_cartesian_driver.identification.arm_samples import ArmSamples, read_samples
 from ur_cartesian_driver.identification.law_experiments import (
-    Interruption,
     LAW_EXPERIMENTS,
     LawExperiment,
     MotionBounds,
@@ -106,10 +105,10 @@ def arm_of(findings: list[Finding], asked: ArmIdentity) -> ArmIdentity:
 
 
 def _answers(yes: bool) -> Callable[[LawExperiment], bool]:
-    """Return the function that answers; --yes covers only uninterrupted moves."""
+    """Return the function that answers; --yes covers only plain moves."""
 
     def agrees(experiment: LawExperiment) -> bool:
-        if yes and experiment.interruption is Interruption.NONE:
+        if yes and experiment.is_plain:
             print(f'\n{experiment.question}')
             return True
         return sys.stdin.isatty() and ask(experiment.question)

@@ -4,8 +4,8 @@
 The motions by which an arm shows its laws, and the bounds within which they may run.
 
 Each begins and ends at the present pose of the tool: wrist 3 turns, or the tool moves against its
-z axis or turns about it, there and back. The slow ones come first, those that stop or pause the
-program last.
+z axis or turns about it, there and back, or round a triangle. The slow ones come first, those that
+stop or pause the program last.
 """
 
 from __future__ import annotations
@@ -125,6 +125,11 @@ class LawExperiment:
         }[self.interruption]
         return f'{what} {happens}, at up to {fast}. It shows {self.shows}.'
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is a move that nothing interrupts: one that may run without a question."""
+        return self.interruption is Interruption.NONE
+
     def calls(self, state: RobotState) -> tuple[str, ...]:
         """
         Return the calls behind each recorded move; the way back from a stop is not recorded.
@@ -231,6 +236,66 @@ class ServoExperiment(LawExperiment):
         return [*before, *there, *[angle] * held, *back, *[0.0] * held]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlendExperiment(LawExperiment):
+    """
+    The tool moves round a right-angled triangle, with blends at two of its corners.
+
+    :param aside: way along the tool's x axis, between ``retract`` and the way back [m].
+    :param radius: of the blends [m].
+    """
+
+    aside: float
+    radius: float
+
+    @property
+    def question(self) -> str:
+        """The sentence about what moves, how far and how fast."""
+        return (
+            f'The tool moves {1e3 * self.retract:.0f} mm against its z axis, '
+            f'{1e3 * self.aside:.0f} mm along its x axis and straight back, at up to '
+            f'{1e3 * self.speed:.0f} mm/s, with blends of {1e3 * self.radius:.0f} mm, in which '
+            f'its speed is up to the robot. It shows {self.shows}.'
+        )
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it may run without a question; not as long as its speed is not known."""
+        return False
+
+    def calls(self, state: RobotState) -> tuple[str, ...]:
+        """Return the calls of the one motion."""
+        blended = f'{self.there}, r={self.radius:g}'
+        lines = (
+            f'movel(there, {blended})',
+            f'movel(beside, {blended})',
+            f'movel(back, {self.back})',
+        )
+        return ('\n'.join(lines),)
+
+    def script(self, state: RobotState) -> str:
+        """Return the body of the program for the place of the arm."""
+        lines = [
+            'back = get_target_tcp_pose()',
+            f'there = pose_trans(back, p[0, 0, {-self.retract:.9g}, 0, 0, 0])',
+            f'beside = pose_trans(there, p[{self.aside:.9g}, 0, 0, 0, 0, 0])',
+        ]
+        return '\n'.join([*lines, *self.calls(state)])
+
+    def places(self, state: RobotState) -> list[Vector3]:
+        """
+        Return where the TCP may be [m], and at last the middle of the line between both blends.
+
+        As the curve of a blend is not known, its corner counts as further out by the radius.
+        """
+        out = -self.retract - self.radius
+        corners = [(-self.radius, out), (self.aside + self.radius, out)]
+        return [
+            (state.actual_tcp_pose @ Pose((x, 0.0, z))).position
+            for x, z in (*corners, (0.5 * self.aside, -self.retract))
+        ]
+
+
 _TIMED_SPEED = ASSUMED_LAWS.timed_joint_speed
 LAW_EXPERIMENTS = (
     LawExperiment(
@@ -291,6 +356,16 @@ LAW_EXPERIMENTS = (
         speed=ASSUMED_LAWS.timed_linear_speed,
         there='',
         back='',
+    ),
+    BlendExperiment(
+        name='blend',
+        shows='where blends begin, their curve and their speed',
+        retract=0.04,
+        aside=0.04,
+        radius=0.01,
+        speed=0.04,
+        there='a=0.4, v=0.04',
+        back='a=0.4, v=0.04',
     ),
     LawExperiment(
         name='pause',
