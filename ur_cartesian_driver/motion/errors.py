@@ -41,7 +41,7 @@ _Error = TypeVar('_Error', bound='DriverError')
 
 
 class ErrorCode(IntEnum):
-    """The ``error_code`` of the action's result: 0 to -6 are FZI's, the others ours."""
+    """The ``error_code`` of the action's result; 0 to -6 are as in FZI's action of this name."""
 
     SUCCESSFUL = 0
     INVALID_GOAL = -1

@@ -172,7 +172,7 @@ class Progress:
     buffered: float = 0.0
     #: SERVO: nominal time by which the arm is behind the newest set-point [s].
     lag: float = nan
-    #: The controller's clock [s].
+    #: Time by the controller's clock [s].
     timestamp: float = 0.0
     #: Whether the arm is at rest and the goal waits for more points (keep_open).
     awaiting_points: bool = False
@@ -191,7 +191,7 @@ class Pulse:
     pin: int
     #: Number of the pulse among the pulses of this output in the goal, from 0.
     number: int
-    #: The controller's clock in the cycle in which the output switched on [s].
+    #: Time by the controller's clock of the cycle in which the output switched on [s].
     timestamp: float
     #: Measured pose of the TCP in that cycle, in the robot's base; None = the packet of the cycle
     #: was lost, and ``timestamp`` is later.

@@ -90,7 +90,7 @@ class NodeReader:
             yield key, value
 
     def items(self, node: yaml.Node, fault: str, length: int | None = None) -> list[yaml.Node]:
-        """Return the nodes of a list, of the given length if any; else refuse it by ``fault``."""
+        """Return the nodes of a list; refuse another node, or another length, by ``fault``."""
         if kind_of(node) != 'sequence' or length not in (None, len(node.value)):
             self.refuse(node, fault)
         return list(node.value)
@@ -119,6 +119,8 @@ def text_of_file(path: Path, what: str, error: type[ValueError]) -> str:
     """
     Return the text of a file, cut off if it is too long.
 
+    :param what: the kind of the file, for the error text.
+    :param error: the error that is raised if the text is not UTF-8.
     :raises OSError: the file cannot be read.
     """
     with path.open(encoding='utf-8') as file:

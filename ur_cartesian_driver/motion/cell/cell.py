@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The bodies of a cell: their places, their carriers, and the contacts that are allowed.
+The bodies of a cell: their poses, the frames that carry them, and the contacts that are allowed.
 
 A body is fixed in the robot's base, or carried by a link of the arm or by the tool. Frames are
 named as in the robot description for ROS, without a prefix.
@@ -22,7 +22,7 @@ from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 DEFAULT_CLEARANCE = 0.005
 #: The largest clearance [m].
 MAX_CLEARANCE = 1.0
-#: Largest coordinate of a place [m]; a larger one is probably given in millimetres.
+#: Largest coordinate of a position [m]; a larger one is probably given in millimetres.
 MAX_COORDINATE = 100.0
 #: Longest name of a body.
 _MAX_NAME = 100
@@ -62,16 +62,16 @@ LINK_NAMES: tuple[str, ...] = (
 @dataclass(frozen=True, slots=True)
 class PlacedShape:
     """
-    A shape of a body, and its place on the body.
+    A shape of a body, and its pose on the body.
 
-    :raises ValueError: the place is out of bounds.
+    :raises ValueError: the pose is out of bounds.
     """
 
     shape: Shape
     T_body_shape: Pose = IDENTITY
 
     def __post_init__(self) -> None:
-        """Check the place."""
+        """Check the pose."""
         check_place(self.T_body_shape)
 
 
@@ -81,7 +81,7 @@ class CellBody:
     A body of the cell.
 
     :raises ValueError: the name is invalid, the frame is unknown, there is no shape, the clearance
-        or the place is out of bounds, or the arm carries a half-space.
+        or the pose is out of bounds, or the arm carries a half-space.
     """
 
     name: str
@@ -243,7 +243,7 @@ class Cell:
 
     def moved(self, name: str, frame: str, T_frame_body: Pose) -> Cell:
         """
-        Return the cell with a body in another place, or carried by another frame.
+        Return the cell with a body at another pose, or carried by another frame.
 
         :raises ValueError: the cell has no body of this name, or the frame is unknown.
         """
@@ -251,5 +251,5 @@ class Cell:
         return self.with_bodies([body])
 
 
-#: No body at all.
+#: A cell without bodies.
 EMPTY_CELL = Cell()

@@ -70,7 +70,7 @@ T = TypeVar('T')
 FORMAT = 1
 #: Most shapes of a file; with YAML aliases, a short text can contain very many.
 _MAX_SHAPES = 10_000
-#: Largest rounding error in the length of a quaternion, and the largest that is not corrected.
+#: Largest accepted error in the length of a quaternion, and the largest that is not corrected.
 _UNIT_TOLERANCE, _EXACT_UNIT = 1e-3, 1e-12
 
 _HEAD = ('cell', 'clearance', 'bodies', 'may_touch', 'urdf')
@@ -111,7 +111,7 @@ def cell_from_text(text: str, name: str, folder: str | Path) -> Cell:
 
 def cell_text(cell: Cell) -> str:
     """
-    Return the text of a file; :func:`cell_from_text` returns the same cell.
+    Return the text of a file, from which :func:`cell_from_text` makes the same cell.
 
     Bodies of a URDF are written as bodies of the cell.
 
@@ -445,7 +445,7 @@ class _CellReader(NodeReader):
                     node,
                     f'the {what} has the length {length:.4g} instead of 1; the order is x y z w',
                 )
-            # An exact quaternion stays as it is, so that reading does not change a cell.
+            # An exact quaternion stays as it is, so that writing and reading do not change a cell.
             exact = abs(length - 1.0) <= _EXACT_UNIT
             return (x, y, z, w) if exact else normalize((x, y, z, w))
         angles = self._vector(node, what)

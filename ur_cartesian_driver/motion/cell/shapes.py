@@ -104,7 +104,7 @@ class HalfSpace:
 
     @property
     def bounds(self) -> Floats:
-        """The lowest and the highest corner, (2, 3) [m]; infinite but for the height."""
+        """The lowest and the highest corner, (2, 3) [m]; only the highest z, 0, is finite."""
         return np.array([[-inf, -inf, -inf], [inf, inf, 0.0]])
 
 
@@ -122,7 +122,7 @@ class Mesh:
 
     #: (n, 3) [m]
     vertices: Floats = field(repr=False)
-    #: (m, 3) numbers of the vertices of each triangle.
+    #: (m, 3) indices of the vertices of each triangle.
     triangles: Indices = field(repr=False)
     #: The file, '' = none.
     source: str = ''

@@ -41,7 +41,7 @@ _MOVED_LINKS = tuple(name for name, number in FRAMES.items() if name.endswith('_
 #: The frame in the cell for each link of an arm.
 _ARM_FRAMES = {**{name: name for name in FRAMES}, 'base_link_inertia': 'base'}
 _MOVING = ('revolute', 'continuous', 'prismatic', 'planar', 'floating')
-#: The attribute that holds the line of an element.
+#: The attribute in which the reader stores the line number of an element.
 _LINE = ' line'
 
 
@@ -90,7 +90,7 @@ def urdf_bodies(
 
     :param name: the name of the file, for error texts.
     :param folder: the folder to which the names of meshes are relative.
-    :param T_base_root: the place of the root of a file without the arm; None = the identity.
+    :param T_base_root: pose of the root link, for a file without the arm; None = the identity.
     :param clearance: the clearance of all bodies [m]; None = the clearance of the cell.
     :param leave_out: the links that do not become bodies.
     :raises UrdfError: the file cannot be used.
@@ -100,7 +100,7 @@ def urdf_bodies(
 
 @dataclass(frozen=True, slots=True)
 class _UrdfJoint:
-    """A joint of the file, at 0."""
+    """A joint of the file, at its position 0."""
 
     name: str
     parent: str

@@ -384,7 +384,7 @@ class PayloadChange:
 class PartAction(IntEnum):
     """The change of a body of the cell, numbered as in ``PartChange.action``."""
 
-    #: From the point on, the body moves with the flange, from its place at this time.
+    #: From the point on, the body moves with the flange, at the pose on it that it has then.
     ATTACH = 0
     #: From the point on, the body stays at the place where it was put.
     RELEASE = 1

@@ -29,7 +29,7 @@ class MovingFrame:
     T_base_tool: Pose
 
     def frame(self, T_base_flange: Pose) -> Pose:
-        """Return the frame in base."""
+        """Return the pose of the frame in base."""
         return T_base_flange @ self.T_flange_frame
 
     def tool(self, T_base_flange: Pose) -> Pose:
@@ -37,7 +37,7 @@ class MovingFrame:
         return self.frame(T_base_flange).inverse() @ self.T_base_tool
 
     def frame_under(self, T_frame_tool: Pose) -> Pose:
-        """Return the frame in base from the pose of the tool in the frame."""
+        """Return the pose of the frame in base from the pose of the tool in the frame."""
         return self.T_base_tool @ T_frame_tool.inverse()
 
     def flange(self, T_frame_tool: Pose) -> Pose:
@@ -83,7 +83,7 @@ class MovingFrame:
         """Return pose, twist and acceleration of the tool in the frame, from the TCP's in base."""
         T_base_frame = self.frame(T_base_tcp @ T_flange_tcp.inverse())
         offset = subtract(self.T_base_tool.position, T_base_tcp.position)
-        # The tool moves in the frame as the frame moves at the tool, reversed.
+        # Seen from the frame, the tool moves opposite to the frame's own motion at the tool.
         there = twist_at(twist, offset)
         turned = conjugate(T_base_frame.quaternion)
         relative = None
@@ -95,9 +95,9 @@ class MovingFrame:
 
 def _as_seen(acceleration: Vector6, twist: Vector6) -> Vector6:
     """
-    Return the acceleration of a body at a fixed point with the Coriolis term of the point removed.
+    Return a - 2 w x v: the acceleration of a body at a fixed point, less the Coriolis term.
 
-    The point moves with -v in the body, which turns with w: a - 2 w x v.
+    Seen from the body, which turns with w, the fixed point moves with -v.
     """
     a, v, w = acceleration[:3], twist[:3], twist[3:]
     return (*subtract(a, scale(cross(w, v), 2.0)), *acceleration[3:])

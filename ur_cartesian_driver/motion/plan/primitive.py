@@ -143,9 +143,9 @@ class SwitchOutput:
     #: pose. The output switches when the tool crosses, in this direction, the plane through it.
     trigger_direction: Vector6 = ZERO6
     #: Whether the tool is already past the plane when the record is read; the output then waits
-    #: until the tool has gone back in front of the plane and crosses it.
+    #: until the tool has gone back through the plane and crosses it anew.
     starts_beyond: bool = False
-    #: Delay after the end of the motion before [s].
+    #: Delay after the end of the preceding motion [s].
     delay: float = 0.0
     #: Whether an analog output follows the speed, by the :class:`SpeedLaw` before this record,
     #: until the next record switches it.
@@ -319,6 +319,7 @@ class BeginPress:
     Force mode begins; without compliant axes, the program only watches for contact.
 
     :param T_base_task: the frame of the compliant axes.
+    :param compliant: 1 for each compliant axis, 0 for each other one.
     :param follows_tool: whether the frame is the TCP's, updated in each cycle.
     """
 

@@ -41,7 +41,7 @@ class EffectiveSpeed:
         """
         Return the effective speed in a packet, 0 to 1.
 
-        :param timestamp: the controller's clock [s].
+        :param timestamp: time by the controller's clock [s].
         :param speed_scaling: the slowdown in addition to the slider, 0 to 1.
         :param target_speed_fraction: the speed slider, 0 to 1.
         :param runtime_state: a :class:`RuntimeState`, or its number.

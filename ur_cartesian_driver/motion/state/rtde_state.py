@@ -124,7 +124,7 @@ class RobotState:
     simulator computes RTDE outputs, also new ones, in ``sim/rtde_output_values.py``.
     """
 
-    #: The controller's clock [s].
+    #: Time by the controller's clock [s].
     timestamp: Annotated[float, Rtde('timestamp')]
     actual_q: Annotated[Vector6, Rtde('actual_q')]
     actual_qd: Annotated[Vector6, Rtde('actual_qd')] = ZERO6

@@ -32,7 +32,7 @@ class ServoFeedback:
     that follows the manufacturer's guide leaves them at 0.
     """
 
-    #: The controller's clock [s].
+    #: Time by the controller's clock [s].
     timestamp: float
     #: How fast the motion of the program runs, 0 to 1 (:mod:`~.effective_speed`).
     effective_speed: float
@@ -53,7 +53,7 @@ class ServoFeedback:
 class ServoReport:
     """The progress of the streamed set-points, as ``ServoState`` reports it."""
 
-    #: The controller's clock [s].
+    #: Time by the controller's clock [s].
     timestamp: float
     activity: ServoActivity
     setpoints_sent: int
