@@ -105,7 +105,7 @@ def turned(stroke: Stroke) -> Pose:
 
 
 class CentreLine:
-    """Consecutive strokes; sideways is perpendicular to both the stroke and the tool's z axis."""
+    """Consecutive strokes, about which a wave swings across the stroke and the tool's z axis."""
 
     def __init__(self, strokes: Sequence[Stroke]) -> None:
         """

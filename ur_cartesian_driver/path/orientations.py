@@ -103,7 +103,11 @@ def direction(name: str, vector: Sequence[float]) -> Vector3:
 
 
 def _of_axes(ex: Vector3, ey: Vector3, ez: Vector3) -> Quaternion:
-    """Return the orientation of a frame from its axes; the largest component is computed first."""
+    """
+    Return the orientation of a frame from its axes.
+
+    The quaternion's largest component is found first: it is the one that is safely not zero.
+    """
     m = (ex, ey, ez)  # columns
     trace = ex[0] + ey[1] + ez[2]
     candidates = (trace, ex[0], ey[1], ez[2])

@@ -355,9 +355,9 @@ class Path(PathWithEvents):
         self, other: Path, by: AirTravel, place: ArmStand, where: str
     ) -> tuple[Path, ArmStand]:
         """
-        Return the path of :meth:`travel_to`, and the place of the arm at its end.
+        Return the path of :meth:`travel_to`, and the arm's joints and the cell at its end.
 
-        :param place: the place of the arm at the end of this path.
+        :param place: the arm's joints and the cell at the end of this path.
         :param where: the beginning of refusals.
         """
         traveller = Traveller(by, place, other._begin(by, where), where)
@@ -479,8 +479,8 @@ class Path(PathWithEvents):
         """
         Return the path backwards, from its end to its start.
 
-        A dwell at the end comes first then. A goal cannot begin with a dwell, so such a path has
-        to follow another one, by :meth:`then`.
+        A dwell at the end becomes a dwell at the start. No goal can begin with a dwell, so such a
+        path has to follow another one, by :meth:`then`.
 
         :raises InvalidGoal: the path has no start at which to end, or has events, which cannot be
             reversed.

@@ -506,7 +506,7 @@ class PathWithEvents(PathOfMotions):
         return self._with_point(-1, replace(point, events=(*point.events, event)))
 
     def _begun(self, is_wanted: Callable[[Any], bool]) -> tuple[int, Any] | None:
-        """Return the latest wanted event without an end, after the index of its point; or None."""
+        """Return point index and event of the latest wanted event without an end; None = none."""
         for i in range(len(self) - 2, -1, -1):
             for event in self._points[i].events:
                 if type(event) in _METHODS and not event.last_waypoint and is_wanted(event):
@@ -538,7 +538,7 @@ class PathWithEvents(PathOfMotions):
                     )
 
     def _as_stop(self, name: str) -> tuple[str, PathPoint]:
-        """Return method and point for the text of errors, and the last point changed to a stop."""
+        """Return the beginning of error texts, and the last point, changed to a stop."""
         if not self._points:
             raise InvalidGoal(f'{name}()', 'comes before the first point', 'add a motion first')
         where, point = f'{name}() at point {len(self) - 1}', self._points[-1]

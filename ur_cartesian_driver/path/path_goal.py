@@ -29,7 +29,7 @@ SETTINGS = tuple(
 )
 #: The usual blend radius at both ends of a PROCESS motion for which none is given [m].
 PROCESS_BLEND = 0.002
-#: The least duration of such a blend [s]: the robot leaves out a blend that is shorter than one
+#: The smallest duration of such a blend [s]: the robot leaves out a blend that is shorter than one
 #: cycle, which is 8 ms on the slowest controller.
 _PROCESS_BLEND_TIME = 0.01
 #: The largest fraction of a segment that such a blend takes up.

@@ -63,7 +63,7 @@ _BASE_FRAMES = ('', 'base', 'base_link')
 _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 _OPTIMIZED_TYPES = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 _FREE_AXES = {axis.name.lower(): axis for axis in FreeAxis if axis}
-#: Segment fields that methods set by parameters of their own; other fields are given by name.
+#: Segment fields for which the methods have parameters; all others are given by field name.
 _OWN_WORDS = {
     *('type', 'blend_radius', 'dwell', 'velocity', 'acceleration'),
     *('via', 'via_posture', 'arc_mode', 'free_axis', 'free_min', 'free_max'),
@@ -267,7 +267,7 @@ class PathOfMotions:
         """
         Add a straight line.
 
-        :param place: the end of the line: a pose, or a position.
+        :param place: the end of the line: a pose, or a position [m].
         :param orientation: orientation at the end of the line; None = as in the pose, or at the
             point before.
         :param blend: replaces the blend of :meth:`at`; likewise ``speed`` and ``acceleration``.
@@ -444,7 +444,7 @@ class PathOfMotions:
         **fields: Any,
     ) -> Self:
         """
-        Add a motion from the point before by a distance [m] and a turn.
+        Add a motion by a distance [m] and a turn from the last point, or else from the start.
 
         :param turn: a rotation, made by :func:`~.orientations.axis_angle` for example.
         :param of_tool: whether distance and turn are along the axes of the tool, not of the frame.
@@ -480,7 +480,7 @@ class PathOfMotions:
         return f'point {len(self)} ({kind})'
 
     def _pose(self, where: str, place: Place, orientation: Quaternion | None) -> Pose:
-        """Return a pose; ``orientation`` None = as in the place, or else at the point before."""
+        """Return a pose; ``orientation`` None = that of ``place``, or else of the last point."""
         before = place if isinstance(place, Pose) else self.end
         position = place.position if isinstance(place, Pose) else place
         if orientation is None:

@@ -57,7 +57,7 @@ def many_numbers(where: str, name: str, values: Any) -> tuple[float, ...]:
 
 
 def vector(where: str, values: Sequence[float], bound: float, prefix: str = '') -> Vector3:
-    """Return three numbers, none of which is larger than a bound."""
+    """Return three numbers; refuse one whose magnitude is above a bound [m]."""
     try:
         x, y, z = (float(value) for value in values)
     except (TypeError, ValueError, OverflowError):

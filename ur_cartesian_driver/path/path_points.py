@@ -20,9 +20,9 @@ from ur_cartesian_driver.planning.request.field_rules import check_record
 
 T = TypeVar('T')
 
-#: Poses that differ by less than this [m], [rad] are the same.
+#: Poses that differ by no more than this count as the same [m], [rad].
 SAME_POSITION, SAME_ANGLE = 1e-6, 1e-6
-#: Axes of two frames with a direction cosine of less than this are at right angles.
+#: Direction cosine of two axes up to which the axes count as perpendicular.
 _ALIGNED = 1e-12
 #: The fields of a point that are rates.
 RATES = ('twist', 'acceleration', 'jerk')
@@ -70,7 +70,7 @@ class PathPoint:
 
 @dataclass(frozen=True, slots=True)
 class MotionOptions:
-    """Settings of one motion, except its place."""
+    """Settings of one motion, except its target."""
 
     blend: float | None
     speed: float | None

@@ -49,7 +49,7 @@ from ur_cartesian_driver.planning.spline.spline_points import tool_points
 #: Distance before the stop at which the path is resumed, and distance from the path at which the
 #: approach begins, backwards along the tool's z axis [m].
 OVERLAP, APPROACH = 0.005, 0.03
-#: The largest value of either [m]; more must be millimetres by mistake.
+#: The largest overlap and the largest approach [m]; more must be millimetres by mistake.
 MAX_RESUME_LENGTH = 1.0
 #: In a goal with times: time until the approach begins [s], and speed of the approach [m/s].
 APPROACH_TIME, APPROACH_SPEED = 4.0, 0.03
@@ -57,9 +57,9 @@ APPROACH_TIME, APPROACH_SPEED = 4.0, 0.03
 _BLEND_MARGIN = 1.05
 #: If less than this remains of a segment [m], it is left out.
 _NOTHING = 1e-5
-#: The least length, and the least height above the chord, of the rest of an arc [m].
+#: The smallest length, and the smallest height above the chord, of the rest of an arc [m].
 _MIN_ARC, _MIN_HEIGHT = 4e-3, 3e-5
-#: The least time in which the arm gathers speed on a spline [s], and the number of points in it.
+#: The shortest time in which the arm gathers speed on a spline [s]; number of points in this time.
 _RAMP_TIME, _RAMP_POINTS = 0.4, 8
 #: Number of chords that measure the length of a piece of a spline.
 _CHORDS = 64
@@ -273,7 +273,7 @@ class _Resumption:
         )
 
     def _behind(self, place: float, distance: float) -> float:
-        """Return the place at a distance [m] after a place; before it if this is negative."""
+        """Return the place at a distance [m] after a place; a negative distance leads back."""
         step = 1 if distance > 0.0 else -1
         k, left = round(place) - (step < 0), abs(distance)
         while 0 <= k < len(self.points) and (length := self._length(k)) < left:
@@ -300,7 +300,11 @@ class _Resumption:
     # -- the approach ----------------------------------------------------------------------------
 
     def _approach(self, k: int, u: float) -> tuple[list[Waypoint], list[Segment], list[float]]:
-        """Return points, segments and places of the approach, which ends at rest on the path."""
+        """
+        Return points, segments and places of the approach, which ends at rest on the path.
+
+        :param k: segment on which the approach ends, at the fraction ``u``.
+        """
         there = self._pose(k, u)
         poses = [there]
         if self.approach > 0.0:
@@ -399,7 +403,7 @@ class _Resumption:
         return elapsed
 
     def _time(self, place: float) -> float:
-        """Return the time of a place of a timed goal [s], evenly between points."""
+        """Return the time of a place of a timed goal [s], interpolated between its points."""
         k = min(floor(place), len(self.points) - 1)
         before = self.points[k - 1].time if k else 0.0
         return before + (place - k) * (self.points[k].time - before)

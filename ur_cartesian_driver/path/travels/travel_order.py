@@ -28,7 +28,7 @@ _LONGEST_RUN = 3
 
 @dataclass(frozen=True, slots=True)
 class Runs:
-    """The joints at the beginning and the end of each run of a path; rows (m, 6) [rad]."""
+    """The joints at both ends of a path, a row for each way of running it; (m, 6) [rad]."""
 
     entries: Floats
     exits: Floats
@@ -93,7 +93,7 @@ class _Costs:
         return chosen[::-1]
 
     def _totals(self, order: Sequence[int]) -> list[Floats]:
-        """Return the least cost to the entry of each run of each path of an order [m]."""
+        """Return for each path of an order the least costs to the entries of its runs [m]."""
         totals = [self._from_start[order[0]]]
         for before, after in pairwise(order):
             totals.append((totals[-1][:, None] + self._between[before][after]).min(axis=0))

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Travels through the air between paths: the place of the arm at their ends, and its motions between.
+Travels through the air: where the arm stands before and after each path, and its motions between.
 
 A path describes the motion of the tool, not the arm that carries it. So a travel needs the arm,
 the state in which the whole path begins, and the options for planning.
@@ -67,13 +67,14 @@ class AirTravel(TransferSettings):
 
     @property
     def begin(self) -> ArmStand:
-        """The place of the arm when the whole path begins."""
+        """The arm's joints, and the cell, when the whole path begins."""
         return ArmStand(at_set_point(self.state, self.arm).actual_q, self.options.cell)
 
     def end_of(self, goal: Goal, place: ArmStand) -> ArmStand:
         """
-        Return the place of the arm at the end of a goal that begins at a place.
+        Return the arm's joints, and the cell, at the end of a goal.
 
+        :param place: the joints, and the cell, at the beginning of the goal.
         :raises GoalRefused: the goal cannot be executed from there.
         """
         T_flange_tcp = self.state.T_flange_tcp
@@ -90,7 +91,7 @@ class AirTravel(TransferSettings):
 
 @dataclass(frozen=True, slots=True)
 class ArmStand:
-    """The place of an arm between two paths, with the cell at that time."""
+    """The joints of the arm between two paths, with the cell at that time."""
 
     #: The joint positions [rad].
     q: Joints
@@ -127,7 +128,7 @@ class Traveller:
     """
     An arm with the tool of a path, on its travel to the path.
 
-    :param place: the place from which the arm comes.
+    :param place: joints and cell when the travel begins.
     :param there: the beginning of the path.
     :param where: the beginning of refusals, such as ``The travel to path 2``.
     """
@@ -141,11 +142,11 @@ class Traveller:
 
     def runs(self) -> dict[Joints, ArmStand]:
         """
-        Return the joints in which the path can begin [rad], each with the place at its end.
+        Return the joints in which the path can begin [rad], each with the stand at the path's end.
 
-        Each joint has the turn that is nearest to the place from which the arm comes.
+        Each joint has the turn that is nearest to its position when the travel begins.
 
-        :raises GoalRefused: there are none; the refusal is about the nearest ones.
+        :raises GoalRefused: the path can begin in no joints; the refusal is about the nearest.
         """
         found: dict[Joints, ArmStand] = {}
         refusal: GoalRefused | None = None
