@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The common part of two fixtures of a simulated robot: ours, and the stand-alone simulator's.
+The common part of two pytest fixtures of a simulated robot: ours, and the stand-alone simulator's.
 
 pytest plugins import this module in every project that uses the environment, so the simulator is
 imported only when a test starts one.

@@ -132,7 +132,7 @@ def at_places(
     """
     Return each variant at all places of a grid around its present place.
 
-    Coordinates are the sums of all offsets, for the axes that have several values.
+    The coordinates of a variant are its total offsets along the axes that have several values.
 
     :param x: offsets of the goal's frame along the base's x [m]; ``y`` and ``z`` likewise.
     :param rz: turns about an axis through the frame's origin, parallel to the base's z [rad].
@@ -401,9 +401,9 @@ def _grid(
     results: Sequence[SweepResult], column: str
 ) -> tuple[list[str], list[list[Coordinate]], np.ndarray[Any, np.dtype[np.float64]]]:
     """
-    Return the axes of a map, their values, and the worst margin of each cell.
+    Return the axes of a map, their values, and the smallest number of each cell in a column.
 
-    -inf means that a variant of the cell is refused; NaN, that no margin of the cell is known.
+    -inf means that a variant of the cell is refused; NaN, that no number of the cell is known.
     """
     names = _axes(results)
     values: list[list[Coordinate]] = [

@@ -179,7 +179,7 @@ class ImportedPath:
         return bool((self.corners > 0.0).any())
 
     def take(self, rows: Int64s) -> ImportedPath:
-        """Return the given, rising rows; outputs of other rows move to the kept row before."""
+        """Return some rows, by rising indices; outputs of other rows move to the row before."""
         new_row = {int(row): i for i, row in enumerate(rows)}
         return replace(
             self,

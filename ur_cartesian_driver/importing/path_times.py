@@ -3,8 +3,9 @@
 """
 Times of the points of a file.
 
-Readers count from the first point, whatever the clock of the file. The first time of a goal is the
-duration of the motion to the first point; it is 0 only if the arm is already there.
+The times that readers collect count from the first point, whatever the clock of the file. The
+first time of a goal is the duration of the motion to the first point; it is 0 only if the arm is
+already there.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ _SECTIONS_OF = {
     **dict.fromkeys((*MARKERS, 'SEQEND'), _WITH_ENTITIES),
     'DICTIONARY': ('OBJECTS',),
 }
-#: Markers of entities with a path, and records that have no place.
+#: Markers of entities with a path, and records that have no position.
 _OF_PATHS = {marker for markers in MARKERS.values() for marker in markers}
 _NOWHERE = ('SECTION', 'ENDSEC', 'TABLE', 'ENDTAB', 'LAYER', 'ENDBLK', 'SEQEND')
 #: Largest number of placed entities of blocks, and deepest nesting of blocks.

@@ -178,8 +178,8 @@ def _ellipse(record: Record, pen: _Pen, left_out: LeftOut) -> None:
         raise ValueError('it has an axis without a length')
     normal = object_axes(record.extrusion()).z
     out = dot(normal, a)
-    # Some programs turn such an axis, and others the plane. If the axis is steep to the plane,
-    # there is no ellipse, however small.
+    # If the axis is not in the plane, some programs turn the axis, and others the plane. If it is
+    # steep to the plane, there is no ellipse, however small.
     if pen.length_of(scale(normal, out)) > pen.tolerance or abs(out) > 0.5 * norm(a):
         raise ValueError(f'its axis leaves its plane by {abs(out):g} (group codes 11 and 210)')
     across = cross(normal, a)
@@ -271,7 +271,7 @@ def _elevation(record: Record, vertices: Sequence[Record], pen: _Pen) -> float:
         if code in record.values:
             return record.number(code)
     heights = [vertex.point(10)[2] for vertex in vertices]
-    # Most programs take its own point, if without z, for an elevation of 0.
+    # If the polyline's own point has no z, most programs read it as an elevation of 0.
     found = [*heights, *([0.0] if 10 in record.values else [])]
     if found and pen.length_of((0.0, 0.0, max(found) - min(found))) > pen.tolerance:
         raise ValueError(

@@ -55,7 +55,7 @@ class Arc(NamedTuple):
         return abs(self.end[axis] - self.start[axis]) > _MIN_RISE
 
     def place(self, share: float) -> Vector3:
-        """Return the point at a fraction of the arc (a spiral if its radii differ: LinuxCNC)."""
+        """Return the point at a fraction of the arc; if its radii differ, it is a spiral."""
         if share == 1.0:
             x, y, z = self.end
             return (x, y, z)

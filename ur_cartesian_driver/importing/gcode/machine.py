@@ -48,7 +48,8 @@ _CONDITION_END = re.compile(r'\s*M623\b', re.I)
 _UNITS = {'G20': LENGTH_UNITS['in'], 'G21': LENGTH_UNITS['mm']}
 #: The codes of the work offsets; G10 numbers them from 1.
 _FRAMES = ('G54', 'G55', 'G56', 'G57', 'G58', 'G59', 'G59.1', 'G59.2', 'G59.3')
-#: The words of G4 that are a time wherever they stand; S and F are one if there is none of these.
+#: The words that are the time of a G4 wherever they stand in its line; if there is none of them,
+#: S or F is the time.
 _DWELL = 'PXU'
 #: Codes that get a P only if no other code of their line takes it.
 _LEAVE_P = frozenset((*_FRAMES, 'M0', 'M1', 'M2', 'M6', 'M30', 'M60'))

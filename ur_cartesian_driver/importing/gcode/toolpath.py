@@ -42,7 +42,7 @@ class Toolpath:
         self._corner_unit: float | None = None
 
     def length(self, line: int) -> float:
-        """Return the unit of lengths [m]."""
+        """Return the unit of lengths [m]; if none has been given, it is mm, with a remark."""
         if self.unit is None:
             self.unit = LENGTH_UNITS['mm']
             self._into.remarks.add(line, 'no G20 or G21 before', 'lengths are in mm')

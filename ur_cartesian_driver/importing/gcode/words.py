@@ -23,7 +23,7 @@ from ur_cartesian_driver.importing.gcode.codes import (
 from ur_cartesian_driver.importing.imported_path import BrokenFile
 from ur_cartesian_driver.importing.text_file import quoted
 
-#: What a line says to people.
+#: Matches a comment.
 COMMENT = re.compile(r'\([^()]*\)|;.*')
 _MESSAGE = re.compile(r'\(\s*(MSG|DEBUG|PRINT|LOG)\s*,', re.I)
 # Replaces each comment until the check that no comment divides a word. No text file has this

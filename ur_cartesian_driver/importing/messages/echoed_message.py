@@ -152,7 +152,7 @@ def _value(event: Any, events: Iterator[Any], first: int, depth: int) -> Any:
     """
     Return the value that begins with an event of PyYAML.
 
-    :param first: the line of the file at which the text of PyYAML begins.
+    :param first: the line of the file at which the text begins that PyYAML parses.
     :raises BrokenFile: the value is a reference or is nested too deeply, or a field in it has no
         name or occurs twice.
     """

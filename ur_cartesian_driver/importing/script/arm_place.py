@@ -22,7 +22,7 @@ from ur_cartesian_driver.urscript.script_values import ScriptPose
 
 
 class ArmPlace:
-    """The arm's position, shared with the motion generator for the controller's functions."""
+    """The arm's position; the controller's functions read it from the motion generator."""
 
     def __init__(self, controller: Controller, options: ImportOptions) -> None:
         """Begin at an unknown position."""
@@ -39,7 +39,8 @@ class ArmPlace:
         self._flange_poses: list[Pose] = []
         #: For each TCP that was set: the line of the set_tcp call, and the TCP as text.
         self.set_tcps: dict[Pose, tuple[int, str]] = {}
-        #: Joint positions solved for a pose of the file; they stand for the pose, on any arm.
+        #: Joint positions computed for a pose of the file. They mean this pose, whichever the arm,
+        #: so they need no remark on the assumed arm.
         self.solutions: set[tuple[Value, ...]] = set()
 
     @property

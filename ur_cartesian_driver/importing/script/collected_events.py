@@ -127,7 +127,11 @@ class CollectedEvents:
             self.last.blend = 0.0
 
     def rest(self, time: float) -> None:
-        """Make the arm rest at the last point for a time [s]."""
+        """
+        Make the arm rest at the last point for a time [s].
+
+        :raises RuntimeException: the arm would rest for longer than a goal allows.
+        """
         if self.last is None:
             self.run.say('sleep()', 'a goal begins with a move')
         elif time > 0.0:
@@ -160,7 +164,11 @@ class CollectedEvents:
         self._events.append(wait)
 
     def switch(self, output: IOCommand) -> None:
-        """Switch an output at the last point, after the rest and the waits there."""
+        """
+        Switch an output at the last point, after the rest and the waits there.
+
+        :raises RuntimeException: the rest is longer than the largest delay of an output.
+        """
         if not self.acts:
             self.run.say(
                 'an output', 'when a thread switches it beside the moves is not in the file'

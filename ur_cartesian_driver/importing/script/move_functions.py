@@ -41,7 +41,7 @@ TOOL_A, TOOL_V, FRACTION = 1.2, 0.25, 0.3
 JOINT_A, JOINT_V = ASSUMED_LAWS.timed_joint_acceleration, ASSUMED_LAWS.timed_joint_speed
 #: A shorter line [m] only turns the tool: its rates apply to the turn, as in a goal.
 PURE_TURN = 1e-6
-#: The assumed turn ratio of movel.
+#: The assumed turn ratio of movel: the angle that it turns in the time of 1 m [rad/m].
 TURN_RATIO = ASSUMED_LAWS.turn_ratio
 #: Larger lengths [m] are taken for millimetres.
 FAR = 3.0

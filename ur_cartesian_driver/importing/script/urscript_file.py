@@ -31,8 +31,8 @@ from ur_cartesian_driver.urscript.running.script_interpreter import BUDGET_EXCEE
 #: A program probably does not end if it has more cycles, more points (with outputs and waits), or
 #: more evaluated nodes of the syntax tree than this.
 MAX_CYCLES, MAX_POINTS, MAX_NODES = 100_000, 100_000, 10_000_000
-#: Largest number of nodes that a thread evaluates between two moves: entering a block pays for all
-#: of its statements, and slicers write long blocks.
+#: Largest number of nodes that a thread evaluates between two moves. It is large because entering
+#: a block counts all of its statements, and slicers write long blocks.
 MAX_NODES_AT_ONCE = 5_000_000
 
 
