@@ -134,7 +134,7 @@ def closest_lines(
 
 
 def _shapes_text(body: CellBody) -> str:
-    """Return the shapes of a body, such as ``box, 2 spheres``."""
+    """Return the shapes of a body, such as ``box, 2 x sphere``."""
     counts = Counter(_shape_name(placed.shape) for placed in body.shapes)
     return ', '.join(name if n == 1 else f'{n} x {name}' for name, n in counts.items())
 

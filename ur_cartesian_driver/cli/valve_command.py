@@ -153,7 +153,7 @@ def later_command(arguments: argparse.Namespace) -> str:
 
 
 def ask_distance(which: str, read: Callable[[str], str]) -> float:
-    """Ask a person for the distance by which the fast bead starts or ends behind the slow [mm]."""
+    """Ask a person how far past the slow bead the fast one starts or ends [mm]."""
     while True:
         answer = read(
             f'How far behind the {which} of the slow bead does the fast one {which} [mm]? '

@@ -25,8 +25,8 @@ OnClosed = Callable[[str], None]
 BACKOFF_PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0)
 CONNECT_TIMEOUT = 2.0
 
-#: Most data that may wait for the other side to read it [bytes]: more than a send window of
-#: points; it bounds the memory.
+#: Most data that may wait until the other side reads it [bytes]. It bounds the memory, and is more
+#: than all points that the driver sends ahead.
 MAX_UNSENT = 1 << 20
 #: Most data read at once [bytes].
 MAX_READ = 1 << 16
@@ -88,7 +88,7 @@ class TcpConnection(asyncio.BufferedProtocol):
         return self._buffer
 
     def buffer_updated(self, nbytes: int) -> None:
-        """Pass the bytes on."""
+        """Pass the received bytes to ``on_data``."""
         self._on_data(bytes(self._buffer[:nbytes]))
 
     def eof_received(self) -> bool:
@@ -102,7 +102,7 @@ class TcpConnection(asyncio.BufferedProtocol):
         return False
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Report the reason."""
+        """Report the end of the connection and its reason, unless :meth:`eof_received` has."""
         self._end(f'{exc}' if exc is not None else 'we closed the connection')
 
     def _end(self, reason: str) -> None:

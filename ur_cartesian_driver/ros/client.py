@@ -52,7 +52,7 @@ STATUS_NAMES = {
     GoalStatus.STATUS_CANCELED: 'CANCELED',
     GoalStatus.STATUS_ABORTED: 'ABORTED',
 }
-#: Time without a server after which the driver is considered gone [s].
+#: Time without the action server after which the driver is considered gone [s].
 SERVER_TIMEOUT = 3.0
 #: The states of a driver that accepts goals.
 _READY_STATES = (DriverStatus.READY, DriverStatus.EXECUTING)
@@ -157,7 +157,8 @@ class GoalClient:
         self._closed = False
         self._own_context: Context | None = None
         if node is None:
-            # This context installs no signal handlers: a goal can still be cancelled after Ctrl-C.
+            # This context installs no signal handlers, so Ctrl-C does not shut ROS down, and the
+            # goal can still be cancelled.
             self._own_context = Context()
             rclpy.init(args=[], context=self._own_context)
             node = rclpy.create_node(node_name, context=self._own_context)
@@ -300,7 +301,8 @@ class GoalClient:
 
         This can be called from anywhere while the goal runs, also in the callback of :meth:`send`.
 
-        :param along: offset [m] in the frame of the path, like ``across`` and ``normal``; limited
+        :param along: offset in the direction of the motion [m]; ``across``: in the direction
+            along x the tool's z axis; ``normal``: in the direction along x across. Each is limited
             to the ``path_offset.limits`` of the goal.
         """
         if self._offsets is None:
@@ -441,7 +443,8 @@ class GoalClient:
         """
         Wait for the driver, and return its endpoints; a driver that is started later has others.
 
-        A driver that was killed is visible for some seconds beside its successor.
+        A killed driver stays visible for some seconds beside its successor, so this waits until
+        only one driver is left.
 
         :raises TimeoutError: no driver answers.
         :raises ConnectionError: several drivers serve the action, and any of them could move.

@@ -48,7 +48,7 @@ def followed(check: str, slider: float) -> Callable[[MotionSamples], Finding]:
 
 
 def steps(check: str) -> Callable[[MotionSamples], Finding]:
-    """Return the analysis that counts the cycles in which the program made no step."""
+    """Return the analysis that counts the cycles in which the program did not advance."""
 
     def analyse(samples: MotionSamples) -> Finding:
         # The first piece is left out, because in it the program finds the fraction of the slider
@@ -76,7 +76,7 @@ def steps(check: str) -> Callable[[MotionSamples], Finding]:
 
 
 def corner_pause(samples: MotionSamples) -> Finding:
-    """Check that the program read the pieces sent after a pause."""
+    """Check that after a pause the program began all pieces, and the joints kept to their path."""
     own = _following(samples)
     paused = float(np.sum(np.diff(samples.time)[samples.runtime_state[1:] == RuntimeState.PAUSED]))
     if not own.any() or not paused:

@@ -26,7 +26,7 @@ POWER_UP_TIMEOUT = 30.0
 
 
 class ProgramAutoStart:
-    """At most one upload of the program, on the first connection."""
+    """Uploads the program at most once, on the first connection."""
 
     def __init__(
         self,

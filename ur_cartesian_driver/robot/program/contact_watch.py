@@ -23,7 +23,7 @@ END_TIMEOUT = 1.0
 
 
 class ContactWatch:
-    """One watch at a time, until its answer."""
+    """Begins and ends watches, one at a time, and passes their outcomes on."""
 
     def __init__(self, sockets: ProgramSockets, changed: Callable[[bool], None]) -> None:
         """

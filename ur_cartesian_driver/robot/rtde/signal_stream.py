@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Inputs, outputs and tool of the robot, through a slow RTDE connection of their own.
+Receives inputs, outputs and tool data of the robot through a separate, slow RTDE connection.
 
 In the packets of the robot state, at 500 Hz, these fields would take most of the computing time
 for no benefit.

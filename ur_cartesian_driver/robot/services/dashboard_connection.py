@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The dashboard of a robot: one line out, one line in, then the connection is closed again.
+Requests to a robot's dashboard: one line is sent, one comes back, then the connection is closed.
 
 A new connection for each request costs a millisecond, and a late answer cannot be mistaken for
 the answer to the next request. Refusals are explained in our own words: the dashboard often says
@@ -108,7 +108,12 @@ class DashboardConnection:
         answered: Callable[[], bool],
         within: float = ANSWER_TIMEOUT,
     ) -> None:
-        """Send a request and feed the bytes that come back until the request is answered."""
+        """
+        Send a request, and pass the bytes that come back to ``feed`` until it is answered.
+
+        :raises OSError: the dashboard does not answer ``within`` this time [s], or hangs up.
+        :raises ProtocolError: ``feed`` refuses the bytes.
+        """
         ended: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         errors: list[ProtocolError] = []
 

@@ -58,7 +58,7 @@ class SceneArm:
     """The arm with its state and frames, for objects in frames that move with the arm."""
 
     arm: Arm
-    #: None = not known.
+    #: The newest state of the robot; None = not known.
     state: RobotState | None
     frames: Frames
     prefix: str = ''

@@ -46,7 +46,9 @@ from ur_cartesian_driver.srv import (
 DASHBOARD = 'dashboard_client'
 _NO_FIELDS = 'std_srvs/srv/Trigger'
 
+#: Writes the value of an answer into the fields of a response.
 Fill = Callable[[Message, str], None]
+#: Returns the argument of a command from a request.
 Argument = Callable[[Message], str]
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The driver's node, as its clients see it: services that are called without waiting."""
+"""The driver's node, seen from another node, which calls its services without waiting."""
 
 from __future__ import annotations
 
