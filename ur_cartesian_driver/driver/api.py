@@ -321,7 +321,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         """
         Execute a plan and return at once.
 
-        A plan that begins with a travel is made again first if the arm has moved since.
+        A plan that begins with a travel is renewed first, see :meth:`renewed`.
 
         :raises RobotNotReady: the robot program is not connected, a motion is running, or the plan
             was made for another robot program.
@@ -361,8 +361,8 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         Plan and run a goal or path, and wait for its outcome; a refusal is an outcome too.
 
         :param preempt: whether to stop a running motion for this goal, once the goal has passed
-            all checks from the arm's predicted place at rest; False = refuse the goal while a
-            motion runs.
+            all checks from the position where the arm is predicted to come to rest; False =
+            refuse the goal while a motion runs.
         :raises TimeoutError: no outcome came within ``timeout`` [s]; the motion was cancelled, and
             its end was awaited for at most :data:`CANCEL_TIMEOUT`.
         """

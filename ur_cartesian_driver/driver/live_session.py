@@ -36,7 +36,7 @@ from ur_cartesian_driver.motion.plan.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
 
-#: Tolerance for the squared length of a unit quaternion.
+#: Largest deviation of the squared length of a quaternion from 1.
 UNIT_TOLERANCE = 1e-3
 
 
@@ -104,7 +104,7 @@ class InteractiveMotions(ABC):
         :param age: how old the target is [s].
         :raises InvalidGoal: the target is malformed, or too far away.
         :raises NotAvailable: the cell has a mesh, and pinocchio is not installed.
-        :raises RobotNotReady: the robot cannot accept a motion now, or one is running.
+        :raises RobotNotReady: the robot cannot accept a motion now, or another motion runs.
         """
         state, cell = self._state_for('follow live targets'), self.options.cell
         T_base_tcp, age = plain_target(T_base_tcp, age)

@@ -49,7 +49,8 @@ class LoopConnection:
         self._config, self._auto_heartbeat = config, auto_heartbeat
         self._on_notification, self._on_lost = on_notification, on_lost
         self._reconfigure, self._log = reconfigure, logger
-        #: Guards the pipe, opening and closing, and callers' data that changes with them.
+        #: Guards the pipe, opening and closing, and the data of :class:`~.RunningMotions`, which
+        #: change with them.
         self.lock = threading.RLock()
         self.host: host.LoopHost | None = None
         self._closed = threading.Event()

@@ -32,13 +32,13 @@ from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 OnProgress = Callable[[Progress], None]
 
 
-#: Why clients cannot slow a motion: its goal has no bounds for a signal.
+#: Why clients cannot slow a motion whose goal has no ``feed_override``: field, problem, remedy.
 NO_FEED_OVERRIDE = (
     'feed_override',
     'is not set in the running goal',
     'set its minimum in the goal',
 )
-#: Why clients cannot slow a motion: an input of the robot gives the signal.
+#: The same for all motions, if an input of the robot gives the signal.
 HAS_FEED_INPUT = (
     'feed_override_input',
     'names an input of the robot, whose signal slows all goals',
@@ -108,7 +108,7 @@ class MotionHandle:
 
         :param waypoints: the points, with times from the start of the goal, in the goal's frame.
         :param segments: empty, or one for each point.
-        :param io_commands: outputs to switch; their waypoint indices count in the whole goal.
+        :param io_commands: outputs to switch; their waypoint indices count from the goal's start.
         :param last: whether no more points follow, so that the arm comes to rest at the last one.
             If ``waypoints`` is empty, the arm comes to rest at the planned ending, which for a
             spline is after its last point.
@@ -147,7 +147,7 @@ class MotionHandle:
             ``path_offset.limits`` of the goal.
         :param age: time since the offset was measured [s].
         :raises InvalidGoal: the goal permits no offset, a value is not a finite number, or the age
-            is more than ``path_offset.timeout``; the previous offset stays.
+            is negative or more than ``path_offset.timeout``; the previous offset stays.
         """
         if self.offset_timeout is None:
             raise InvalidGoal(

@@ -68,7 +68,7 @@ class ReportedRobot:
         self._has_warned_of_cell = False
 
     def take(self, notification: Notification | Request) -> None:
-        """Process a report; notifications about motions and calls are ignored."""
+        """Process a report; notifications for :class:`~.RunningMotions` are ignored."""
         match notification:
             case ServoProgress(report=report):
                 for listener in list(self.servo_listeners):

@@ -34,7 +34,7 @@ class RunningPath:
         """
         Begin at the start of a plan.
 
-        :param spline: the joints over time of a goal in SERVO.
+        :param spline: the joints over time of a goal in SERVO; None = the goal has another mode.
         :param take_part_change: called at each point at which the cell changes.
         """
         self._start, self._take_part_change = plan.start, take_part_change

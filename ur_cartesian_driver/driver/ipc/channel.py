@@ -159,7 +159,7 @@ class SetFeedOverride:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AppendToMotion:
-    """Append records (84 bytes each) to a motion with keep_open; always answered."""
+    """Append records (84 bytes each) to a motion with keep_open; AppendAnswered answers it."""
 
     motion: int
     append_job: AppendJob

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Service calls of the owner, also during a motion."""
+"""Carry out the service calls of the owner, also during a motion."""
 
 from __future__ import annotations
 

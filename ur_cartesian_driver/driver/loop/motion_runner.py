@@ -192,7 +192,12 @@ class MotionRunner:
         return f'The goal has {needs}, {NEEDS_OWN_PROGRAM}'
 
     async def append(self, request: AppendToMotion) -> None:
-        """Offer points to the running motion; refuse them if they are for another motion."""
+        """
+        Offer points to the running motion.
+
+        Points for another motion are refused, and so are points that only the driver's own robot
+        program can run if another program runs.
+        """
         foreign = await self._foreign_program(request.append_job.job)
         if request.motion != self._number or self._machine is None:
             self._refuse_append(request, 'The goal has ended.')
@@ -220,7 +225,8 @@ class MotionRunner:
         """
         Give the running motion another feed.
 
-        A feed for another motion is ignored; with ``feed_override_input`` every feed is.
+        A feed for another motion is ignored. If ``feed_override_input`` names an input of the
+        robot, that input gives the feed, and every feed from clients is ignored.
         """
         is_open = not self._config.feed_override_input
         if is_open and request.motion == self._number and self._machine is not None:

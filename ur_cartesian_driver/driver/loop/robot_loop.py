@@ -3,7 +3,7 @@
 """
 The robot loop: one asyncio loop that owns the sockets and the machine of the running goal.
 
-The loop never imports ROS. In a process of its own, it sends the robot's messages on time while
+The loop never imports ROS. In a process of its own, it sends the robot its messages on time while
 the owner receives a goal of 100,000 points, which holds Python's interpreter lock for seconds. The
 loop can also run in a thread. A pipe for messages and shared memory for the newest robot state
 connect the loop to its owner, see :mod:`~ur_cartesian_driver.driver.loop.loop_host`.

@@ -63,7 +63,7 @@ def write_mcap(recording: Recording, file: BinaryIO, options: ExportOptions) -> 
         from mcap_ros2.writer import Writer
     except ModuleNotFoundError as error:
         if (error.name or '').partition('.')[0] not in ('mcap', 'mcap_ros2'):
-            raise  # these are installed, but one of their own packages is not
+            raise  # mcap is installed, but a package that it needs is not
         raise ImportError(
             'MCAP needs mcap and mcap-ros2-support, which are not installed; run "pip install '
             "mcap-ros2-support\", or install this package with its extra 'export'"

@@ -206,7 +206,7 @@ def newest_recording(path: Path) -> Path:
     Return the path of a recording; for a directory, the newest one in it.
 
     Files and folders that do not have the name of a recording, such as renamed ones, are left out;
-    folders of motions that run or were killed count only if there is no file.
+    folders of unfinished recordings count only if there is no file.
 
     :raises OSError: the directory contains no recording.
     """
