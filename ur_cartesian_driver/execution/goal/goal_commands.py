@@ -25,6 +25,7 @@ class SendControl(GoalCommand):
     """Send a trajectory action on the reverse socket."""
 
     action: TrajectoryAction
+    #: Number of points, for the actions that need it (:func:`~.reverse.trajectory`).
     count: int = 0
     #: For START: whether offsets that arrive through registers displace the path.
     takes_offsets: bool = False
@@ -86,7 +87,7 @@ class RestoreOutputs(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StopProgram(GoalCommand):
-    """End the robot program, whatever it is doing: the arm must not go on by itself."""
+    """End the robot program, whatever it is doing, so that the arm does not go on by itself."""
 
     reason: str
 

@@ -7,7 +7,7 @@ The machine sends nothing and reads no clock. The owner of the sockets calls
 :meth:`GoalMachine.start` once and then :meth:`GoalMachine.step` with every event, and carries out
 the returned commands, until one of them is :class:`~.goal_commands.Finish`.
 
-Each event becomes a signal, the signal selects a transition in the table of
+An event becomes a signal or has no effect. The signal selects a transition in the table of
 :mod:`~.goal_transitions`, and entering the new state yields commands. :mod:`~.goal_monitor`
 compares the packets of the robot with the plan; a :class:`~.feeder.Feeder` sends the motion.
 """

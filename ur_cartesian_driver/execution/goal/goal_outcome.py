@@ -43,7 +43,7 @@ class GoalOutcome:
             cause = f'{cause}; before that, {self.cause}'
         if signal is not GoalSignal.UNCONFIRMED:
             self.touched = signal is GoalSignal.CONTACT
-        elif self.cause:  # why the arm had to stop
+        elif self.cause:  # self.cause says why the arm had to stop
             cause = f'{self.cause}; {cause}'
             if self._code is ErrorCode.CONNECTION_LOST:
                 code = self._code

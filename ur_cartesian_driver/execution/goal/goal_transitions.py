@@ -9,7 +9,8 @@ state, and the error code if the signal decides the outcome of the goal.
 * **ARMING**: every goal begins here. If it moves a frame other than the robot's TCP, the command
   that sets the TCP has been sent: nothing moves until the robot reports that TCP and is at the
   start of the plan. Motions through RTDE registers also wait for the robot's inputs and for the
-  answer of the robot program. If there is nothing to prepare, ARMED follows at once.
+  answer of the robot program; goals with safe outputs wait until the program has confirmed these.
+  If there is nothing to prepare, ARMED follows at once.
 * **MOVING**: the robot program runs points. Its result SUCCESS leads to SETTLING. A cause that
   stops the arm by itself (safety, connection) ends the goal at once, because the robot program
   would not read our CANCEL; our own reasons to stop (cancel, preemption, tolerance, a change of

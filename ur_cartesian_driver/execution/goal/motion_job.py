@@ -108,7 +108,7 @@ class MotionJob:
     keep_open: bool = False
     #: Motion farther ahead of the arm than this time must remain replaceable [s]; 0 = need not.
     replace_horizon: float = 0.0
-    #: Number of records at the end of an open goal that bring the arm to rest if none follow.
+    #: Number of records at the end of an open goal that bring the arm to rest if no more follow.
     ending_records: int = 0
     #: Whether the robot program acts at some point while the arm stands still.
     has_stops: bool = False

@@ -7,8 +7,8 @@ A target from a sensor arrives at any time, jumps, and may be anywhere. The moti
 not jump: the tool goes straight towards the newest target with bounded speed and acceleration,
 brakes in time to arrive at rest, and never goes where it could not stop. To ensure this, each
 cycle checks the pose at which the tool would come to rest if it braked after its next step. If
-that pose is out of reach, beyond a joint limit, too near to a singularity or behind a workspace
-plane, the arm brakes now, along a path that earlier cycles have checked.
+that pose is out of reach, beyond a joint limit, too near to a singularity or outside the workspace
+(:mod:`~.workspace_guard`), the arm brakes now, along a path that earlier cycles have checked.
 
 Speed and acceleration are bounded as the lengths of vectors, linear and angular, so the direction
 of the target does not matter (doc/architecture.md says why ruckig, which bounds each axis, is not

@@ -5,7 +5,8 @@ Keep an arm that follows live targets away from planes, from bodies of the cell 
 
 A check takes longer than a control cycle, so it is left out while no part of the arm can reach a
 bound. A part moves at most by the sum of the joints' turns, times the largest distance of any part
-from an axis. So each check also yields the joint turn that is allowed before the next one.
+from an axis. So each check also notes the smallest distance left to a bound: no other check is
+needed until the joints have turned far enough to use it up.
 """
 
 from __future__ import annotations

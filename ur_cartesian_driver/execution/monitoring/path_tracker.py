@@ -39,8 +39,8 @@ from ur_cartesian_driver.motion.plan.plan import ReferencePath
 METRES_PER_RADIAN = 0.1
 #: Allowance for a target that has come farther than its speed explains [m].
 SEARCH_MARGIN = 0.005
-#: The search reaches at least this far ahead in planned time [s]: where set-points turn back, a
-#: lagging servo turns back early.
+#: The search reaches at least this far ahead in planned time [s], because a lagging servo turns
+#: back before it has come to the place where the set-points turn back.
 SEARCH_TIME = 0.1
 #: A position farther on than the speed explains is chosen only if it is nearer to the target by
 #: this distance [m]: where a path turns back, both branches are equally near.
@@ -322,8 +322,8 @@ class PathTracker:
 
         A radian weighs :data:`METRES_PER_RADIAN` in :attr:`residual`. Only half of the bound is
         used, because the straight line between two quaternions is not quite the turn from one to
-        the other; if the two are so far apart that this matters, the line is far from every unit
-        quaternion, and the residual is large.
+        the other. If the two are so far apart that half of the bound is too much, the line is far
+        from every unit quaternion, so the residual is large.
         """
         return self.residual <= 0.5 * min(distance, METRES_PER_RADIAN * angle)
 

@@ -27,7 +27,8 @@ class Standstill:
         #: Whether the target has stood still for longer than the plan explains.
         self.is_long = False
         #: Present standstill of the target, in real time [s]; the same in scaled time [s]; the
-        #: longest standstill that the plan explains, in scaled time [s], 0 = it explains none.
+        #: longest planned one with :data:`STANDSTILL_MARGIN`, in scaled time [s], 0 = none is
+        #: planned.
         self._time = self._scaled_time = self._timeout = 0.0
         self.extend(path, output_delay)
 

@@ -63,7 +63,7 @@ class RareWarnings:
         self._waiting = ''
 
     def due(self, now: float) -> list[GoalCommand]:
-        """Return the warning that waits, or nothing within :data:`WARNING_PERIOD` of the last."""
+        """Return the waiting warning, but none within :data:`WARNING_PERIOD` of the last one."""
         if not self._waiting or now < self._next:
             return []
         text, self._waiting, self._next = self._waiting, '', now + WARNING_PERIOD

@@ -45,7 +45,7 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
         self._largest = list(ZERO3)
 
     def set_offset(self, offset: Vector3, age: float, now: float) -> None:
-        """Accept an offset; values beyond the limits are cut."""
+        """Accept an offset, cut to the limits, if it is finite and neither stale nor outdated."""
         if not all(map(isfinite, offset)):
             age = nan
         if not self._freshness.accept(age, now):

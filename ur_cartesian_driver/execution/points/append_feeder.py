@@ -32,8 +32,8 @@ from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
-#: Longest wait for more points, before a motion begins that has only an ending [s]: the robot
-#: program waits half a second for its first point.
+#: Longest wait for more points, before a motion begins that has only an ending [s]. It is short
+#: because the robot program waits only half a second for its first point.
 FIRST_POINTS_TIMEOUT = 0.25
 
 

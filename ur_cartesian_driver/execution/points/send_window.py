@@ -17,7 +17,7 @@ class SendWindow:
     When a goal is cancelled, the robot program reads and discards everything that was sent (10
     points in each step of the controller), so the window bounds the time of a cancel: 500 points
     cost 0.1 s at 500 Hz. Still, 500 points are far more than the robot can run in its 0.5 s read
-    timeout.
+    timeout, so the window does not make it wait for a point.
     """
 
     size: int = 500

@@ -90,7 +90,7 @@ class AppendServoFeeder(ServoFeeder, Appendable):
         self._spline = self._source.spline
 
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
-        """Record the stop after the ending, or go on with the points appended during it."""
+        """Record the stop after the ending, or go on with the points appended meanwhile."""
         if state is GoalState.AWAITING_POINTS:
             self._appended.rest(self._stop_time)
         elif state is GoalState.MOVING and self._next_spline is not None:

@@ -55,7 +55,8 @@ class BoundedOffset:
     """
     The offset, which moves towards a target within the bounds of a band.
 
-    Each axis has its own bounds and its own limit, so each can stop at its limit in time.
+    Speed and acceleration are bounded on each axis by itself, so each can stop at its limit in
+    time.
     """
 
     def __init__(self, band: OffsetBand) -> None:

@@ -3,8 +3,9 @@
 """
 The clock of streamed set-points, which runs as fast as the robot carries them out.
 
-The clock uses both feedback values of the manufacturer's guide: the effective speed shows at once
-how fast the robot's time runs; L, the motion time in flight, accumulates the remaining error::
+The clock uses both feedback values of the manufacturer's guide to buffered ``servoj``: the
+effective speed shows at once how fast the robot's time runs; L, the motion time in flight,
+accumulates the remaining error::
 
     rate = effective_speed + (target - L) / T        0 <= rate <= MAX_RATE, slew-limited
 
@@ -13,9 +14,9 @@ plus the time of set-points that the robot had not read when it made the report.
 the wire does not make L look too small, and the loop (an integrator with a proportional gain) does
 not oscillate.
 
-With s for the true speed, the derivative of L is ``rate - s``. The clock keeps L within
-``max_lag`` at any rate: everything in flight fits into the buffer even if the robot reads all of
-it at once and carries out nothing. So the buffer cannot overflow.
+With s for the true speed, the derivative of L is ``rate - s``. The clock never lets L exceed
+``max_lag``, so everything in flight fits into the buffer, even if the robot reads all of it at
+once and carries out nothing. The buffer cannot overflow.
 """
 
 from __future__ import annotations

@@ -17,7 +17,8 @@ goal (:mod:`~ur_cartesian_driver.execution.goal.goal_transitions`) then mean:
 A goal with events along its path is also sent as points
 (:mod:`~ur_cartesian_driver.execution.points.point_feeder`): the robot program switches outputs,
 waits and calls functions as along any spline, but the set-points lead the arm. While the program
-acts at a point, the set-points are held there, until the program has begun the next motion.
+acts at a point, the set-points are held there, until the program has begun the next motion. In
+CANCELLING such a goal also sends CANCEL.
 
 At the end of every goal, successful or not, the robot program is told to brake and stop reading,
 and the inputs are released.
@@ -177,7 +178,8 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
             self._last_read, self._last_answer = event.feedback.last_sequence, now
         if not self.stream.may_leave:
             self._cancelled_at = now if self._cancelled_at is None else self._cancelled_at
-            # A paused program does not answer, but it takes no next goal either.
+            # A paused program does not answer, but it takes no next goal either, so the stream
+            # need not wait for its answer.
             is_late = now > self._cancelled_at + CANCEL_TIMEOUT
             self.stream.may_leave = is_late or not event.feedback.playing
         before = self.stream.phase

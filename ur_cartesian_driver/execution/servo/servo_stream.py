@@ -10,8 +10,8 @@ in :data:`TRANSITIONS`:
 * **OPENING**: the inputs are requested. The first packets show the control step of the robot, and
   the sequence number that it read last, perhaps of an earlier client; ours continue after it.
 * **ENTERING**: the divergence thresholds are written, with the mode IDLE, and the robot program is
-  asked to read the inputs (a program that follows the guide always reads them). The program has
-  answered when it has read one of our sequence numbers.
+  asked to read the inputs (a program that follows the manufacturer's guide always reads them). The
+  program has answered when it has read one of our sequence numbers.
 * **READY**: the program reads the inputs. Nothing moves before :meth:`ServoStream.begin`.
 * **FILLING**: mode SERVO; set-points repeat the present position until enough motion time is in
   flight.
@@ -54,7 +54,7 @@ from ur_cartesian_driver.protocol.program.registers import ExternalError, ServoM
 MIN_WRITE_PERIOD = 0.5
 #: Fraction of ``target_lag`` that is in flight when the arm starts.
 START_FILL = 0.75
-#: Increase of the motion's rate after the buffer was empty [1/s].
+#: Increase of the motion's rate after the buffer was empty, or after a stall [1/s].
 RESTART_ACCELERATION = 2.0
 #: Decrease of the motion's rate while the arm is off its path [1/s].
 STALL_DECELERATION = 4.0

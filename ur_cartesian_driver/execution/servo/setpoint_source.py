@@ -79,7 +79,7 @@ class SplineSetpoints:
         return self._current
 
     def _compute_batch(self, dt: float) -> None:
-        """Compute the next set-points, for steps of the same length."""
+        """Compute the next set-point; if the step is the same as before, the next BATCH ones."""
         count = BATCH if abs(dt - self._step) <= _TIME_TOLERANCE else 1
         self._step, self._row = dt, 0
         q, _, _ = self.spline.rows(self.time + dt * np.arange(1.0, count + 1.0))

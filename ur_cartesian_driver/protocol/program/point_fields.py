@@ -3,7 +3,7 @@
 """
 Trajectory points as 21 numbers, made from motion primitives and outputs.
 
-URCL has this table since 2.12. Velocity comes before acceleration on the wire, unlike in
+URCL has had this table since 2.12. Velocity comes before acceleration on the wire, unlike in
 URScript. The factors on the wire are S = 1,000,000 and T, which equals S except in dialect 2.0.
 :mod:`~ur_cartesian_driver.protocol.program.trajectory_points` scales the numbers, and arranges
 them for older programs.
