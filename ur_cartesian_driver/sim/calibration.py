@@ -28,7 +28,7 @@ AXIS_TURN, AXIS_SHIFT = 1e-3, 3e-4
 
 # Axes at a smaller angle [rad] are treated as parallel, because files are rounded to ten digits.
 _PARALLEL = 1e-8
-# Tolerated deviation of the first joint from the axis of the base [m, rad].
+# Tolerated deviation of the first joint axis from the z axis of the base [m, rad].
 _OFF_AXIS = 1e-9
 
 
@@ -137,7 +137,7 @@ def _nominal_axes(geometry: DhTable) -> _Axes:
 
 
 def _table(axes: _Axes, model: RobotModel) -> DhTable:
-    """Return the DH table: each x axis is the common normal of a joint axis and the next one."""
+    """Return the DH table, whose x axes are the common normals of consecutive joint axes."""
     rows = []
     origin, x, z = np.zeros(3), np.array([1.0, 0.0, 0.0]), axes.directions[0]
     for i in range(1, 6):
@@ -161,7 +161,14 @@ def _table(axes: _Axes, model: RobotModel) -> DhTable:
 def _common_normal(
     origin: Floats, z: Floats, point: Floats, following: Floats
 ) -> tuple[Floats, float, float]:
-    """Return the common normal: direction, distance of its foot from ``origin``, and length."""
+    """
+    Return the common normal of two joint axes.
+
+    :param origin: a point on the first axis, whose direction is ``z`` [m].
+    :param point: a point on the second axis, whose direction is ``following`` [m].
+    :returns: the direction of the normal; the coordinate of its foot along ``z`` from ``origin``
+        [m]; its length, positive along the direction [m].
+    """
     normal = np.cross(z, following)
     size = float(np.linalg.norm(normal))
     if size > _PARALLEL:

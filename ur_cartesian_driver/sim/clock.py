@@ -16,12 +16,13 @@ import time
 from typing import Literal, Protocol
 
 #: The event loop can be late by this much [s], because epoll counts in milliseconds. The clock
-#: therefore asks to be woken this much too early, and sleeps for the remaining time.
+#: therefore asks the loop to wake it this much too early, and blocks for the remaining time.
 _LOOP_GRAIN = 0.001
 #: A clock that is late by more than this [s] (suspended process, overloaded machine) restarts
 #: instead of catching up. Robot programs count their timeouts (commonly 0.2 s) in cycles, and
 #: cycles would be so short while the clock caught up that no client could answer in time.
 _MAX_LAG = 0.1
+#: Number of last cycles whose lateness is kept.
 _MAX_SAMPLES = 20_000
 
 
@@ -66,7 +67,8 @@ class RealClock:
 
         :param cycle: simulated time of a cycle [s].
         :param rate: seconds of simulated time per second of real time.
-        :param when_late: 'skip' = a restart adds the lateness to ``skipped``; 'wait' = it adds 0.
+        :param when_late: 'skip' = a restart of a late clock adds the lateness to ``skipped``;
+            'wait' = it adds nothing.
         """
         self._period, self._rate = cycle / rate, rate
         self._skips = when_late == 'skip'

@@ -71,11 +71,12 @@ from ur_cartesian_driver.sim.state.power_and_safety import (
 )
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 
-#: The controller's clock at the start [s]: RTDE clients believe that a controller that has been
-#: up for less than 40 s is still booting.
+#: The controller's clock at the start [s]; not 0, because RTDE clients believe that a controller
+#: that has been up for less than 40 s is still booting.
 START_TIME = 60.0
 #: Number of past cycles whose joint positions programs can read.
 MAX_HISTORY = 100
+#: While this many windows are open on the pendant, only blocking ones are added.
 _MAX_POPUPS = 100
 #: The first major version of PolyScope X.
 POLYSCOPE_X = 10
@@ -110,13 +111,14 @@ class Controller:
 
         :param make_builtins: returns the functions that programs can call.
         :param sockets: the sockets of programs; None = in memory, for tests.
+        :raises UnloadableProgram: the program that the configuration names cannot be loaded.
         """
         self.config = config
         #: Duration of a cycle [s].
         self.cycle = config.cycle
         #: Number of cycles so far.
         self.cycles = 0
-        #: Time that the clock has skipped because this computer was too busy [s].
+        #: Time that the simulator's clock has skipped because this computer was too busy [s].
         self.skipped_time = 0.0
         self.arm = Arm(config.robot_model, config.geometry)
         self.motion = MotionGenerator(self.arm, self.cycle, config.q, config.laws)
@@ -154,11 +156,12 @@ class Controller:
         self.remote_control = config.remote_control and config.has_remote_control
         #: The speed slider, 0..1.
         self.speed_slider = 1.0
-        #: The rate at which motions run now, 0..1; determined by slider, pauses and stops.
+        #: The fraction of the programmed speed at which motions run now, 0..1; the slider, pauses
+        #: and stops change it.
         self.scale = 1.0
         #: Whether the arm slows down on its path because the program ended during the motion.
         self._stopping_on_path = False
-        #: Whether the power is cut as soon as the arm rests.
+        #: Whether the power will be cut as soon as the arm stands still.
         self._cuts_power = False
         self._joint_history: deque[Vector6] = deque([config.q] * MAX_HISTORY, maxlen=MAX_HISTORY)
         self.programs: ProgramRunner = ProgramRunner(
@@ -231,7 +234,7 @@ class Controller:
 
     @property
     def _is_moving_freely(self) -> bool:
-        """Whether the arm has power, and no pause or stop holds the arm."""
+        """Whether the arm has power and a program runs, and no pause or stop holds the arm."""
         return (
             self.safety.mode in OPERATIONAL
             and self.power.mode is RobotMode.RUNNING
@@ -272,7 +275,7 @@ class Controller:
         Return the actual joint positions of an earlier cycle [rad].
 
         :param steps: number of cycles before the last one.
-        :raises RuntimeException: ``steps`` is negative, or larger than the history.
+        :raises RuntimeException: ``steps`` is not from 0 to ``MAX_HISTORY`` - 1.
         """
         if not 0 <= steps < MAX_HISTORY:
             raise RuntimeException(f'steps is {steps}; the history holds 0..{MAX_HISTORY - 1}')
@@ -329,7 +332,7 @@ class Controller:
         self.scale = min(max(target, self.scale - step), self.scale + step)
 
     def _report_motion_events(self) -> None:
-        """Send the warnings of the motion; a fault of the motion causes a protective stop."""
+        """Send the warnings of the motion; cause a protective stop if the motion has a fault."""
         for warning in self.motion.warnings:
             self.messages.error(warning.code, warning.argument, warning.text)
         self.motion.warnings.clear()
@@ -339,7 +342,7 @@ class Controller:
             self.safety_event(SafetyEvent.PROTECTIVE_STOP, reported=True)
 
     def _pause_if_wanted(self, code: int, argument: int) -> None:
-        """Pause the program if its `pause_on_error_code` names this error."""
+        """Pause the program if it has called `pause_on_error_code` for this error."""
         if self.process.has_pause_on(code, argument):
             self.programs.pause()
 
@@ -356,7 +359,9 @@ class Controller:
 
     def brake(self) -> None:
         """
-        Stop the arm because the program has ended: along its path or, off a path, at HARD_STOP.
+        Stop the arm because the program has ended.
+
+        On a path, the arm slows down along the path; otherwise it brakes at ``HARD_STOP``.
 
         If the arm is paused on its path or stopped by a fault, the path is discarded.
         """
@@ -373,7 +378,7 @@ class Controller:
         self.motion.motion_version = self.config.motion_version
 
     def begin_program(self) -> None:
-        """Make the first motion of a program start slowly."""
+        """Make the first path move of a program start slowly."""
         self.motion.begin_program()
 
     def end_modes(self) -> None:
@@ -441,7 +446,7 @@ class Controller:
         """
         Load a program like :meth:`load_program`, but compile it in parallel with the cycles first.
 
-        :param then: called with the result, at once or later.
+        :param then: called with the reason for a refusal, else an empty string, at once or later.
         """
         program = self._stored_program(PurePosixPath(name).name)
         if isinstance(program, str):
@@ -452,7 +457,7 @@ class Controller:
             then(self.load_program(name))
 
     def _stored_program(self, file: str) -> SavedProgram | None:
-        """Return a stored program: its text, unless the text is generated when it is played."""
+        """Return a stored program, as text unless it has External Control; None = no such file."""
         program = self.stored_programs.program(file)
         if isinstance(program, ProgramTree) and not program.has_external_control:
             return program.script(file, FetchedScript())
@@ -525,7 +530,7 @@ class Controller:
         self.watchdogs.watch(variable, frequency, action, self.time)
 
     def show_popup(self, popup: Popup) -> None:
-        """Show a window; while too many are open, only a blocking window is kept."""
+        """Show a window; beyond ``_MAX_POPUPS`` open windows, keep only blocking ones."""
         if popup.blocking or len(self.popups) < _MAX_POPUPS:
             self.popups.append(popup)
         self.messages.popup(popup)

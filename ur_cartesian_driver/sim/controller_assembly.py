@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Puts a simulated controller together: its cycle, the functions of programs, its faults."""
+"""Puts a simulated controller together with its script functions and its fault injector."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ The values of the RTDE outputs in the simulated controller.
 
 Actual values equal the targets, unless the arm is compliant or imperfect, or a fault makes them
 differ. Only the payload has a mass; the links have none. Outputs of quantities that are not
-simulated (temperatures, encoders) are zero or have the plausible values of :data:`FIXED`.
+simulated have the plausible values of :data:`FIXED` (temperatures), or are zero (encoders).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from ur_cartesian_driver.sim.state.controller_io import (
 
 Getter = Callable[['Controller'], Any]
 
-#: Values of ``joint_mode`` and ``tool_mode``.
+#: Values of the outputs ``joint_mode`` and ``tool_mode``.
 _RUNNING, _IDLE, _POWER_OFF = 253, 255, 239
 #: Supply voltage of a powered arm [V]; supply current [A].
 _VOLTAGE, _CURRENT = 48.0, 0.5
@@ -53,7 +53,7 @@ def _elbow_velocity(controller: Controller) -> Vector3:
 
 
 def _tcp_acceleration(controller: Controller) -> Vector6:
-    """Return linear and angular acceleration of the TCP [m/s^2, rad/s^2]."""
+    """Return the target's linear and angular acceleration of the TCP [m/s^2, rad/s^2]."""
     motion = controller.motion
     if not any(motion.qd) and not any(motion.qdd):
         return ZERO6  # a shortcut, because most arms stand still most of the time
@@ -62,7 +62,7 @@ def _tcp_acceleration(controller: Controller) -> Vector6:
     )
 
 
-@lru_cache(maxsize=1)  # used several times per cycle: by each client, for target and actual
+@lru_cache(maxsize=1)  # each client needs the value twice per cycle, for target and actual
 def _point_acceleration(
     arm: Arm, q: Vector6, qd: Vector6, qdd: Vector6, offset: Vector3
 ) -> Vector6:
@@ -103,13 +103,13 @@ def _actual_acceleration(controller: Controller) -> Vector6:
 
 
 def _target_currents(controller: Controller) -> Vector6:
-    """Return the joint currents [A] without noise; only an imperfect arm has currents."""
+    """Return the joint currents [A] without noise; a perfect arm has none."""
     imperfections = controller.config.arm_imperfections
     return imperfections.holding_current if imperfections and _powered(controller) else ZERO6
 
 
 def _joint_currents(controller: Controller) -> Vector6:
-    """Return the measured joint currents [A]; only an imperfect arm has currents."""
+    """Return the measured joint currents [A]; a perfect arm has none."""
     arm = controller.actual.imperfect_arm
     return arm.currents() if arm is not None and _powered(controller) else ZERO6
 

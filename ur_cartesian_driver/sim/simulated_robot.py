@@ -50,13 +50,13 @@ T = TypeVar('T')
 
 _CALL_TIMEOUT = 10.0
 _COMPILE_TIMEOUT = 120.0
-#: Difference between the ports of a script interface (30001) and of its read-only twin (30011).
+#: Port of a read-only twin (such as 30011), minus the port of its script interface (30001).
 READ_ONLY_DISTANCE = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ports:
-    """The ports that the servers listen on."""
+    """The ports on which the servers of a robot listen."""
 
     rtde: int
     primary: int
@@ -71,7 +71,7 @@ class Ports:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotSnapshot:
-    """The state of the simulated robot in one cycle; joints and poses are target values."""
+    """The state of the simulated robot after a cycle; joints and poses are target values."""
 
     timestamp: float
     q: Vector6
@@ -112,12 +112,15 @@ class SimulatedRobot:
 
         :param sockets: the sockets of programs; None = TCP.
         :param clock: the clock for the cycles; None = a clock with the rate of the configuration.
+        :raises UnloadableProgram: the program that the configuration names cannot be loaded.
+        :raises ValueError: a fault of the configuration is not understood.
         """
         self.config = config or SimulatorConfig()
         #: The error that has ended the thread; None = no error.
         self._failure: Exception | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
-        #: Called in the robot's thread with a peer's port and the bytes received from this peer.
+        #: Called in the robot's thread when a program's socket has received bytes: with the port
+        #: of the peer and the bytes.
         self.on_socket_data: Callable[[int, bytes], None] | None = None
         impaired = ImpairedSockets(
             sockets or TcpScriptSockets(self._on_socket_data, self.config.host)
@@ -292,7 +295,8 @@ class SimulatedRobot:
         while True:
             await self._clock.next_cycle()
             if self._compiler is not None and isinstance(self._clock, VirtualClock):
-                # Runs are repeatable: no program starts later because this computer is slow.
+                # Wait for the compiler, so that runs are repeatable: otherwise programs would
+                # start in later cycles on a slow computer.
                 await self._compiler.wait_until_idle()
             self.controller.skipped_time = self._clock.skipped
             self.controller.step()
@@ -329,7 +333,7 @@ class SimulatedRobot:
 
     def call(self, function: Callable[[Controller], T]) -> T:
         """
-        Call a function with the controller between two cycles, and return its result.
+        Call a function with the controller between two cycles, and return or raise its result.
 
         :raises TimeoutError: the robot's thread did not call the function within 10 s.
         :raises RuntimeError: the robot's thread was ended by an error.
@@ -411,7 +415,11 @@ class SimulatedRobot:
         self.call(lambda controller: controller.programs.stop())
 
     def pause_program(self) -> None:
-        """Pause the program on its path."""
+        """
+        Pause the program on its path.
+
+        :raises RuntimeError: no program is playing.
+        """
         self._checked(lambda controller: controller.programs.pause())
 
     def play_program(self) -> None:
@@ -439,12 +447,14 @@ class SimulatedRobot:
             compiled.result(_COMPILE_TIMEOUT)
 
     def close_popups(self) -> None:
-        """Confirm all popups."""
+        """Close all popups, as if the person at the pendant confirmed them."""
         self.call(lambda controller: controller.close_popups())
 
     def answer(self, *answers: object) -> None:
         """
-        Answer the windows of the pendant that request a value: open ones first, then later ones.
+        Type answers into the windows of the pendant that request values.
+
+        Requests get the answers in their order; the remaining answers are for later requests.
 
         :param answers: the typed answers: `yes` or `no` for a boolean, a number, or a text.
         """

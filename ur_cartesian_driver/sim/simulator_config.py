@@ -91,7 +91,7 @@ class SimulatorConfig:
     #: Motion version of movej and movel at the start, and of programs that are played: 1 or, from
     #: PolyScope 5.22 on, 2. Programs can set another one.
     motion_version: int = 1
-    #: Figures of motion version 2, which are assumed.
+    #: Parameters of motion version 2; their values are assumed.
     second_motion_version: SecondMotionVersion = field(default_factory=SecondMotionVersion)
     #: Denavit-Hartenberg parameters of this arm; None = the nominal parameters of the model.
     geometry: DhTable | None = None
@@ -112,9 +112,9 @@ class SimulatorConfig:
     brake_release_time: float = 0.5
     #: Simulated seconds per second of real time; 0 = as many as possible.
     rate: float = 1.0
-    #: Behaviour of the robot's clock if this computer was too busy to begin cycles in time: 'skip'
+    #: Behaviour of the controller's clock if this computer was too busy for cycles in time: 'skip'
     #: adds the lost time, so that the clock keeps real time as on a real robot; 'wait' does not,
-    #: so that motions take their nominal time by the robot's clock, as tests expect.
+    #: so that motions take their nominal time on the controller's clock, as tests expect.
     when_late: Literal['skip', 'wait'] = 'skip'
     #: Faults, as values of `sim.faults.fault_values` or as text; their times are measured from the
     #: first cycle.
@@ -126,6 +126,7 @@ class SimulatorConfig:
     #: Answers of the person at the pendant when programs request values, in this order; a program
     #: that requests more values waits.
     answers: Sequence[object] = ()
+    #: The bodies of ``contacts``.
     contact_bodies: tuple[ContactBody, ...] = field(init=False, default=())
     #: ``imperfections`` with the figures of the twin.
     arm_imperfections: Imperfections | None = field(init=False, default=None)
@@ -137,10 +138,10 @@ class SimulatorConfig:
     #: Programs that can be loaded: file name -> URScript, or the tree of a program on the pendant.
     #: `external_control.urp` has a node of External Control unless a program here has that name.
     programs: Mapping[str, SavedProgram] = field(default_factory=dict)
-    #: Name of the program that is loaded from the start; empty = an empty, unnamed program.
+    #: Name of the program that is loaded from the start; empty = none.
     program: str = ''
-    #: Host and port of External Control in the installation; its node fetches its program from
-    #: there when it is played.
+    #: Host and port of External Control in the installation. When a program with a node of
+    #: External Control is played, the node's script is fetched from there.
     external_control_host: str = '127.0.0.1'
     external_control_port: int = 50002
 
@@ -224,7 +225,12 @@ class SimulatorConfig:
 
     @property
     def second_version_laws(self) -> SecondMotionVersion:
-        """Return ``second_motion_version`` with the blends of the twin."""
+        """
+        Return ``second_motion_version``, adapted to the twin.
+
+        If the twin has measured blends, its ``blend_begin`` determines them, so the additional
+        ``blend_fraction`` is 1.
+        """
         if self.twin is None or 'blend_begin' not in self.twin.estimates:
             return self.second_motion_version
         return replace(self.second_motion_version, blend_fraction=1.0)
@@ -236,19 +242,19 @@ class SimulatorConfig:
 
     @property
     def laws(self) -> MotionLaws:
-        """Return the laws of motion of the controller."""
+        """Return the measured laws of motion, and assumed ones where none were measured."""
         return laws_of(self.twin, self.turn_ratio)
 
     @property
     def robot_model(self) -> RobotModel:
-        """Return the model of the robot, with the limits of this robot."""
+        """Return the model of the robot, with ``joint_limits`` if they are given."""
         model = robot_model(self.model)
         return model if self.joint_limits is None else model.limited_to(self.joint_limits)
 
     @property
     def version(self) -> tuple[int, int, int, int]:
         """
-        Return major, minor, bugfix, build.
+        Return the version of the robot's software: major, minor, bugfix, build.
 
         :raises ValueError: ``polyscope`` is not two to four numbers with dots between them.
         """
@@ -277,7 +283,7 @@ class SimulatorConfig:
 
     @property
     def listening_interpreter_port(self) -> int:
-        """Return the port for statements in interpreter mode; 0 = any free one."""
+        """Return the port for interpreter mode; 0 = any free one."""
         return self._port_beside_primary(self.interpreter_port, 19)
 
     @property

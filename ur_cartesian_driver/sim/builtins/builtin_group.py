@@ -25,19 +25,19 @@ def without_effect(function: F) -> F:
 
 
 def has_effect(function: Callable[..., Any]) -> bool:
-    """Return whether a script function does more than check its arguments."""
+    """Return whether a script function is not marked with :func:`without_effect`."""
     return getattr(function, '__func__', function) not in _WITHOUT_EFFECT
 
 
 class BuiltinGroup:
-    """The functions of one subject, as the public methods of a subclass; see the package."""
+    """Base of a group: the public methods of a subclass are the functions of one subject."""
 
     def __init__(self, controller: Controller) -> None:
         """Give the functions access to the state of this controller."""
         self._controller = controller
 
     def functions(self) -> dict[str, Any]:
-        """Return the functions by name."""
+        """Return the script functions of the group, by name."""
         return {
             name: getattr(self, name)
             for name in dir(self)

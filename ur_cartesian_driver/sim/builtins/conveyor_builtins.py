@@ -29,7 +29,7 @@ from ur_cartesian_driver.urscript.script_values import ScriptPose, Value
 
 ENCODERS = 2
 DECODERS = 5
-#: Ticks after which an encoder wraps around, by `range_id`.
+#: Ticks after which an encoder wraps around, indexed by `range_id`.
 RANGES = (2**32, 2**8, 2**16, 2**24, 2**32)
 
 
@@ -47,7 +47,7 @@ class _Conveyors:
 
 
 class ConveyorBuiltins(BuiltinGroup):
-    """Tick counts and tracking outlive the program; `stop_conveyor_tracking` ends tracking."""
+    """Functions for encoders and tracked belts, whose state outlives the program."""
 
     def __init__(self, controller: Controller) -> None:
         """Begin with tick counts of zero, and with no tracked belt."""
@@ -72,7 +72,7 @@ class ConveyorBuiltins(BuiltinGroup):
         self._encoder(encoder_index).range = RANGES[index(range_id, 'range_id', len(RANGES))]
 
     def encoder_get_tick_count(self, encoder_index: Value, opt: Value = '') -> float:
-        """Return the tick count of an encoder; `raw` = as a whole number."""
+        """Return the tick count of an encoder; with `opt` = `raw`, as a whole number."""
         count = self._encoder(encoder_index).count
         if text(opt, 'opt') not in ('', 'raw'):
             raise RuntimeException(f'opt is {opt!r}; it must be "" or "raw"')

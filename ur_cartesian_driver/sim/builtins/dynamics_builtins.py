@@ -20,13 +20,13 @@ from ur_cartesian_driver.sim.motion.kinematics.point_motion import (
 )
 from ur_cartesian_driver.urscript.script_values import Matrix, Value
 
-#: Half the time [s] between the two Jacobians whose difference gives the time derivative.
+#: The time derivative of the Jacobian is computed from Jacobians this much [s] before and after.
 DIFFERENCE = 1e-4
 UNIT_ACCELERATIONS = tuple(vector6(1.0 if i == j else 0.0 for i in range(6)) for j in range(6))
 
 
 class DynamicsBuiltins(BuiltinGroup):
-    """Functions of joint positions and speeds (default: the target's); results in base axes."""
+    """Functions of joint positions and speeds; by default, of the present target motion."""
 
     def _q(self, q: Value) -> Vector6:
         return self._controller.motion.q if q is None else six(q, 'q')
@@ -38,13 +38,13 @@ class DynamicsBuiltins(BuiltinGroup):
         return self._controller.motion.T_flange_tcp if tcp == 'active_tcp' else pose(tcp, 'tcp')
 
     def get_jacobian(self, q: Value = None, tcp: Value = 'active_tcp') -> Matrix:
-        """Return the matrix that maps joint speeds to the twist of the TCP [m/s, rad/s]."""
+        """Return the matrix that maps joint speeds to the TCP twist, in base axes [m/s, rad/s]."""
         return Matrix(self._controller.arm.jacobian(self._q(q), self._tcp(tcp)).tolist())
 
     def get_jacobian_time_derivative(
         self, q: Value = None, qd: Value = None, tcp: Value = 'active_tcp'
     ) -> Matrix:
-        """Return the time derivative of the Jacobian at these joint speeds."""
+        """Return the time derivative of the Jacobian at the joint speeds `qd`."""
         arm, tool, joints = self._controller.arm, self._tcp(tcp), self._q(q)
         ahead, behind = (
             arm.jacobian([a + step * b for a, b in zip(joints, self._qd(qd), strict=True)], tool)

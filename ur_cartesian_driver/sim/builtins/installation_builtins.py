@@ -23,13 +23,14 @@ INPUT_ACTIONS = ('default', 'freedrive')
 EUROMAP_PINS = 33
 
 
-#: Number of program states to which an output can be tied; 6 and 7 follow the power of the arm.
+#: Number of states to which an output can be tied: 0 to 5 follow the program, 6 and 7 the power
+#: of the arm.
 RUN_STATES = 8
 EUROMAP_RUN_STATES = 4
 
 
 def _input_action(count: int) -> Callable[[Any, Value, Value], None]:
-    """Return the script function that assigns an action to one of ``count`` inputs."""
+    """Return a script function that checks the number of an input and an action for it."""
 
     @without_effect
     def choose(_: Any, port: Value, action: Value) -> None:
@@ -41,7 +42,7 @@ def _input_action(count: int) -> Callable[[Any, Value, Value], None]:
 
 
 def _runstate(count: int, states: int = RUN_STATES) -> Callable[[Any, Value, Value], None]:
-    """Return the script function that ties one of ``count`` outputs to one of the states."""
+    """Return a script function that checks the numbers of an output and of a program state."""
 
     @without_effect
     def choose(_: Any, outputId: Value, state: Value) -> None:
@@ -52,7 +53,7 @@ def _runstate(count: int, states: int = RUN_STATES) -> Callable[[Any, Value, Val
 
 
 def _runstate_list(count: int) -> Callable[[Any, Value], None]:
-    """Return the older script function; its list has the outputs that are high in a program."""
+    """Return an older script function that checks a list of the numbers of outputs."""
 
     @without_effect
     def choose(_: Any, outputs: Value) -> None:
@@ -131,9 +132,9 @@ class InstallationBuiltins(BuiltinGroup):
 
 class StoredSettingsBuiltins(BuiltinGroup):
     """
-    Settings that programs can read back, and that outlive them.
+    Settings that programs can read back, and that outlive the program.
 
-    Motions depend on the motion version alone.
+    Of these settings, only the motion version changes the simulated motions.
     """
 
     def motion_version_set(self, version: Value) -> None:
@@ -145,7 +146,7 @@ class StoredSettingsBuiltins(BuiltinGroup):
         return self._controller.motion.motion_version
 
     def jerk_gain_scaling_set(self, scaling: Value) -> None:
-        """Set the factor (0.01..1) on the jerk of smooth moves; they move alike here."""
+        """Store the factor (0.01..1) on the jerk of smooth moves; simulated moves ignore it."""
         self._controller.stored.jerk_gain_scaling = within(scaling, 'scaling', 0.01, 1)
 
     def jerk_gain_scaling_get(self) -> float:
@@ -153,11 +154,11 @@ class StoredSettingsBuiltins(BuiltinGroup):
         return self._controller.stored.jerk_gain_scaling
 
     def set_base_acceleration(self, a: Value) -> None:
-        """Store the acceleration of the robot's base [m/s^2]; the arm does not feel it."""
+        """Store the acceleration of the robot's base [m/s^2]; simulated motions ignore it."""
         self._controller.stored.base_acceleration = three(a, 'a')
 
     def get_base_acceleration(self) -> list[float]:
-        """Return the acceleration of the robot's base that was stored [m/s^2]."""
+        """Return the stored acceleration of the robot's base [m/s^2]."""
         return list(self._controller.stored.base_acceleration)
 
 

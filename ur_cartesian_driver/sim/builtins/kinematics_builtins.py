@@ -25,6 +25,7 @@ def joints_of(controller: Controller, value: Value, function: str) -> Vector6:
     """
     Return joint positions unchanged; convert a pose to its solution nearest to the present joints.
 
+    :param function: name of the script function, for the error.
     :raises RuntimeException: the pose cannot be reached.
     """
     if not is_pose(value):
@@ -105,7 +106,7 @@ class KinematicsBuiltins(BuiltinGroup):
         return script_pose(self._controller.actual.T_base_tcp)
 
     def tool_pose(self) -> ScriptPose:
-        """Return the actual pose of the TCP, in programs that PolyScope saves."""
+        """Return the actual pose of the TCP; programs that PolyScope saves use this name."""
         return self.get_actual_tcp_pose()
 
     def get_target_tcp_pose(self) -> ScriptPose:
@@ -120,7 +121,7 @@ class KinematicsBuiltins(BuiltinGroup):
         )
 
     def get_actual_tool_flange_pose(self) -> ScriptPose:
-        """Return the actual pose of the flange."""
+        """Return the pose of the flange at the actual joint positions."""
         return script_pose(self._controller.arm.forward(self._controller.actual.q))
 
     def get_tcp_offset(self) -> ScriptPose:

@@ -137,12 +137,12 @@ class ModbusBuiltins(BuiltinGroup):
 
     @without_effect
     def modbus_request_update_signal_value(self, signal_name: Value) -> None:
-        """Check the name of a signal that would be read at once."""
+        """Check the name of the signal, which a real robot would read at once."""
         self._signal(signal_name)
 
     @without_effect
     def modbus_reset_connection(self, connection_id: Value, is_blocking: Value = True) -> None:
-        """Check the address of the device; no connection can be broken."""
+        """Check that the address is a string; there is no connection to reset."""
         text(connection_id, 'connection_id')
 
     @without_effect
@@ -154,7 +154,7 @@ class ModbusBuiltins(BuiltinGroup):
     def modbus_set_output_register(
         self, signal_name: Value, register_value: Value, is_secondary_program: Value = False
     ) -> None:
-        """Write one register, or a list of them; registers behind a shorter list stay."""
+        """Write one or several registers; the ones after them, and inputs, do not change."""
         signal = self._signal(signal_name)
         given = _given(signal, int, signal_name, register_value, 'register_value')
         values: list[Value] = [index(value, 'register_value', 2**16) for value in given]
@@ -164,7 +164,7 @@ class ModbusBuiltins(BuiltinGroup):
     def modbus_set_output_signal(
         self, signal_name: Value, digital_value: Value, is_secondary_program: Value = False
     ) -> None:
-        """Write one digital output, or a list of them; outputs behind a shorter list stay."""
+        """Write one or several digital outputs; the ones after them, and inputs, do not change."""
         signal = self._signal(signal_name)
         given = _given(signal, bool, signal_name, digital_value, 'digital_value')
         values: list[Value] = [truth(value) for value in given]
@@ -184,7 +184,7 @@ class ModbusBuiltins(BuiltinGroup):
 
     @without_effect
     def modbus_set_digital_input_action(self, signal_name: Value, action: Value) -> None:
-        """Assign an action to an input."""
+        """Check the name of the signal, and that the action is a string."""
         self._signal(signal_name)
         text(action, 'action')
 
@@ -192,7 +192,7 @@ class ModbusBuiltins(BuiltinGroup):
     def modbus_set_runstate_dependent_choice(
         self, signal_name: Value, runstate_choice: Value
     ) -> None:
-        """Tie an output to the program state."""
+        """Check the name of the signal and the number of the program state."""
         self._signal(signal_name)
         index(runstate_choice, 'runstate_choice', 6)
 
@@ -213,11 +213,12 @@ def _given(
     signal: _Signal, kind: type, signal_name: Value, value: Value, name: str
 ) -> list[Value]:
     """
-    Return the values to write, as a list; a program passes one value or a list.
+    Return the values to write as a list; a program passes one value or a list.
 
     :param kind: the type that the values of the signal must have.
     :param name: the argument's name.
-    :raises RuntimeException: the signal is of the other kind, or takes fewer values.
+    :raises RuntimeException: the signal is of the other kind, or the number of values is not from
+        1 to the signal's number of values.
     """
     if signal.kind is not kind:
         wanted = 'register' if kind is int else 'digital'

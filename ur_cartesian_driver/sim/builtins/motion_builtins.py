@@ -51,12 +51,17 @@ class MotionBuiltins(BuiltinGroup):
     def _run(
         self, call: Callable[[], Move], waypoint: Pose | None = None, abortable: bool = False
     ) -> Steps:
-        """Take ownership, call the motion generator, and wait until the call can return."""
+        """
+        Take ownership, call the motion generator, and wait until the call can return.
+
+        :param waypoint: the target pose of a move; None for a stream of set-points.
+        :param abortable: whether the interpreter command `abort` ends the call.
+        """
         self._take(waypoint)
         yield from self._controller.ownership.run(call, abortable)
 
     def _stop(self, call: Callable[[], Move]) -> Steps:
-        """Take ownership and stop; unlike a move, a stop is possible in freedrive."""
+        """Take ownership and stop; unlike moves, stops are possible in freedrive."""
         self._controller.ownership.take(self._controller.programs.current_thread)
         yield from self._controller.ownership.run(call)
 
@@ -161,7 +166,7 @@ class MotionBuiltins(BuiltinGroup):
 
     def servoc(self, pose: Value, a: Value = 1.2, v: Value = 0.25, r: Value = 0) -> Steps:
         """
-        Move like `movep`: its difference from the manual's "servo circular" is not published.
+        Move like `movep`; how the manual's "servo circular" differs from it is not published.
 
         A call takes at least one cycle, even if the tool is already at the target: programs call
         `servoc` in a loop in which nothing else takes time.
@@ -282,7 +287,11 @@ class ModeBuiltins(BuiltinGroup):
 
 
 def _limits(a: Value, v: Value, t: Value) -> tuple[float, float, float]:
-    """Return `a`, `v` and `t` as numbers; if `t` is above 0, `a` and `v` only shape the ramps."""
+    """
+    Return `a`, `v` and `t` as numbers.
+
+    If `t` is above 0, `a` and `v` only shape the ramps, so they need not be positive.
+    """
     time = not_negative(t, 't')
     if time > 0.0:
         return number(a, 'a'), number(v, 'v'), time

@@ -22,7 +22,7 @@ class _Requested:
     """A kind of value that a program requests from the person at the pendant."""
 
     name: str
-    #: The type of the value on the primary interface.
+    #: The number of the value's type in messages of the primary interface.
     number: int
     #: Converts the typed text, or raises ValueError.
     read: Callable[[str], Value]
@@ -74,9 +74,10 @@ class PendantBuiltins(BuiltinGroup):
     """
     Messages, popups, and questions to the person at the pendant.
 
-    A question waits without a time limit. Only a person answers it (`SimulatedRobot.answer`): how
-    a client answers a real robot is unknown. The pendant's button Cancel stops the program, as
-    `SimulatedRobot.stop_program` does. `close popup` does not close the question.
+    A question waits without a time limit. Clients cannot answer it, because it is unknown how they
+    answer a real robot; `SimulatedRobot.answer` answers in the person's place. The pendant's
+    button Cancel stops the program, as `SimulatedRobot.stop_program` does. The dashboard command
+    `close popup` does not close the question.
     """
 
     request_boolean_from_primary_client = _request(_Requested('boolean', 0, _boolean))
@@ -96,7 +97,7 @@ class PendantBuiltins(BuiltinGroup):
         error: Value = False,
         blocking: Value = False,
     ) -> Steps:
-        """Show a window; if it is blocking, wait until the window is closed."""
+        """Show a window; if it is blocking, wait until it is closed."""
         popup = Popup(
             text=to_text(s),
             title=to_text(title),

@@ -67,7 +67,7 @@ class PoseBuiltins(BuiltinGroup):
         return pose(p_from, 'p_from').distance_to(pose(p_to, 'p_to'))
 
     def interpolate_pose(self, p_from: Value, p_to: Value, alpha: Value) -> ScriptPose:
-        """Return the pose at a fraction between two poses; values outside 0..1 extrapolate."""
+        """Return the pose at the fraction `alpha` between two poses; outside 0..1, extrapolate."""
         start, to = pose(p_from, 'p_from'), pose(p_to, 'p_to')
         return script_pose(start.interpolate(to, number(alpha, 'alpha')))
 
@@ -97,7 +97,7 @@ class PoseBuiltins(BuiltinGroup):
 
 
 def _about(axis: int, angle: float) -> Quaternion:
-    """Return the rotation about axis 0 (x), 1 (y) or 2 (z)."""
+    """Return the rotation by an angle [rad] about axis 0 (x), 1 (y) or 2 (z)."""
     q = [0.0, 0.0, 0.0, cos(0.5 * angle)]
     q[axis] = sin(0.5 * angle)
     return q[0], q[1], q[2], q[3]

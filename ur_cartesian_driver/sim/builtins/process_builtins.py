@@ -35,7 +35,7 @@ class PathOffsetBuiltins(BuiltinGroup):
         return self._controller.motion.path_offset
 
     def path_offset_enable(self) -> None:
-        """Enable the path offset; limits and filter keep their values."""
+        """Enable the path offset with the present limits and filter."""
         self._offset.enabled = True
 
     def path_offset_disable(self, a: Value = 20) -> Steps:
@@ -47,18 +47,18 @@ class PathOffsetBuiltins(BuiltinGroup):
         )
 
     def path_offset_set(self, offset: Value, type: Value) -> None:
-        """Set the offset in a frame, clamped to the limits along and about each axis."""
+        """Set the offset in the frame `type`, clamped to the limits along and about each axis."""
         frame, wanted = _frame(type), six(offset, 'offset')
         if not self._offset.enabled:
             raise RuntimeException('path_offset_set needs path_offset_enable before it.')
         self._offset.set(frame, wanted)
 
     def path_offset_get(self, type: Value) -> ScriptPose:
-        """Return the currently applied offset, expressed in a frame."""
+        """Return the currently applied offset, expressed in the frame `type`."""
         return ScriptPose(*self._offset.applied(_frame(type)))
 
     def path_offset_set_alpha_filter(self, alpha: Value) -> None:
-        """Set the coefficient of the filter, 0..1."""
+        """Set the coefficient of the offset's filter, 0..1; 1 = no filter."""
         self._offset.alpha = within(alpha, 'alpha', 0, 1)
 
     def path_offset_set_max_offset(self, transLimit: Value, rotLimit: Value) -> None:

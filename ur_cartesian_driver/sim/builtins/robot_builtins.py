@@ -62,15 +62,15 @@ class TimeBuiltins(BuiltinGroup):
         """
         Return a time in seconds and nanoseconds.
 
-        :param mode: 0 = the controller's clock; 2 = the clock of the system, which runs alike here
-            and begins on 2026-01-01, so that a run can be repeated.
+        :param mode: 0 = the controller's clock; 2 = the system time, here the controller's clock
+            plus the time at the start of 2026, so that a run can be repeated.
         """
         start = SYSTEM_TIME if one_of(mode, 'mode', (0, 2)) == 2 else 0
         nanoseconds = round(self._controller.time * 1e9) + start * 10**9
         return Struct({'sec': nanoseconds // 10**9, 'nanosec': nanoseconds % 10**9})
 
     def interpreter_mode(self, clearQueueOnEnter: Value = True, clearOnEnd: Value = True) -> Steps:
-        """Execute statements that clients send to the interpreter port, until the mode ends."""
+        """Execute statements that clients send to the interpreter port until `end_interpreter`."""
         yield from self._controller.interpreter_mode.run(
             clear_queue=truth(clearQueueOnEnter), clear_on_end=truth(clearOnEnd)
         )
@@ -80,7 +80,7 @@ class TimeBuiltins(BuiltinGroup):
         self._controller.interpreter_mode.end()
 
     def clear_interpreter(self) -> None:
-        """Delete all definitions of interpreter mode, when the current statement has ended."""
+        """Delete the variables and functions of all statements, when the current one has ended."""
         self._controller.interpreter_mode.clear()
 
     def rtde_set_watchdog(
@@ -170,7 +170,7 @@ class RobotBuiltins(BuiltinGroup):
     enable_external_ft_sensor = ft_rtde_input_enable  # the old name
 
     def set_payload(self, m: Value, cog: Value = None) -> None:
-        """Set mass [kg] and centre of gravity [m] (default: the TCP); no inertia remains."""
+        """Set mass [kg] and centre of gravity [m] (default: the TCP); the inertia becomes zero."""
         tcp = self._controller.motion.T_flange_tcp.position
         centre = tcp if cog is None else three(cog, 'cog')
         self._change_payload(Payload(mass=not_negative(m, 'm'), cog=centre))
@@ -222,7 +222,7 @@ class RobotBuiltins(BuiltinGroup):
 
     def get_rtde_value(self, name: Value) -> Value:
         """
-        Return the present value of an RTDE output by its name; a vector as a list.
+        Return the present value of the RTDE output `name`; a vector becomes a list.
 
         An integer that does not fit into 32 bits becomes a float.
         """
@@ -246,7 +246,7 @@ class RobotBuiltins(BuiltinGroup):
         """
         Change the positions of unlimited joints by full turns.
 
-        :param qNear: positions [rad], near which the new positions have to be; None = no change.
+        :param qNear: positions [rad] to which the new ones are the nearest; None = no change.
         """
         if qNear is None:
             return
@@ -274,7 +274,7 @@ class RobotBuiltins(BuiltinGroup):
 
 
 def _script_number(value: Any) -> Value:
-    """Return a number of RTDE as a value of a program."""
+    """Return a number of RTDE as a value of a program; a large integer becomes a float."""
     if isinstance(value, bool | float):
         return value
     return int(value) if INT_MIN <= value <= INT_MAX else float(value)

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Remote procedure calls of programs, as XML-RPC over the sockets of programs.
+Remote procedure calls of programs: XML-RPC over the sockets that programs use.
 
 A pose is sent as a struct with the members x, y, z, rx, ry and rz, as the manufacturer's example
 servers expect. Each call opens its own connection; the program waits for the answer without a time
@@ -40,7 +40,7 @@ MAX_PART = 16_384
 
 
 class RpcBuiltins(BuiltinGroup):
-    """The factory of remote objects, whose methods a program calls."""
+    """The function that makes remote objects, whose methods a program can call."""
 
     def rpc_factory(self, type: Value, url: Value) -> RemoteObject:
         """Return an object whose methods call a server; nothing is sent before the first call."""
@@ -85,7 +85,7 @@ class RemoteProcedures(RemoteObject):
         return _from_wire(found[0]) if found else None
 
     def _post(self, method: str, body: bytes) -> Generator[None, None, bytes]:
-        """Send a request; return the body of the answer."""
+        """Send a request over a new connection; return the body of the answer."""
         sockets, controller = self._controller.sockets, self._controller
         self._calls += 1
         name = f'\0{id(self)} {self._calls}'  # cannot clash with a program's sockets
@@ -123,7 +123,12 @@ class RemoteProcedures(RemoteObject):
             sockets.close(name)
 
     def _body(self, method: str, received: bytes, closed: bool) -> bytes | None:
-        """Return the body of an HTTP answer; None = the answer has not fully arrived."""
+        """
+        Return the body of an HTTP answer; None = the answer has not fully arrived.
+
+        :param closed: whether the server has closed the connection.
+        :raises RuntimeException: the answer is too long, or reports an error.
+        """
         head, separator, body = received.partition(b'\r\n\r\n')
         if len(received) > MAX_ANSWER:
             raise self._failure(method, 'the answer is longer than 1 MiB')

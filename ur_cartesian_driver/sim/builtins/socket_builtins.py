@@ -76,7 +76,12 @@ class SocketBuiltins(BuiltinGroup):
     def _wait(
         self, name: Value, timeout: Value, take: Callable[[bytearray], T | None]
     ) -> Generator[None, None, T | None]:
-        """Return the result of `take` on the received bytes; None = timeout, or socket closed."""
+        """
+        Wait until `take` finds a value in the received bytes, and return the value.
+
+        :param take: returns the value and deletes its bytes; None = it has not fully arrived.
+        :returns: None = timeout, or the socket is closed.
+        """
         limit = number(timeout, 'timeout')
         deadline = self._now + limit if limit > 0.0 else float('inf')
         name_ = text(name, 'socket_name')
@@ -91,7 +96,7 @@ class SocketBuiltins(BuiltinGroup):
             yield
 
     def _count_read(self, name: str) -> bool:
-        """Count a read of any thread; return whether it has to wait for the next cycle."""
+        """Count a read of a socket; return whether the read has to wait for the next cycle."""
         now = self._controller.cycles
         cycle, reads = max(self._reads.get(name, (now, 0)), (now, 0))
         cycle, reads = (cycle, reads + 1) if reads < READS_PER_CYCLE else (cycle + 1, 1)
@@ -138,7 +143,7 @@ class SocketBuiltins(BuiltinGroup):
         interpret_escape: Value = False,
         timeout: Value = 2,
     ) -> Generator[None, None, str]:
-        """Return all received text, or the part between prefix and suffix; on failure ''."""
+        """Return all received text, or the part between prefix and suffix; on failure, ''."""
         before, after = (_bytes(prefix, interpret_escape), _bytes(suffix, interpret_escape))
         data = yield from self._wait(socket_name, timeout, _between(before, after))
         return '' if data is None else data.decode('latin-1')
@@ -146,7 +151,7 @@ class SocketBuiltins(BuiltinGroup):
     def socket_read_line(
         self, socket_name: Value = 'socket_0', timeout: Value = 2
     ) -> Generator[None, None, str]:
-        """Return one line without its line end; on failure ''."""
+        """Return one line without its line end; on failure, an empty string."""
         data = yield from self._wait(socket_name, timeout, _through(b'\n'))
         return '' if data is None else data.decode('latin-1').rstrip('\r\n')
 
@@ -168,19 +173,19 @@ class SocketBuiltins(BuiltinGroup):
         self._send(line.encode('latin-1', 'replace'), socket_name)
 
     def socket_send_int(self, value: Value, socket_name: Value = 'socket_0') -> bool:
-        """Send a 32 bit integer in network order."""
+        """Send a 32 bit integer in network order; return whether the socket accepts it."""
         return self._send(struct.pack('>i', int32(value, 'value')), socket_name)
 
     def socket_send_byte(self, value: Value, socket_name: Value = 'socket_0') -> bool:
-        """Send the lowest 8 bits of a value as one byte."""
+        """Send the lowest 8 bits of a value as a byte; return whether the socket accepts it."""
         return self._send(bytes([whole(value, 'value') & 0xFF]), socket_name)
 
     def socket_send_string(self, str: Value, socket_name: Value = 'socket_0') -> bool:
-        """Send a value as text."""
+        """Send a value as text; return whether the socket accepts it."""
         return self._send(to_text(str).encode('latin-1', 'replace'), socket_name)
 
     def socket_send_line(self, str: Value, socket_name: Value = 'socket_0') -> bool:
-        """Send a value as text, followed by a line end."""
+        """Send a value as text with a line end; return whether the socket accepts it."""
         return self._send((to_text(str) + '\n').encode('latin-1', 'replace'), socket_name)
 
     def _send(self, data: bytes, socket_name: Value) -> bool:

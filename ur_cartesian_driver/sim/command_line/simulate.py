@@ -37,7 +37,7 @@ _MODEL = 'ur5e'
 
 
 def simulate(arguments: argparse.Namespace) -> int:
-    """Run a simulated controller until it is interrupted."""
+    """Run the simulated controller that the options describe, until it is interrupted."""
     config = simulator_config(arguments)
     try:
         robot = SimulatedRobot(config)
@@ -63,7 +63,8 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
     programs, loaded = {}, ''
     if arguments.programs:
         found = [file for file in arguments.programs.iterdir() if file.suffix in _READERS]
-        # PolyScope writes a .script beside each .urp; the .urp comes later and replaces it.
+        # PolyScope writes a .script beside each .urp. Both get the name of the .urp, which comes
+        # later in the order of suffixes and so replaces the .script.
         programs = dict(map(_read_if_possible, sorted(found, key=lambda file: file.suffix)))
     if arguments.program and _is_built_in(arguments.program):
         loaded = str(arguments.program)
@@ -89,7 +90,7 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
 
 
 def _is_built_in(file: Path) -> bool:
-    """Return whether a name means a built-in program; an existing file takes precedence."""
+    """Return whether a name is a built-in program's; an existing file takes precedence."""
     return str(file) in BUILT_IN_PROGRAMS and not file.exists()
 
 
@@ -124,7 +125,7 @@ def _read_urp(file: Path) -> tuple[str, SavedProgram]:
 
 
 def _read_urpx(file: Path) -> tuple[str, str]:
-    """Return the name in a file of PolyScope X, with the suffix, and the URScript."""
+    """Return the program's name (with the suffix) and URScript from a file of PolyScope X."""
     try:
         name, content = read_urpx(file.read_bytes())
     except (ValueError, RecursionError) as error:
@@ -141,14 +142,14 @@ _READERS: Mapping[str, Callable[[Path], tuple[str, SavedProgram]]] = {
 
 
 def imperfections(arguments: argparse.Namespace, model: RobotModel) -> Imperfections | None:
-    """Return the imperfections of the robot from the arguments; None = a perfect robot."""
+    """Return the imperfections that the arguments demand; None = a perfect robot."""
     if arguments.imperfect is None:
         return None
     return typical_imperfections(model, arguments.imperfect)
 
 
 def calibration(arguments: argparse.Namespace, model: RobotModel) -> DhTable | None:
-    """Return the calibrated DH table from the arguments; None = the nominal table."""
+    """Return the DH table of the calibration that the arguments name; None = the nominal one."""
     if arguments.calibration is not None:
         return read_calibration(Path(arguments.calibration), model)
     if arguments.calibration_seed is not None:

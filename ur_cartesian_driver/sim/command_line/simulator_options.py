@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The options of the simulated controller; other commands have some of them too."""
+"""The options of the simulated controller; some of them belong to other commands, too."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def add_simulator_options(command: argparse.ArgumentParser) -> None:
     """Add all options of the simulator."""
     take_negative_numbers(command)
     add_model(command, '--model')
-    command.set_defaults(model='')  # the twin's model, else ur5e
+    command.set_defaults(model='')  # empty = the twin's model, or ur5e without a twin
     _add_network(command)
     _add_arm(command)
     _add_surroundings(command)
@@ -145,7 +145,7 @@ def _add_start(command: argparse.ArgumentParser) -> None:
 
 
 def take_negative_numbers(command: argparse.ArgumentParser) -> None:
-    """Accept values such as -1.5,2 that begin with a minus; argparse has no public option."""
+    """Accept values such as -1.5,2; argparse has no public option for a leading minus."""
     command._negative_number_matcher = _NUMBERS
 
 
@@ -155,7 +155,7 @@ def add_model(command: argparse.ArgumentParser, name: str = '--ur-type') -> None
 
 
 def add_ports(command: argparse.ArgumentParser, text: str, **ports: int | None) -> None:
-    """Add an option for each port."""
+    """Add the options --NAME-port for ports, given as name = default."""
     for name, port in ports.items():
         command.add_argument(
             f'--{name.replace("_", "-")}-port', type=port_number, default=port, help=text
@@ -188,7 +188,7 @@ def fields_from(arguments: argparse.Namespace, kind: type[Any]) -> dict[str, Any
 
 
 def fault(text: str) -> Fault:
-    """Return the fault of the simulator that a text describes, with its trigger."""
+    """Return the fault that a text describes, with its trigger."""
     return parsed(parse_fault, text)
 
 
@@ -230,7 +230,11 @@ def six_numbers(text: str, *bounds: tuple[float, str]) -> tuple[float, ...]:
 
 
 def check_magnitude(number: float, bound: float, unit: str) -> None:
-    """Refuse a number that is not within minus and plus a bound in the same unit."""
+    """
+    Refuse a number whose magnitude is larger than ``bound``.
+
+    :param unit: the unit of both, for the error.
+    """
     if not abs(number) <= bound:  # refuses NaN, too
         hint = '; give radians, not degrees' if unit == 'rad' else ''
         raise argparse.ArgumentTypeError(

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Read faults from text, for the command line and the markers of tests.
+Reads faults from text, for the command line and for tests.
 
 ::
 
@@ -70,7 +70,11 @@ class _WordReader:
         return True
 
     def wrong(self, expected: str, word: str | None = None) -> ValueError:
-        """Return the error for the next word, or for a word that was taken already."""
+        """
+        Return the error for a word.
+
+        :param word: a word that was taken already; None = the next word.
+        """
         word = self.peek() if word is None else word
         return ValueError(
             f'The fault {self._text!r} is not understood at {word!r}; expected {expected}.'
@@ -134,7 +138,8 @@ _DEVIATION: dict[str, Reader] = {
     'amount': _number('an amount'),
 }
 
-#: First word of a fault -> class of the fault, and the readers of the fields in later words.
+#: First word of a fault -> class of the fault, and field -> function that reads it from the
+#: following words.
 _KINDS: Mapping[str, tuple[type[Fault], Mapping[str, Reader]]] = {
     **{event.value: (EventFault, {'action': _constant(event)}) for event in FaultEvent},
     'slider': (

@@ -30,21 +30,21 @@ GARBAGE_SIZE = 64
 
 @dataclass(frozen=True, slots=True)
 class AfterTime:
-    """A time [s] has passed on the controller's clock since the fault was set."""
+    """Trigger: a time [s] has passed on the controller's clock since the fault was set."""
 
     seconds: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class AfterDistance:
-    """The TCP has travelled a distance [m] since the fault was set."""
+    """Trigger: the TCP has travelled a distance [m] since the fault was set."""
 
     metres: float
 
 
 @dataclass(frozen=True, slots=True)
 class PlaneCrossing:
-    """The TCP crosses the plane ``axis = position`` [m], in coordinates of the base."""
+    """Trigger: the TCP crosses the plane ``axis = position`` [m] of the base frame."""
 
     axis: Literal['x', 'y', 'z']
     position: float
@@ -98,7 +98,7 @@ class FaultEvent(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EventFault(Fault):
-    """An event of safety, power or program that the client did not request."""
+    """An event of safety, power or program that the client under test did not request."""
 
     action: FaultEvent
 
@@ -120,7 +120,7 @@ class ForeignMotionFault(Fault):
     """Another client's program replaces the running one and moves the arm away."""
 
     axis: DeviationAxis
-    #: Distance from the present pose of the tool, in base axes [m or rad].
+    #: Displacement from the present target pose along or about the base axis [m or rad].
     distance: float
 
     def script(self) -> str:
@@ -133,7 +133,7 @@ class ForeignMotionFault(Fault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeviationFault(Fault):
-    """An actual value deviates from its target on one axis of the base."""
+    """A measured quantity of the TCP deviates from its target on one axis of the base."""
 
     quantity: DeviationQuantity
     axis: DeviationAxis
@@ -146,7 +146,7 @@ class DeviationFault(Fault):
     seed: int = 0
 
     def value(self, elapsed: float, random: Random) -> float:
-        """Return the deviation ``elapsed`` seconds after its beginning."""
+        """Return the deviation ``elapsed`` seconds after the start of the fault."""
         if self.shape == 'noise':
             return random.gauss(0.0, self.amount)
         return self.amount * elapsed if self.shape == 'ramp' else self.amount
@@ -161,7 +161,7 @@ class DropFault(LastingInterfaceFault):
 
 
 class HalfOpenFault(InterfaceFault):
-    """The present connections stay open but carry no data, as after a cut; new ones work."""
+    """The present connections stay open but carry no data; new connections work."""
 
 
 class SilenceFault(LastingInterfaceFault):

@@ -1,13 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The sockets that programs open, with connection faults between socket and program."""
+"""The sockets that programs open, with connection faults between the sockets and the programs."""
 
 from __future__ import annotations
 
 from ur_cartesian_driver.sim.faults.impairment import ImpairedConnection, Impairment
 from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets, SocketState
 
-#: Bound on received bytes that are held back here; further ones wait in the kernel or at the peer.
+#: While this many received bytes are held back, no more are read; they wait in the kernel.
 _MAX_INCOMING = 65_536
 
 
@@ -29,7 +29,7 @@ class ImpairedSockets:
         self._arrived: dict[str, bytearray] = {}
 
     def open(self, name: str, address: str, port: int) -> None:
-        """Begin to connect, unless a fault prevents it."""
+        """Begin to connect, unless a fault refuses connections."""
         self.close(name)
         if self._impairment is not None and self._impairment.refuses_connections:
             return
@@ -39,7 +39,7 @@ class ImpairedSockets:
         self._sockets.open(name, address, port)
 
     def state(self, name: str) -> SocketState:
-        """Return the state of a socket; it stays open until the delayed bytes have arrived."""
+        """Return the state; a socket that its peer closed is OPEN while bytes are held back."""
         state = self._sockets.state(name)
         impaired = self._impaired.get(name)
         if impaired is None or state is not SocketState.CLOSED or name not in self._names:
@@ -105,7 +105,7 @@ class ImpairedSockets:
             self._impair_socket(name).freeze()
 
     def inject(self, data: bytes) -> None:
-        """Send bytes that no program has sent."""
+        """Send bytes that no program has sent, to the peers of all sockets."""
         for name in self._names:
             self.send(name, data)
 

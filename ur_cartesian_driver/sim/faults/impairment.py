@@ -1,11 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Impaired connections, without sockets or a clock: which bytes are held back, and until when.
+Holds back the bytes of connections that faults impair; it has no sockets and no clock.
 
-The server of an impaired connection hands over the bytes of both directions, and asks once per
-cycle for the bytes that are due. Sound connections are not handled here. Times are on the
-controller's clock, so results are deterministic on the virtual clock.
+The code that owns a connection (`tcp_server`, `impaired_sockets`) hands the bytes of both
+directions to an :class:`ImpairedConnection`, and asks once per cycle for the bytes that are due.
+Connections without a fault do not pass through this module. Times are on the controller's clock,
+so results are deterministic on the virtual clock.
 """
 
 from __future__ import annotations
@@ -67,13 +68,13 @@ class DelayLine:
             self.size += len(data)
 
     def clear(self) -> None:
-        """Lose the bytes that are held back."""
+        """Discard the bytes that are held back."""
         self._pieces.clear()
         self.size = 0
 
     def take(self, now: float, rate: float = inf) -> bytes:
         """
-        Return the bytes that have become due since the last call.
+        Return and forget the bytes that are due, as far as the rate allows.
 
         :param rate: bound on the returned bytes per second; a piece can be returned in parts.
         """
@@ -88,19 +89,19 @@ class DelayLine:
             self._budget -= len(part)
             arrived += part
         if not self._pieces or self._budget == inf:
-            self._budget = 0.0  # an unused budget is not saved
+            self._budget = 0.0  # an idle line saves nothing for a later burst
         self.size -= len(arrived)
         return bytes(arrived)
 
 
 class ImpairedConnection:
-    """One connection that is impaired, or still holds bytes back."""
+    """The bytes of a connection that is impaired, or was impaired and still holds bytes back."""
 
     def __init__(self, impairment: Impairment | None, now: float) -> None:
         """Begin with nothing held back."""
         self.impairment = impairment
         self.frozen = False
-        #: The delay line of the client's bytes; the delay line of the robot's bytes.
+        #: Bytes from the peer to the robot; bytes from the robot to the peer.
         self.incoming, self.outgoing = DelayLine(now), DelayLine(now)
 
     @property
@@ -114,7 +115,7 @@ class ImpairedConnection:
         return not (self.frozen or self.incoming.size or self.outgoing.size)
 
     def freeze(self) -> None:
-        """Carry no more data, and lose the bytes that are held back."""
+        """Carry no more data, and discard the bytes that are held back."""
         self.frozen = True
         self.incoming.clear()
         self.outgoing.clear()
@@ -126,7 +127,7 @@ class ImpairedConnection:
             self.outgoing.put(data, now + self._delay)
 
     def queue_incoming(self, data: bytes, now: float) -> None:
-        """Queue bytes that the client has sent."""
+        """Queue bytes that the peer has sent."""
         if not self.frozen:
             self.incoming.put(data, now + self._delay)
 
@@ -143,5 +144,5 @@ class ImpairedConnection:
         return 0.0 if self.impairment is None else self.impairment.delay
 
     def _release_terms(self, now: float) -> tuple[float, float]:
-        """Return the time up to which bytes are due, and their rate; both inf if unimpaired."""
+        """Return the time up to which bytes are due, and their largest rate [bytes/s]."""
         return (inf, inf) if self.impairment is None else (now, self.impairment.rate)

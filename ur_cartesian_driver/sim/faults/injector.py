@@ -4,7 +4,7 @@
 Injects faults into the simulated robot when they are triggered.
 
 :class:`FaultInjector` uses the controller's clock, so it is as deterministic as the controller.
-While no fault is set, the injector costs no time.
+While no fault is set, the controller does not call the injector.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 _log = logging.getLogger(__name__)
 
-# Tolerance [s, m], because cycles are summed in floats.
+# Tolerance [s, m] for triggers and durations, because times and travel are sums of floats.
 _ROUNDING = 1e-9
 
 
@@ -71,7 +71,7 @@ _ACTIONS: Mapping[FaultEvent, Callable[[Controller], object]] = {
 
 @dataclass(slots=True)
 class _PendingFault:
-    """A pending fault, with the time and the travel of the TCP when it was set."""
+    """A pending fault, with the time [s] and the travel of the TCP [m] when the fault was set."""
 
     fault: Fault
     set_at: float
@@ -82,7 +82,7 @@ class _PendingFault:
 
 @dataclass(slots=True)
 class _ActiveFault:
-    """A lasting fault that has begun, the time of its start, and the source of its noise."""
+    """A lasting fault, the time of its start [s], and the random numbers of its noise."""
 
     fault: TimedFault
     since: float
@@ -133,7 +133,7 @@ class FaultInjector:
         """
         Forget pending faults, and end lasting faults.
 
-        Effects that have happened remain: a stop, a dropped or half-open connection.
+        Effects that have happened remain, such as a stop, or a dropped or half-open connection.
         """
         self._pending.clear()
         self._active.clear()
@@ -226,7 +226,7 @@ class FaultInjector:
         )
 
     def _impairments(self) -> dict[str, Impairment]:
-        """Return the impairment of each interface, combined from all its faults."""
+        """Return the impairment of each interface that has connection faults, all combined."""
         found: dict[str, Impairment] = {}
         for running in self._active:
             fault = running.fault

@@ -68,8 +68,8 @@ class DashboardHandlers:
     """
     The effects of the commands on a controller and its pendant.
 
-    A method that carries out a command returns None for success, otherwise the reply. A method
-    that has to wait for the robot is a generator, which returns the same.
+    A method that carries out a command returns None for success, otherwise the reply. If the
+    command has to wait for the robot, the method is a generator whose result is this value.
     """
 
     def __init__(self, controller: Controller) -> None:
@@ -128,7 +128,7 @@ class DashboardHandlers:
         return None if known else f'File not found: {name}'
 
     def unlock(self, _: str) -> str | None:
-        """Unlock a protective stop, if it has lasted long enough."""
+        """Unlock a protective stop that has lasted for the unlock delay."""
         refusal = self.controller.safety_event(SafetyEvent.UNLOCK)
         if 'cannot be unlocked' in refusal:
             return (
@@ -138,7 +138,7 @@ class DashboardHandlers:
         return None
 
     def restart_safety(self, _: str) -> None:
-        """Clear a fault or violation, and leave the arm without power."""
+        """Clear a fault or violation; without one, only cut the power of the arm."""
         if self.controller.safety_event(SafetyEvent.RESTART):
             self.controller.power_off()
 
@@ -189,7 +189,7 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = {
 #: Commands that are answered when the program has left a state: the manufacturer's page for CB3
 #: says that they return when stopping or pausing is completed; assumed for e-Series.
 _AWAITED = {'stop': RuntimeState.STOPPING, 'pause': RuntimeState.PAUSING}
-#: Handlers of commands that need more than a call of the controller; all others only reply.
+#: Handlers of commands that need more than a call of the controller.
 _HANDLERS: Mapping[
     str, Callable[[DashboardHandlers, str], str | Generator[None, None, str | None] | None]
 ] = {
@@ -229,21 +229,21 @@ _VALUES: Mapping[str, str] = {
 
 
 class DashboardSession(ClientSession):
-    """Answers commands in order; some answers wait until the robot has carried them out."""
+    """Answers commands in order; some are answered only when the robot has carried them out."""
 
     def __init__(self, controller: Controller) -> None:
-        """Note whether the client may control the robot, as decided when it connects."""
+        """Note whether the client may control the robot; this is decided when it connects."""
         self._controller = controller
         self._may_control = controller.takes_scripts
         self._handlers = DashboardHandlers(controller)
         self._server = DashboardServerCodec(controller.config.version[:2])
         self._requests: deque[DashboardRequest | str] = deque()
-        #: The generator of the answer to the first request; None = not begun.
+        #: The generator of the answer to the first request; None = the request has not begun.
         self._answering: Generator[None, None, bytes] | None = None
 
     @property
     def is_busy(self) -> bool:
-        """Whether commands wait; published programs send two, and hang up at once."""
+        """Whether commands wait; published programs send two and hang up before the answers."""
         return bool(self._requests)
 
     def open(self) -> bytes:

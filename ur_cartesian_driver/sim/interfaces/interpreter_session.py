@@ -14,7 +14,7 @@ _MAX_LINE_LENGTH = 1024 * 1024
 
 
 class InterpreterSession(ClientSession):
-    """Hands statements over to interpreter mode, which can answer later."""
+    """Hands statements over to interpreter mode, which answers each at once or later."""
 
     def __init__(self, controller: Controller) -> None:
         """Wait for statements."""

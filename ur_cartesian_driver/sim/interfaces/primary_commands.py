@@ -21,7 +21,7 @@ from ur_cartesian_driver.sim.programs.script_upload import (
 #: Error code of a script port that is read-only.
 READ_ONLY = 210
 
-#: In published programs the number follows without a blank.
+#: The number follows; in published programs, without a blank before it.
 _SET_SPEED = 'set speed'
 _CONTROL: Mapping[str, Callable[[Controller], object]] = {
     'power on': Controller.power_on,
@@ -41,7 +41,7 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = {
 
 def execute_command(controller: Controller, item: UploadedItem, *, may_send: bool) -> None:
     """
-    Execute an item that a client has sent; answers go to all clients.
+    Execute a program, line or command that a client has sent; answers go to all clients.
 
     :param may_send: False = the connection of the client is read-only.
     """

@@ -5,8 +5,8 @@ One client of an interface that accepts scripts: primary, secondary or real-time
 
 All three interfaces accept programs and commands, but send different data; apart from the
 greeting, the data goes to all clients. In local control, input is refused; a client that connected
-in local control is always refused. Each interface has a read-only twin, which sends the same data
-and ignores all input.
+in local control is refused even afterwards. Each interface has a read-only twin: a second port
+that sends the same data and ignores all input.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ur_cartesian_driver.sim.programs.script_upload import UploadDecoder
 
 
 class ScriptSession(ClientSession):
-    """Executes programs and commands; a stream, not the session, sends the states."""
+    """Executes programs and commands; `primary_stream` and `realtime_stream` make the states."""
 
     def __init__(self, controller: Controller) -> None:
         """Wait for programs."""
@@ -44,7 +44,7 @@ class PrimarySession(ScriptSession):
 
 
 class ReadOnlySession(ClientSession):
-    """A client of a read-only twin."""
+    """A client of the read-only twin of an interface."""
 
     def __init__(self, greeting: bytes) -> None:
         """

@@ -58,7 +58,8 @@ TOOL_OUTPUTS: Mapping[str, str] = {
 STATE_RATE = 10.0
 #: Reported limit of the joint accelerations [rad/s^2], as recorded on a UR5e.
 _JOINT_ACCELERATION = 40.0
-#: Type of the robot -> type of its controller box; unknown for other robots, which report 4.
+#: Type of the robot -> type of its controller box. The boxes of other robots are unknown; the
+#: simulator reports 4 for them.
 _CONTROLLER_BOXES = {1: 4, 2: 5, 3: 6, 4: 16, 7: 10, 8: 11}
 _EMERGENCY = frozenset({SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP})
 #: Position limit [rad] that is sent for an endless joint, instead of infinity.
@@ -142,7 +143,7 @@ def _mode(controller: Controller) -> RobotModeData:
 
 
 def _outputs(controller: Controller, names: Mapping[str, str]) -> dict[str, Any]:
-    """Return fields with the values of RTDE outputs, so that both interfaces agree."""
+    """Return fields with the values of RTDE outputs, so that the interface agrees with RTDE."""
     return {
         field: COMPUTED[name](controller) if name in COMPUTED else FIXED[name]
         for field, name in names.items()

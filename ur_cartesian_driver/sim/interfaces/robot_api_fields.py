@@ -24,17 +24,18 @@ class Refused(Exception):
     """Raised for a request that is not carried out."""
 
     def __init__(self, status: HTTPStatus, message: str, **fields: Any) -> None:
-        """Take the status and the fields of the answer."""
+        """Take the HTTP status and the fields of the answer."""
         super().__init__(message)
         self.status, self.fields = status, {'message': message, **fields}
 
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A request that is answered when the robot has carried it out, or has failed."""
+    """A request that is answered later: when the robot has carried it out, or cannot do so."""
 
-    #: Raises `Refused` if the request has failed.
+    #: Returns whether the request is carried out; raises `Refused` if it has failed.
     is_done: Callable[[Controller], bool]
+    #: The message of the answer to a request that was carried out.
     message: str
 
 

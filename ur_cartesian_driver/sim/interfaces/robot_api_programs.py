@@ -32,7 +32,11 @@ def list_programs(controller: Controller, _: Body) -> Fields:
 
 
 def download_program(controller: Controller, body: Body) -> Fields:
-    """Return the content of a program's file."""
+    """
+    Return the content of a program's file.
+
+    :raises Refused: there is no such program, or its file cannot be read.
+    """
     name = text_field(body, 'name')
     files = controller.stored_programs
     if name not in files.names():
@@ -44,7 +48,12 @@ def download_program(controller: Controller, body: Body) -> Fields:
 
 
 def upload_program(controller: Controller, body: Body) -> Fields:
-    """Add the program in a form's file."""
+    """
+    Add the program in the file of a form.
+
+    :raises ValueError: the form has no program file.
+    :raises Refused: a program has this name already.
+    """
     name, content = read_urpx(_file(body))
     if name in controller.stored_programs.names():
         raise Refused(
@@ -55,7 +64,12 @@ def upload_program(controller: Controller, body: Body) -> Fields:
 
 
 def update_program(controller: Controller, body: Body) -> Fields:
-    """Replace a program by the one in a form's file."""
+    """
+    Replace a program by the one of the same name in the file of a form.
+
+    :raises ValueError: the form has no program file.
+    :raises Refused: there is no such program, or it is loaded.
+    """
     name, content = read_urpx(_file(body))
     if name not in controller.stored_programs.names():
         raise Refused(HTTPStatus.NOT_FOUND, 'Program not found', details=name)
@@ -66,7 +80,7 @@ def update_program(controller: Controller, body: Body) -> Fields:
 
 
 def load_program(field: str) -> Callable[[Controller, Body], Waiting]:
-    """Return the handler that loads the program whose name is in a field."""
+    """Return a request handler; it loads the program whose name is in ``field`` of the request."""
 
     def load(controller: Controller, body: Body) -> Waiting:
         name = text_field(body, field)

@@ -106,7 +106,7 @@ def _play(controller: Controller, state: RuntimeState) -> None:
 
 def _has_started(controller: Controller) -> bool:
     """
-    Return whether the program has started; a short one may have ended since.
+    Return whether the program has started; a short program may have ended since then.
 
     :raises Refused: the program will not start.
     """
@@ -247,13 +247,14 @@ _ROUTES: Mapping[tuple[str, str], tuple[tuple[int, int], Handler]] = {
 
 
 class RobotApiSession(ClientSession):
-    """Answers one request after the other, and each action when it is done."""
+    """Answers one request after the other; an action is answered when it is done."""
 
     def __init__(self, controller: Controller) -> None:
         """Wait for requests."""
         self._controller = controller
         self._buffer = bytearray()
-        #: Size of the request whose head has arrived, so that a long body is not copied each time.
+        #: Size of a request whose head has arrived but not its body [bytes]; 0 = unknown. Until
+        #: the body has arrived, the buffer is not copied and parsed again.
         self._request_size = 0
         self._waiting: Waiting | None = None
         self._waits_until = 0.0
@@ -287,7 +288,7 @@ class RobotApiSession(ClientSession):
                 raise HangUp(answers)
 
     def _due_answer(self, waiting: Waiting) -> bytes:
-        """Return the answer to an action; empty while the robot carries the action out."""
+        """Return the answer to an action; empty while the action is neither done nor timed out."""
         try:
             if waiting.is_done(self._controller):
                 return _response(HTTPStatus.OK, {'message': waiting.message})

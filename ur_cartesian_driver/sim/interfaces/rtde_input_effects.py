@@ -3,8 +3,9 @@
 """
 The effects of writing RTDE inputs.
 
-The inputs that set the controller's outputs or slider come with a mask of the channels to set. A
-package is applied as a whole, so the order of masks and values in the recipe does not matter.
+The inputs that set the controller's outputs or its slider are accompanied by inputs with the masks
+of the channels to set. A package is applied as a whole, so the order of masks and values in the
+recipe does not matter.
 """
 
 from __future__ import annotations

@@ -47,14 +47,14 @@ class _OutputSchedule:
 
 
 class _PacketGaps:
-    """Leaves out packets, as a busy controller does."""
+    """Chooses packets to leave out at random, as a busy controller leaves some out."""
 
     def __init__(self, imperfections: Imperfections) -> None:
         self._imperfections, self._random = imperfections, Random(imperfections.seed)
         self._left_out = 0
 
     def leaves_out(self) -> bool:
-        """Return whether to leave out the packets of this cycle."""
+        """Return whether to leave out the packet of this cycle; call this once per cycle."""
         if self._left_out > 0:
             self._left_out -= 1
             return True
@@ -90,7 +90,7 @@ class RtdeSession(ClientSession):
         self._schedule: _OutputSchedule | None = None
 
     def feed(self, data: bytes) -> bytes:
-        """Answer requests and apply inputs."""
+        """Apply the inputs in the bytes, and return the answers to the requests."""
         for event in self._server.feed(data):
             if isinstance(event, InputReceived):
                 apply_inputs(self._controller, event.recipe.named(event.values))

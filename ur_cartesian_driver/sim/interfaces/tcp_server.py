@@ -23,7 +23,8 @@ _log = logging.getLogger(__name__)
 
 #: Largest number of bytes that a client can leave unread, not counting bytes in the kernel.
 MAX_UNREAD_BYTES = 1_000_000
-#: A client with more unread bytes gets no states but is kept: many clients only send scripts.
+#: A client with more unread bytes gets no states but is kept, because many clients only send
+#: scripts and never read.
 MAX_UNREAD_BYTES_FOR_STATE = 16_384
 
 
@@ -96,13 +97,13 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
             self._transport_reading(self._impaired.incoming.size < MAX_UNREAD_BYTES)
 
     def eof_received(self) -> bool:
-        """Stay open for the bytes that a fault holds back, as a slow network does."""
+        """Return True, which keeps the transport open, while a fault holds bytes back."""
         self._has_ended = True
         held = self._impaired
         return held is not None and bool(held.incoming.size or held.outgoing.size)
 
     def poll(self) -> None:
-        """Make the session answer requests that it could not answer at once."""
+        """Send the answers to requests that the session could not answer at once."""
         self._handle_incoming(b'')
         if self._transport is None:
             self._leave_if_done()
@@ -176,7 +177,7 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
         return self._impaired
 
     def pump(self, now: float) -> bool:
-        """Pass on the bytes that are due; return whether the connection is still impaired."""
+        """Pass on the bytes that are due; return whether to call again in the next cycle."""
         impaired = self._impaired
         if impaired is None:
             return False
@@ -271,7 +272,7 @@ class TcpServer(Generic[S]):
             connection.write(data)
 
     def broadcast_state(self, data: bytes) -> None:
-        """Send a state to all clients that read."""
+        """Send a state to all clients that do not leave too many bytes unread."""
         for connection in tuple(self.connections):
             connection.write_state(data)
 

@@ -4,11 +4,11 @@
 The motion that the robot measures.
 
 The simulated arm follows its targets exactly, so actual values equal the targets, unless the arm
-is compliant or configured as imperfect, or a fault makes them deviate. A deviation of the pose
-changes the joint positions accordingly, but not the twist, as with a faulty measurement. A
-deviation of the twist changes the joint speeds, but not the pose. A deviation of the acceleration
-also makes twist and joint speeds drift, by its integral, because many clients differentiate speeds
-instead of reading the accelerometer.
+is compliant or configured as imperfect, or a fault makes the actual values deviate. A deviation of
+the pose changes the joint positions accordingly, but not the twist, as with a faulty measurement.
+A deviation of the twist changes the joint speeds, but not the pose. A deviation of the
+acceleration also makes twist and joint speeds drift, by its integral, because many clients
+differentiate speeds instead of reading the accelerometer.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ur_cartesian_driver.sim.motion import MotionGenerator
 from ur_cartesian_driver.sim.motion.contact.contact_motion import ContactMotion
 from ur_cartesian_driver.sim.motion.imperfect_arm import ImperfectArm, Imperfections, Motion
 
-# A solution this far [rad] from the undisturbed joints is treated as another branch.
+# A solution farther than this [rad] from the undisturbed joints is treated as another branch.
 _BRANCH_JUMP = 0.5
 
 
@@ -42,7 +42,7 @@ class ActualMotion:
         Follow the targets of this motion.
 
         :param imperfections: the imperfections of the arm; None = a perfect arm.
-        :param contact: the compliance of the arm.
+        :param contact: computes how far the tool deviates in contact and in force mode.
         """
         self._motion, self._contact = motion, contact
         self.imperfect_arm = ImperfectArm(motion, imperfections) if imperfections else None
@@ -52,9 +52,10 @@ class ActualMotion:
         self._twist_fault: Vector6 | None = None
         #: Deviation of the measured acceleration of the TCP [m/s^2, rad/s^2].
         self.acceleration_error: Vector6 = ZERO6
-        #: The integral of the deviation of the acceleration.
+        #: The integral of ``acceleration_error`` [m/s, rad/s].
         self._drift: Vector6 = ZERO6
-        #: The joints of the last deviated pose, and what they were solved for.
+        #: The last solution of inverse kinematics: its inputs (undisturbed joints, deviation, TCP)
+        #: and the joints at the deviated pose.
         self._solved: tuple[tuple[Vector6, Vector6, Pose], Vector6] | None = None
 
     def step(self) -> None:
@@ -65,7 +66,7 @@ class ActualMotion:
     def deviate(
         self, pose: Vector6 | None, twist: Vector6 | None, acceleration: Vector6 | None
     ) -> None:
-        """Set the deviations of this cycle, in base axes; None = no deviation."""
+        """Set the deviations by faults in this cycle, in base axes; None = no deviation."""
         self._pose_fault = pose
         self.acceleration_error = acceleration or ZERO6
         if acceleration is None:
@@ -76,12 +77,12 @@ class ActualMotion:
 
     @property
     def _pose(self) -> Vector6 | None:
-        """Deviation of the pose."""
+        """Deviation of the pose by a fault and compliance, in base axes [m, rad]; None = none."""
         return _sum(self._pose_fault, self._contact.deviation)
 
     @property
     def _twist(self) -> Vector6 | None:
-        """Deviation of the twist."""
+        """Deviation of the twist by a fault and compliance, in base axes; None = none."""
         return _sum(self._twist_fault, self._contact.twist)
 
     @property

@@ -56,7 +56,7 @@ class ArmTarget:
 
     @property
     def T_flange_tcp(self) -> Pose:
-        """The TCP; motions that began before it was set keep the previous TCP."""
+        """The TCP; a motion that began before the TCP was set keeps the previous one."""
         return self._T_flange_tcp
 
     @T_flange_tcp.setter
@@ -65,13 +65,13 @@ class ArmTarget:
         self.T_base_tcp = self.forward(self.q)
 
     def activate_tcp(self) -> None:
-        """Use the latest TCP for the motion that begins now."""
+        """Use the present ``T_flange_tcp`` for the motion that begins now."""
         self.T_tcp_flange = self._T_flange_tcp.inverse()
         self._active_tcp = self._T_flange_tcp
 
     @property
     def tcp_is_active(self) -> bool:
-        """Whether the running motion uses the latest TCP."""
+        """Whether the running motion uses the present ``T_flange_tcp``."""
         return self._active_tcp is self._T_flange_tcp
 
     @property
@@ -84,12 +84,12 @@ class ArmTarget:
         return self.arm.forward(q) @ self._T_flange_tcp
 
     def ik_branch(self) -> IkBranchTracker:
-        """Return the tracker of the IK branch on which the arm is."""
+        """Return a tracker that starts from the present joints and their IK branch."""
         return IkBranchTracker(self.kinematics, self.q, self.T_base_tcp, self.T_tcp_flange)
 
     def move_to(self, q: Vector6, pose: Pose, rates: TargetRates | None = None) -> None:
         """
-        Move the target to joint positions and their pose in this cycle.
+        Move the target to joint positions and to the TCP pose at them, in this cycle.
 
         :param rates: the speeds and accelerations; None = compute differences over the cycle.
         """

@@ -96,7 +96,7 @@ class ControllerPathOffset:
     # -- called for programs -------------------------------------------------------------------
 
     def set(self, frame: int, offset: Vector6) -> None:
-        """Set the offset in a frame [m, rad], clamped to the limits."""
+        """Set the wanted offset in a frame [m, rad], clamped to the limits."""
         if frame != self._frame:
             self._frame, self._applied = frame, self.applied(frame)
         bounds = (self.max_translation,) * 3 + (self.max_rotation,) * 3
@@ -139,7 +139,7 @@ class ControllerPathOffset:
         self._axes = None if self.target is None else self._axes
 
     def forget(self) -> None:
-        """Discard the offset, because the arm was put somewhere else."""
+        """Discard the offset, because the arm was teleported."""
         self.target, self._wanted = None, ZERO6
         self.end_displacement()
 
@@ -150,7 +150,7 @@ class ControllerPathOffset:
         Displace the target for a cycle; return a fault if the arm cannot follow.
 
         :param moving: whether the arm is in motion.
-        :param is_led: whether set-points lead the arm.
+        :param is_led: whether set-points (servoj, speedj, speedl) lead the arm.
         """
         self._update_axes()
         if not self.enabled and not moving:
@@ -208,7 +208,7 @@ class ControllerPathOffset:
         return None
 
     def _is_sudden(self, target: ArmTarget, q: Vector6, change: Vector6) -> bool:
-        """Return whether the offset moves a joint faster than the joint can follow."""
+        """Return whether the offset demands too much speed or acceleration of a joint."""
         motion = self._motion
         rate = scale6(subtract6(change, self._change), 1.0 / motion.cycle)
         most = MAX_JOINT_ACCELERATION * motion.cycle
@@ -218,7 +218,7 @@ class ControllerPathOffset:
         )
 
     def _displaced(self, pose: Pose) -> Pose:
-        """Return a pose of the motion, displaced by the offset."""
+        """Return a pose of the motion without offset, displaced by the applied offset."""
         offset = self._applied
         if self._frame == TCP:
             return pose @ Pose.from_rotation_vector(offset)
@@ -235,7 +235,7 @@ class ControllerPathOffset:
         return _BASE_AXES if frame == BASE or self._axes is None else self._axes
 
     def _update_axes(self) -> None:
-        """Align the frame MOTION with the motion of the tool."""
+        """Align the frame MOTION with the tool's direction of motion, if the tool moves."""
         direction = self._motion.tcp_twist[:3]
         speed = norm(direction)
         if speed < _MIN_SPEED:

@@ -61,24 +61,29 @@ class CycleBatch:
         self._cycles: list[list[float]] = []
         #: The motion for which the cycles were solved.
         self._motion: PathMotion | None = None
-        #: Section, path time per cycle [s] and bound on the tool speed [m/s] of the solution.
+        #: For which the cycles were solved: index of the section, path time per cycle [s] and
+        #: bound on the tool speed [m/s].
         self._solved_for = (0, 0.0, 0.0)
         #: Whether the cycles were solved by inverse kinematics.
         self.on_tool_path = False
         #: The joints of the last cycle that :meth:`next` returned.
         self._q: Vector6 = target.q
+        #: Number of cycles to wait before the next attempt to solve a batch.
         self._back_off = 0
 
     def next(self, motion: PathMotion, duration: float, max_tool_speed: float) -> CycleStep | None:
         """
-        Advance a motion by its next solved cycle; None = the caller has to solve the cycle.
+        Advance a motion by its next solved cycle, and return the cycle's target.
+
+        If no cycle is solved, return None; the caller has to solve the cycle.
 
         :param duration: the path time per cycle [s].
         :param max_tool_speed: bound on the tool speed [m/s].
         """
         target, asked = self._target, (motion.index, duration, max_tool_speed)
         if self._motion is not motion or self._solved_for != asked:
-            # Solve only after two equal calls, because no batch lasts while the scaling changes.
+            # Solve only after two equal calls: while the scaling changes, a batch would be
+            # discarded in the next cycle.
             self._motion, self._solved_for, self._cycles, self._back_off = motion, asked, [], 0
             return None
         if not self._cycles or self._q is not target.q or not target.tcp_is_active:
@@ -99,7 +104,7 @@ class CycleBatch:
     def _solve(
         self, motion: PathMotion, duration: float, max_tool_speed: float
     ) -> list[list[float]]:
-        """Return the next cycles within the section, up to one that the arm cannot follow."""
+        """Return the next cycles of the section, up to the first that the arm cannot follow."""
         target, section = self._target, motion.sections[motion.index]
         stands = section.profile.length <= 0.0
         if stands or duration <= 0.0 or not target.tcp_is_active:

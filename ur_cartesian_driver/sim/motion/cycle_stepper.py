@@ -29,7 +29,7 @@ ROUNDING = 1.0 + 1e-6
 # A step is shortened this many times before its end is considered out of reach.
 _ATTEMPTS = 12
 # Near a singularity, half a step turns the joints almost as far as the whole step. A step that is
-# too long by a factor is therefore divided by a power of the factor. The bounds: the largest
+# too long by a factor is therefore divided by a power of the factor. These are the largest
 # exponent, and the largest divisor as a multiple of the factor.
 _MAX_POWER, _MAX_OVERCUT = 4.0, 2.0
 # A tool motion is stuck if it stays slower than this fraction of the planned speed, ...
@@ -38,8 +38,8 @@ _STALLED = 0.01
 _STALLED_AFTER = 1.0
 # ... while no joint is faster than this fraction of its limit, as in passing a singularity.
 _TURNING = 0.2
-# A joint line whose first step is too long by more than this factor jumps: it does not begin at
-# the final joints of the tool path before it.
+# A joint line whose first step is too long by more than this factor is a jump: the line does not
+# begin at the joints at which the tool path before it has ended.
 _JUMP_RATIO = 50.0
 
 
@@ -107,20 +107,20 @@ class CycleStepper:
         return self._target.forward(q)
 
     def _jumps(self, q: Vector6, setpoint: Setpoint, joints: float) -> bool:
-        """Return whether a step is a branch jump: a shorter step would turn the joints as far."""
+        """Return whether a step jumps: a shorter step would turn the joints just as far."""
         if isinstance(setpoint, Pose):
             return is_singular(self._target.q, q, self._target.T_base_tcp, setpoint)
         return self._on_tool_path and joints > _JUMP_RATIO
 
     def _stalls(self, slow: bool) -> bool:
-        """Return whether a tool motion has been too slow for longer than ``_STALLED_AFTER``."""
+        """Return whether a tool motion has been slow for longer than ``_STALLED_AFTER``."""
         self._stalled_for = self._stalled_for + self._target.cycle if slow else 0.0
         return self._stalled_for > _STALLED_AFTER
 
 
 def _step_divisor(step: tuple[float, float], before: tuple[float, float]) -> float:
     """
-    Return the divisor that makes a step short enough, by a secant in logarithms.
+    Return the divisor that makes a step short enough, by the secant method in logarithms.
 
     :param step: the time of the step, and the factor by which the step is too long.
     :param before: the same two values for the step that was tried before.

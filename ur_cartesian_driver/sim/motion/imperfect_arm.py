@@ -29,7 +29,8 @@ from ur_cartesian_driver.sim.motion import MotionGenerator
 
 #: A joint with a smaller lag [rad] and smaller speeds [rad/s] is considered settled.
 _RESIDUE = 1e-8
-#: Period of the noise; shift of the noise from one quantity to the next [cycles].
+#: Number of cycles after which the noise repeats; shift of the noise of one quantity against that
+#: of the previous one [cycles].
 _NOISE_CYCLES, _NOISE_SHIFT = 1009, 337
 
 
@@ -71,7 +72,7 @@ class Imperfections:
     speed_deadband: float = 0.001
     #: Fraction of RTDE packets after which a single packet is left out. Recorded: 0.07 at 500 Hz.
     single_gaps: float = 0.07
-    #: Fraction of RTDE packets after which up to ``max_skipped`` are left out. Recorded: "a few".
+    #: Fraction of RTDE packets after which up to ``max_skipped`` are left out. Recorded: a few.
     long_gaps: float = 0.002
     #: Largest number of consecutive RTDE packets that are left out. Recorded: gaps of 12 ms at
     #: 500 Hz, of 40 ms at 125 Hz.
@@ -85,7 +86,7 @@ class Imperfections:
 
 
 def typical_imperfections(model: RobotModel, seed: int = 1) -> Imperfections:
-    """Return the imperfections recorded, or assumed, for the series of a model."""
+    """Return the imperfections recorded on arms like this model; where none were, assumed ones."""
     found = Imperfections(seed=seed)
     if model.series != 'CB3':
         return found
@@ -126,7 +127,7 @@ class ImperfectArm:
             _Joint(imperfections, motion.cycle, position, random.uniform(-1.0, 1.0))
             for position in motion.q
         ]
-        # The noise is drawn in advance, because a cycle has little time.
+        # The noise is drawn in advance, because drawing it would take too long in a cycle.
         self._noise = [
             vector6(random.uniform(-0.5, 0.5) for _ in range(6)) for _ in range(_NOISE_CYCLES)
         ]
@@ -250,7 +251,7 @@ class _Joint:
         self.position, self.speed = q + self._drag, 0.0
         #: Whether the joint stays at rest until its target moves.
         self.is_settled = True
-        #: Whether the measured speed can differ from 0.
+        #: Whether the measured speed is not exactly 0.
         self.reads_speed = False
 
     def follow(self, q: float, qd: float, qdd: float) -> None:

@@ -3,9 +3,9 @@
 """
 Turns motion calls into one target per control cycle.
 
-A call (``movel`` ...) returns a :class:`Move` at once; ``step`` does one cycle of the motion. The
-caller polls ``Move.returned``. If the next call comes in the cycle in which ``returned`` becomes
-true, the motion continues without an idle cycle.
+A call (``movel`` ...) returns a :class:`Move` at once; ``step`` does one cycle of the motion. To
+find out when the script function can return, the caller polls ``Move.returned``. If the next call
+comes in the cycle in which ``returned`` becomes true, the motion continues without an idle cycle.
 
 Speed scaling and the limits of the arm stretch the time and never change the path. Tool motions
 are solved by inverse kinematics in each cycle, starting from the previous solution. If a path
@@ -72,7 +72,8 @@ class MotionGenerator:
     Computes the target of the arm, one control cycle after the other; see :class:`ArmTarget`.
 
     ``warnings`` collects reports until the controller takes them. After a ``fault`` the arm stands
-    still until ``clear_fault``. Only joint stops can exceed ``max_tool_speed`` [m/s].
+    still until ``clear_fault``. Only joint stops can exceed ``max_tool_speed`` [m/s]. A path move
+    with an impossible parameter raises :class:`MotionError`.
 
     :param cycle: duration of a cycle [s].
     :param q: joint positions at the start [rad].
@@ -84,7 +85,7 @@ class MotionGenerator:
         """Begin at rest at ``q`` with the flange as TCP."""
         self.arm = arm
         self.cycle = cycle
-        #: The laws of motion.
+        #: The laws of the robot's motion, assumed or measured.
         self.laws = laws
         self.max_tool_speed = MAX_TOOL_SPEED
         #: The motion version of movej and movel, 1 or 2; and the laws of version 2.
@@ -190,14 +191,14 @@ class MotionGenerator:
         t: float = 0.0,
         r: float = 0.0,
     ) -> Move:
-        """Move straight in joint space; a [rad/s^2], v [rad/s] of the leading axis; r [m]."""
+        """Move straight in joint space; a [rad/s^2], v [rad/s] of the fastest joint; r [m]."""
         parameters = ProfileParameters(acceleration=a, speed=v, time=t)
         return self._start_path('movej', self._joint_path('movej', q), parameters, r)
 
     def movel(
         self, T_base_tcp: Pose, a: float = 1.2, v: float = 0.25, t: float = 0.0, r: float = 0.0
     ) -> Move:
-        """Move the tool straight; a [m/s^2], v [m/s], times the turn ratio for rotations."""
+        """Move the tool straight; a [m/s^2], v [m/s]; for turns, times ``turn_ratio`` [rad/m]."""
         parameters = ProfileParameters(acceleration=a, speed=v, time=t)
         ratio = self.laws.turn_ratio
         return self._start_path(
@@ -221,7 +222,8 @@ class MotionGenerator:
         """
         Move on a circular arc; mode 1 keeps the orientation fixed relative to the tangent.
 
-        :raises MotionError: the three points do not lie on a circle.
+        :raises MotionError: the three points do not lie on a circle. If the arm has to stop before
+            the arc begins, this causes a fault instead.
         """
         return self._start_path(
             'movec',
@@ -261,7 +263,7 @@ class MotionGenerator:
         return call.move
 
     def _by_second_version(self, call: MotionCall, asked: ProfileParameters) -> MotionCall:
-        """Return a call as motion version 2 carries it out, if it is a movej or movel."""
+        """Return a movej or movel as motion version 2 carries it out; other calls unchanged."""
         if call.name not in ('movej', 'movel'):
             return call
         version, target = self.second_version, self._target
@@ -322,7 +324,7 @@ class MotionGenerator:
     def speedl(
         self, twist: Vector6, a: float, t: float | None = None, a_rot: float | None = None
     ) -> Move:
-        """Change to a twist of the tool (base axes [m/s, rad/s]) and hold this twist."""
+        """Change to a twist of the TCP (base axes [m/s, rad/s]) and hold this twist."""
         now, a_rot = self._active.nominal_twist(), a if a_rot is None else a_rot
         return self._replace(ToolSpeedMotion(self.T_base_tcp, now, twist, a, a_rot, t))
 
@@ -384,7 +386,7 @@ class MotionGenerator:
     # -- one cycle ---------------------------------------------------------------------------
 
     def step(self, scale: float) -> None:
-        """Do one cycle at ``scale`` times the speed (0..1, 0 = pause), on the same path."""
+        """Do one cycle at ``scale`` times the programmed speed (0..1, 0 = pause)."""
         active = self._active
         self._paths.end_of_frame()
         active.scale = scale
@@ -433,7 +435,7 @@ class MotionGenerator:
                 active.move.returned = True
 
     def _next_start_rate(self) -> float:
-        """Return the start rate of this cycle; it does not grow in a pause."""
+        """Increase the rate of a starting path, except in a pause, and return it."""
         if self._active.scale <= 0.0 or self._start_rate == 1.0:
             return 1.0
         self._start_rate = min(1.0, self._start_rate + self.cycle / self.laws.start_time)

@@ -28,8 +28,8 @@ Steps = Generator[None, None, None]
 HARD_STOP = 15.0
 
 
-#: Number of waypoints with overlapping blends that a thread can skip in one cycle: a loop of such
-#: moves has to take time. Assumed.
+#: Number of waypoints with overlapping blends that a thread can skip in one cycle; it is bounded,
+#: because an endless loop of such moves has to take time. Assumed.
 MAX_SKIPPED = 100
 
 
@@ -48,16 +48,18 @@ class MotionOwnership:
         """Begin without an owner."""
         self._motion = motion
         self._owner: Hashable = None
+        #: Number of motion calls that have not returned; number of these that `abort` can end.
         self._calls = 0
         self._abortable = 0
         self._aborting = False
+        #: Whether a thread was killed in a motion call, and no thread has taken over since.
         self._abandoned = False
         #: Moves that returned at once in this cycle.
         self._instant_moves = 0
 
     def take(self, thread: Hashable) -> None:
         """
-        Make a thread the owner.
+        Make a thread the owner of the motion.
 
         :raises RuntimeException: another thread owns the motion.
         """
@@ -102,10 +104,10 @@ class MotionOwnership:
         """
         Return whether a call that could return at once has to take a cycle.
 
-        A move to the present position takes a cycle, because programs repeat such moves. The first
-        one after a motion that has ended in this cycle returns at once, so that moves follow each
-        other without an idle cycle. A set-point without a duration also returns at once: a loop of
-        such set-points is an error on a robot, too.
+        A move to the present position takes a cycle, because programs repeat such moves in loops.
+        The first such move after a motion that has ended in this cycle returns at once, so that
+        moves follow each other without an idle cycle. A set-point without a duration also returns
+        at once: a loop of such set-points is an error on a robot, too.
         """
         motion = self._motion
         if not motion.moving:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Reports of the motion generator: error codes as the controller writes them."""
+"""Warnings and faults of the motion generator, with the controller's error codes."""
 
 from __future__ import annotations
 

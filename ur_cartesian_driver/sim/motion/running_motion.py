@@ -19,13 +19,14 @@ from ur_cartesian_driver.sim.motion.servo_motions import (
     ToolStopMotion,
 )
 
-#: Deceleration [rad/s^2] before a path move that cannot begin while the arm moves.
+#: Deceleration [rad/s^2] if a path move is called during a servo-like motion: a path can begin
+#: only at rest or in a blend.
 UNATTENDED_DECELERATION = 15.0
 
 
 class RunningMotion:
     """
-    The running motion and its call; also computes the speeds at which the next motion begins.
+    The running motion and its call; also computes the speeds from which the next motion begins.
 
     :param target: the target of the arm.
     :param set_point_deceleration: deceleration if no further servoj set-point comes [rad/s^2].
@@ -54,7 +55,8 @@ class RunningMotion:
         self.abort()
         self._target.activate_tcp()
         if not isinstance(self.motion, SetpointMotion):
-            # The nominal speed of the new motion, times this rate, is the present speed.
+            # The new motion begins at a nominal speed which, times this rate, is the present
+            # speed.
             self.rate = self.scale
         self.motion, self.move = motion, Move()
         if isinstance(motion, SetpointMotion) and motion.duration is not None:
@@ -90,13 +92,13 @@ class RunningMotion:
         return ToolStopMotion(self._target.T_base_tcp, self._twist(), a, a_rot)
 
     def nominal_joint_speed(self) -> Vector6:
-        """Return the joint speed without speed scaling."""
+        """Return the present joint speed divided by the speed scaling."""
         if isinstance(self.motion, JointSpeedMotion | ServoMotion):
             return self.motion.qd
         return self._unscaled(self._joint_speed())
 
     def nominal_twist(self) -> Vector6:
-        """Return the twist of the TCP without speed scaling."""
+        """Return the present twist of the TCP divided by the speed scaling."""
         if isinstance(self.motion, ToolSpeedMotion):
             return self.motion.twist
         return self._unscaled(self._twist())

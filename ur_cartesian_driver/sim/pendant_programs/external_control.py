@@ -4,8 +4,8 @@
 External Control: the URCap of CB3 and PolyScope 5, and the URCapX of PolyScope X.
 
 When a program with such a node is played, the pendant requests the text of the node from a host,
-once, before the first line runs. If the request fails, the node becomes a window with the reason
-(URCap), or stays empty (URCapX). doc/simulation.md has the evidence.
+once, before the first line runs. If the request fails, the node shows a window with the reason
+(URCap), or does nothing (URCapX). doc/simulation.md has the evidence.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class RequestLimits:
     connect: float
     #: Limit for the first byte of the answer; None = no limit.
     answer: float | None
-    #: Time during which the last answer is used again.
+    #: Time after an answer during which it is used again.
     cache: float = 0.0
 
 
@@ -67,7 +67,7 @@ class UrCap:
         return os.strerror(error.errno) if error.errno else str(error)
 
     def fetched(self, answer: HostAnswer) -> FetchedScript:
-        """Return the parts of the program; after a failure, of a program that shows a window."""
+        """Return the parts of the fetched script; after a failure, of one that shows a window."""
         if isinstance(answer, str):
             # The URCap reads lines; if the host hangs up, the line is Java's null.
             lines = answer.splitlines() or ['null']
@@ -101,7 +101,7 @@ class UrCapX(UrCap):
         return str(reason)
 
     def fetched(self, answer: HostAnswer) -> FetchedScript:
-        """Return the parts of the program; none after a failure."""
+        """Return the parts of the fetched script; after a failure, empty parts."""
         text = '' if isinstance(answer, OSError) else answer
         header, control_loop = _split(text)
         return FetchedScript(header=header, control_loop=control_loop, header_first=True)
@@ -131,7 +131,7 @@ class ExternalControl:
 
     def __init__(self, urcap: UrCap, note: Callable[[str], None]) -> None:
         """
-        Prepare; there is no network until ``request`` is set.
+        Generate without a network: every request fails until ``request`` is set.
 
         :param note: writes a line to the log of the pendant.
         """
@@ -141,7 +141,7 @@ class ExternalControl:
 
     def generate(self, tree: ProgramTree, name: str, then: Callable[[str], None]) -> None:
         """
-        Request the program of the nodes, and write the whole program.
+        Request the script for the nodes from the host, and generate the whole program.
 
         :param then: called with the URScript when the host has answered.
         """

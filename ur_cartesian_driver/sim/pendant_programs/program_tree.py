@@ -3,9 +3,9 @@
 """
 The tree of a program on the pendant, and the URScript that PolyScope generates from the tree.
 
-URScript is generated anew whenever the program is played. The URCap External Control (CB3,
-PolyScope 5) puts its header before its first node, even inside the loop of the program; the URCapX
-(PolyScope X) puts its header before the program.
+PolyScope generates the URScript anew whenever the program is played. The URCap External Control
+(CB3, PolyScope 5) puts its header before its first node, even inside the loop of the program; the
+URCapX (PolyScope X) puts its header before the program.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ TreeNode: TypeAlias = ScriptText | ExternalControlNode
 class FetchedScript:
     """The program that External Control has fetched, in its two parts; each may be empty."""
 
-    #: Functions and variables, which a program contains once.
+    #: Functions and variables, which a program contains only once.
     header: str = ''
     #: The text at each node.
     control_loop: str = ''
@@ -62,6 +62,7 @@ class ProgramTree:
         Return the program as URScript.
 
         :param name: the name of the file.
+        :param fetched: the script that External Control has fetched for its nodes.
         """
         lines = [f'def {function_name(name.removesuffix(".urp"))}():']
         header = fetched.header
@@ -98,7 +99,7 @@ SavedProgram: TypeAlias = str | ProgramTree | UnreadableProgram
 
 
 def function_name(program: str) -> str:
-    """Return the name of a program's function: the program's name, as far as URScript allows."""
+    """Return the name of a program's function: the program's name, made a URScript identifier."""
     name = re.sub(r'\W', '_', program, flags=re.ASCII) or 'program'
     return name if name[0].isalpha() and name not in KEYWORDS else f'_{name}'
 

@@ -3,8 +3,8 @@
 """
 Requests programs from a script sender over TCP, while the cycles of the controller go on.
 
-An answer has no length and no end mark. It is complete when the host hangs up or has been silent
-for :data:`SILENCE`, as for the URCapX. The real URCap of CB3 and PolyScope 5 does not wait at all:
+An answer has no length and no end mark. As in the URCapX, it is complete when the host hangs up or
+has been silent for :data:`SILENCE`. The real URCap of CB3 and PolyScope 5 does not wait at all:
 it takes the lines that have arrived, and loses the rest if the host pauses.
 """
 
@@ -67,7 +67,7 @@ class _AnswerCollector(asyncio.Protocol):
 
 
 class ScriptRequests:
-    """Requests the program of one host; the tasks run in the running event loop."""
+    """Requests programs from one host, in tasks of the running event loop."""
 
     def __init__(self, host: str, port: int, limits: RequestLimits, own_host: str) -> None:
         """
@@ -94,7 +94,7 @@ class ScriptRequests:
                 self._cached = answer, loop.time() + self._limits.cache
             then(answer)
 
-        for earlier in self._tasks:  # only one start can wait
+        for earlier in self._tasks:  # only the last start of a program counts
             earlier.cancel()
         task = loop.create_task(fetch())
         self._tasks.add(task)

@@ -40,7 +40,8 @@ def read_urp(data: bytes, name: str) -> ProgramTree:
     Return the tree of a program file.
 
     :param name: the name of the file, for errors.
-    :raises ValueError: it is not a program file, or has a node that the simulator does not run.
+    :raises ValueError: the data are no program file, or have a node that the simulator does not
+        run.
     """
     try:
         xml = _decompressed(data) if data.startswith(_GZIP_MAGIC) else data
@@ -70,7 +71,7 @@ def _decompressed(data: bytes) -> bytes:
 
 
 def _nodes(parent: Element, name: str) -> Iterator[TreeNode]:
-    """Yield the nodes below a node."""
+    """Yield the nodes below a node; the nodes of a folder, not the folder; no comments."""
     for node in parent.findall('children/*'):
         if node.tag == 'Contributed' and node.get('strategyURCapName') == EXTERNAL_CONTROL:
             yield ExternalControlNode()
@@ -110,7 +111,7 @@ def _popup(node: Element) -> str:
     return f'{window}\nhalt' if node.get('haltProgram') == 'true' else window
 
 
-#: Tag and type of a node -> function that returns its URScript, or None if it has none.
+#: Tag and type of a node -> function that returns the node's URScript; None = the node has none.
 _READERS: Mapping[tuple[str, str], Callable[[Element], str | None]] = {
     ('Script', 'Line'): _line,
     ('Script', 'File'): _file,

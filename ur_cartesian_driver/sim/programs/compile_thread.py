@@ -30,7 +30,7 @@ MAX_NEW_OBJECTS = 100_000
 
 
 class CompileThread:
-    """Does work in a thread and passes its results to an event loop, in the order of the calls."""
+    """Does work in a thread and passes the results to an event loop, in the order of the calls."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         """Start the thread."""
@@ -90,7 +90,7 @@ class CompileThread:
 
 class _InterpreterForCycles:
     """
-    The settings of Python during compiling: fast thread switches and no garbage collection.
+    Changes Python's settings during compiling: fast thread switches and no garbage collection.
 
     Several simulators in one process can compile at the same time: the first to begin changes the
     settings, and the last to end restores the settings.

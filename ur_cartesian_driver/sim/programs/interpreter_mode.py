@@ -30,8 +30,8 @@ from ur_cartesian_driver.urscript import (
 
 #: Bound on statements that wait to be compiled or executed; a robot accepts about as many.
 MAX_QUEUED_STATEMENTS = 500
-#: A line that calls one of these functions in an outermost statement is executed before the next
-#: line is compiled.
+#: Barrier functions: a line that calls one of them in an outermost statement is executed before
+#: the next line is compiled.
 _BARRIERS = frozenset({'clear_interpreter', 'end_interpreter'})
 
 AnswerCallback = Callable[[str], None]
@@ -66,7 +66,7 @@ class InterpreterMode:
         self._interpreter: ScriptInterpreter | None = None
         self._interpreted = self._executed = self._cleared = 0
         self._closing = self._clear_wanted = self._end_wanted = False
-        #: Whether the statement that is being executed clears or ends the mode.
+        #: Whether the statement that is being executed clears or ends interpreter mode.
         self._is_running_barrier = False
         self._queue.clear()
         self._discard_waiting('the program has ended')
@@ -75,7 +75,7 @@ class InterpreterMode:
 
     def receive(self, statement: str, answer: AnswerCallback) -> None:
         """
-        Take one line.
+        Execute a command, or queue a line of statements.
 
         :param answer: called with the answer, now or when the line is compiled.
         """
@@ -103,7 +103,7 @@ class InterpreterMode:
         return f'ack: {self._interpreted}'
 
     def _compile_waiting(self) -> None:
-        """Compile and answer waiting statements, up to one that clears or ends the mode."""
+        """Compile and answer waiting statements, up to the first that calls a barrier function."""
         while self._interpreter is not None and self._uncompiled and not self._closing:
             statement, answer = self._uncompiled.popleft()
             try:
@@ -125,10 +125,10 @@ class InterpreterMode:
 
     def run(self, clear_queue: bool, clear_on_end: bool) -> Steps:
         """
-        Execute statements until a statement, or another thread, ends the mode.
+        Execute statements until a statement, or another thread, calls `end_interpreter`.
 
         :param clear_queue: whether to discard the statements that have been waiting.
-        :param clear_on_end: whether to delete the statements' definitions when the mode ends.
+        :param clear_on_end: whether to delete the statements' definitions at the end.
         :raises RuntimeException: the call is not in the main thread, or is in interpreter mode.
         """
         interpreter = self._programs.interpreter
@@ -158,11 +158,11 @@ class InterpreterMode:
         self._interpreter = None
 
     def end(self) -> None:
-        """End the mode when the current statement has ended."""
+        """End interpreter mode when the current statement has ended."""
         self._end_wanted = True
 
     def clear(self) -> None:
-        """Delete all definitions of statements when the current statement has ended."""
+        """Delete the definitions of all statements when the current statement has ended."""
         self._clear_wanted = True
 
     def _forget(self, interpreter: ScriptInterpreter, first_thread: int) -> None:

@@ -50,8 +50,8 @@ def _parse_cached(text: str, is_line: bool = False) -> ScriptProgram:
     return replace(parse_line(text), name='unnamed') if is_line else parse(text)
 
 
-#: Cache of compiled programs, for all controllers of this process. The identity of a program is
-#: part of the key, so the cache also keeps the program.
+#: Cache of compiled programs, for all controllers of this process. A key contains the `id()` of
+#: its program; the value contains the program, so that no other program can get this id.
 _compiled: dict[Hashable, tuple[ScriptProgram, GeneratedCode]] = {}
 MAX_COMPILED = 8
 
@@ -70,14 +70,14 @@ class CompiledProgram(NamedTuple):
 
 
 class CompileAside(Protocol):
-    """Does work and passes its result on, at once or later."""
+    """A function that does work and passes the result on, at once or later."""
 
     def __call__(self, work: Callable[[], T], then: Callable[[T], None]) -> None:
         """Do the work, and call ``then`` with its result."""
 
 
 def compile_at_once(work: Callable[[], T], then: Callable[[T], None]) -> None:
-    """Compile between two cycles."""
+    """Do the work at once; the controller's cycles wait for it."""
     then(work())
 
 
@@ -99,7 +99,7 @@ class ProgramArm(Protocol):
         """Apply the installation's settings, which precede a program started on the pendant."""
 
     def begin_program(self) -> None:
-        """Get ready for the first motion of a program."""
+        """Make the first path move of a program start slowly."""
 
     def end_modes(self) -> None:
         """End the modes that a program has switched on: force mode, freedrive, watchdogs."""
@@ -129,7 +129,7 @@ class ProgramRunner:
         """
         Begin with no program.
 
-        :param thread_delay: cycles after which a new thread of a program begins.
+        :param thread_delay: number of cycles after which a new thread of a program begins.
         :param interleaving_seed: seed of the random switches between threads; None = no switches.
         """
         self._thread_delay = thread_delay
@@ -145,7 +145,7 @@ class ProgramRunner:
         self._loaded: ScriptProgram | GenerateScript | None = None
         #: Marks the start that waits for its generated program; None = no start waits.
         self._awaited: object | None = None
-        #: The reason why `play` has not started its program; empty = the program has started.
+        #: The reason why the last `play` has not started a program; empty = it has.
         self.start_failure = ''
         #: The builtins, on which compiled code depends in addition to the program.
         self._signatures = frozenset(
@@ -160,7 +160,7 @@ class ProgramRunner:
         self.name = ''
         #: Called when a program has ended, to close its sockets.
         self.on_end: Callable[[], None] | None = None
-        #: Number of stops: a program that was sent before a stop does not start after the stop.
+        #: Number of stops so far, so that a program sent before a stop does not start after it.
         self._stops = 0
         #: Function that compiles: at once, or in a thread while the cycles go on.
         self.compile_aside: CompileAside = compile_at_once
@@ -183,7 +183,7 @@ class ProgramRunner:
 
     @property
     def starting(self) -> bool:
-        """Whether a start waits: for the text of the program, or until the arm stands."""
+        """Whether a start waits for the text of the program, or until the arm stands still."""
         return self._awaited is not None or self._queued is not None
 
     def submit(self, text: str, is_line: bool = False) -> None:
@@ -432,7 +432,7 @@ class ProgramRunner:
             self._stepping = None
 
     def _handle_end_of_frame(self, interpreter: ScriptInterpreter) -> None:
-        """Report an error of the frame; end or pause the program."""
+        """Report an error of the frame; end or pause the program if the frame has done so."""
         if interpreter.error is not None:
             error = interpreter.error
             self._messages.exception(error.line, error.column, str(error))

@@ -30,13 +30,13 @@ class Watchdogs:
             self._watches.pop(variable, None)
 
     def written(self, variables: tuple[str, ...], now: float) -> None:
-        """Note that inputs were written."""
+        """Note the time [s] at which inputs were written."""
         for variable in variables:
             if watch := self._watches.get(variable):
                 watch.last, watch.expired = now, False
 
     def expired(self, now: float) -> list[tuple[str, str]]:
-        """Return the inputs that have just become late, with their actions."""
+        """Return the inputs that have become late since the last call, with their actions."""
         late = []
         for variable, watch in self._watches.items():
             if not watch.expired and now - watch.last > watch.period:

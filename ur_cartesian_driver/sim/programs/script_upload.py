@@ -24,8 +24,8 @@ from ur_cartesian_driver.urscript.script_errors import CompileError
 #: such bound.
 MAX_UPLOAD_SIZE = 1024 * 1024
 
-#: The encoding of URScript on all ports: the manufacturer's manual speaks of "(extended) ASCII".
-#: So each byte is a character, and no byte is an error.
+#: The encoding of URScript on all ports. The manufacturer's manual speaks of "(extended) ASCII";
+#: in this encoding each byte is a character, and no byte is an error.
 SCRIPT_ENCODING = 'latin-1'
 
 _BLOCKS = frozenset({'def', 'thread', 'if', 'while', 'switch'})
@@ -53,7 +53,7 @@ class UploadedLine:
 
 @dataclass(frozen=True, slots=True)
 class UploadTooLong:
-    """A line or program that exceeds the bound, so that the remainder is skipped."""
+    """A line or program that exceeds ``MAX_UPLOAD_SIZE``, so that the remainder is skipped."""
 
     text: str = (
         f'The program is longer than {MAX_UPLOAD_SIZE >> 20} MiB, which this controller does not '

@@ -43,7 +43,7 @@ class StoredPrograms:
         return self._programs.get(file)
 
     def names(self) -> dict[str, str]:
-        """Return the file of each program name; on PolyScope X names have no suffix."""
+        """Return program name -> file; a name is the file without suffix, as on PolyScope X."""
         return {PurePosixPath(file).stem: file for file in self._programs}
 
     def urpx(self, name: str) -> Mapping[str, Any]:
@@ -104,7 +104,11 @@ def _text_in(content: object, *keys: str) -> str:
 
 
 def urpx_script(name: str, content: Mapping[str, Any]) -> str:
-    """Return a program's URScript as one function that begins with the application's script."""
+    """
+    Return a program's URScript as one function.
+
+    If the script is not a function already, the function begins with the application's script.
+    """
     script = _text_in(content, *_SCRIPT)
     if script.lstrip().startswith('def '):
         return script

@@ -15,7 +15,7 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 Builtins = Mapping[str, Any]
 
 
-#: Functions that act at once and then wait, if at all; a secondary program can call them, but does
+#: Functions that act at once and may wait afterwards; a secondary program can call them, but does
 #: not wait.
 ACT_AT_ONCE = frozenset({'popup', 'protective_stop'})
 #: Functions that a secondary program can call if they have nothing to wait for. Published

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The sockets that programs open, as the builtins see them.
+The sockets that programs open: the interface for the script functions.
 
-No method waits: a builtin polls its socket once per cycle and yields in between.
+No method waits: a script function polls its socket once per cycle and yields in between.
 `tcp_script_sockets` uses real TCP; the sockets in memory are for programs on the virtual clock.
 """
 
@@ -67,7 +67,7 @@ class MemorySocket:
         return data
 
     def hang_up(self) -> None:
-        """Close the peer's side; bytes sent before can still be read."""
+        """Close the connection as the peer; bytes that it sent before can still be read."""
         self.state = SocketState.CLOSED
 
 
@@ -97,11 +97,11 @@ class MemorySockets:
         return self._sockets[name].state if name in self._sockets else SocketState.CLOSED
 
     def received(self, name: str) -> bytearray:
-        """Return the bytes sent by the peer."""
+        """Return the unread bytes sent by the peer."""
         return self._sockets[name].incoming if name in self._sockets else bytearray()
 
     def send(self, name: str, data: bytes) -> bool:
-        """Hand the data to the peer."""
+        """Hand the data to the peer; return False if the socket is not open."""
         if self.state(name) is not SocketState.OPEN:
             return False
         self._sockets[name].outgoing += data

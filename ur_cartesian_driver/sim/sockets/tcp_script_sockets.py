@@ -18,7 +18,8 @@ import socket
 
 from ur_cartesian_driver.sim.sockets.script_sockets import SocketState
 
-#: Bound on received bytes that the program has not taken, and on bytes that wait to be sent.
+#: While the program has not taken this many received bytes, no more are read; at most this many
+#: bytes wait to be sent.
 _MAX_BUFFERED = 65_536
 _IN_PROGRESS = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK, errno.EINTR)
 _CONNECTED = (0, errno.EISCONN)
@@ -31,7 +32,7 @@ _Resolved = Sequence[tuple[int, int, int, str, _Address]]
 
 
 class _ScriptConnection:
-    """One socket: connecting, open, or closed with data left to read."""
+    """One TCP connection: connecting, open, or closed with data left to read."""
 
     def __init__(self, port: int, on_data: Callable[[int, bytes], None] | None, host: str) -> None:
         self._host = host
@@ -94,7 +95,11 @@ class _ScriptConnection:
                 self._on_data(self._port, data)
 
     def send(self, data: bytes) -> bool:
-        """Send data and keep bytes that the kernel does not accept; False = too many are kept."""
+        """
+        Send data, and keep the bytes that the kernel does not accept.
+
+        :returns: False = the socket is not open, or too many bytes are kept.
+        """
         if self.state is not SocketState.OPEN or len(self._outgoing) + len(data) > _MAX_BUFFERED:
             return False
         self._outgoing += data
@@ -181,7 +186,7 @@ class TcpScriptSockets:
         return connection.state if connection else SocketState.CLOSED
 
     def received(self, name: str) -> bytearray:
-        """Return the unread bytes of a socket."""
+        """Read from the kernel, and return the unread bytes of a socket."""
         connection = self._connections.get(name)
         if connection is None:
             return bytearray()
@@ -189,7 +194,7 @@ class TcpScriptSockets:
         return connection.incoming
 
     def send(self, name: str, data: bytes) -> bool:
-        """Send on a socket."""
+        """Send data on a socket; return whether it accepts the data."""
         connection = self._connections.get(name)
         return connection is not None and connection.send(data)
 

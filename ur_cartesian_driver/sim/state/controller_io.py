@@ -20,7 +20,7 @@ STANDARD, CONFIGURABLE, TOOL = 8, 8, 2
 PORTS = 256
 
 
-#: Registers that RTDE transfers one by one: type in RTDE, list in :class:`Registers`, numbers.
+#: Registers that RTDE transfers one by one: type in RTDE, list in :class:`Registers`, indices.
 #: (RTDE transfers bits 0-63 in integers.)
 _SINGLE_REGISTERS = (
     ('bit', 'bits', range(64, REGISTER_BITS)),
@@ -30,7 +30,7 @@ _SINGLE_REGISTERS = (
 
 
 def single_registers(direction: str) -> Iterator[tuple[str, str, int]]:
-    """Yield RTDE name, list in :class:`Registers` and number of each single register."""
+    """Yield RTDE name, list in :class:`Registers` and index of each single register."""
     for kind, values, numbers in _SINGLE_REGISTERS:
         for i in numbers:
             yield f'{direction}_{kind}_register_{i}', values, i
@@ -91,10 +91,11 @@ class ControllerIo:
     #: Values of the analog outputs [V or A]; 4 mA at first, as recorded in URSim and as set by
     #: programs from the pendant.
     analog_out: list[float] = field(default_factory=lambda: [0.004, 0.004])
+    #: Domain of each analog output; True = voltage.
     analog_out_voltage: list[bool] = field(default_factory=lambda: [False, False])
     tool_analog_in: list[float] = field(default_factory=lambda: [0.0, 0.0])
     tool_voltage: int = 0
-    #: Force [N] and torque [Nm] that an RTDE client has measured.
+    #: Force [N] and torque [Nm] of an external sensor, as an RTDE client has written them.
     external_force: Vector6 = (0.0,) * 6
     inputs: Registers = field(default_factory=Registers)
     outputs: Registers = field(default_factory=Registers)

@@ -97,7 +97,7 @@ class ControllerMessages:
             self.on_error(code, argument)
 
     def safety_mode(self, mode: SafetyMode) -> None:
-        """Send the new safety mode."""
+        """Send a new safety mode to the clients."""
         self.pending.append(SafetyModeMessage(timestamp=self._stamp(), safety_mode=mode))
 
     def popup(self, popup: Popup) -> None:
@@ -143,7 +143,7 @@ class ControllerMessages:
 
 
 def _cut(text: str, length: int = _MAX_TEXT_LENGTH) -> str:
-    """Return the text, cut to ``length`` bytes in UTF-8, which has at most four per character."""
+    """Return the text, cut to ``length`` bytes of UTF-8 (at most four bytes per character)."""
     if len(text) <= length // 4:
         return text
     return text.encode(errors='replace')[:length].decode(errors='ignore')

@@ -37,7 +37,7 @@ class Pendant:
     """The pendant: settings shared by all dashboard clients, and the person in front of it."""
 
     user_role: str = 'PROGRAMMER'
-    #: NONE: no client controls the operational mode.
+    #: MANUAL, AUTOMATIC, or NONE: no client controls the operational mode.
     operational_mode: str = 'NONE'
     #: Answers of the person to the next windows that request a value.
     answers: deque[str] = field(default_factory=deque)
@@ -45,7 +45,7 @@ class Pendant:
 
 @dataclass(slots=True, kw_only=True)
 class StoredSettings:
-    """Settings that programs make and read back; they outlive programs, and change no motion."""
+    """Settings that programs store and read back; they outlive programs and affect no motion."""
 
     #: 0.01 to 1.
     jerk_gain_scaling: float = 1.0
@@ -63,5 +63,5 @@ class ProcessState:
     pause_on: set[tuple[int, int | None]] = field(default_factory=set)
 
     def has_pause_on(self, code: int, argument: int) -> bool:
-        """Return whether an error pauses the program."""
+        """Return whether an error with this code and argument pauses the program."""
         return bool(self.pause_on & {(code, argument), (code, None)})

@@ -67,7 +67,7 @@ SAFETY_TRANSITIONS: Mapping[SafetyMode, Mapping[SafetyEvent, SafetyMode]] = {
     SafetyMode.FAULT: {SafetyEvent.RESTART: SafetyMode.NORMAL},
 }
 
-#: The bits that RTDE reports in addition to the mode.
+#: The status bits that RTDE reports in addition to the safety mode.
 STATUS_BITS: Mapping[SafetyMode, SafetyStatus] = {
     SafetyMode.NORMAL: SafetyStatus.NORMAL_MODE,
     SafetyMode.REDUCED: SafetyStatus.REDUCED_MODE,
@@ -84,7 +84,7 @@ STATUS_BITS: Mapping[SafetyMode, SafetyStatus] = {
 
 #: Modes in which the arm may move.
 OPERATIONAL = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
-#: Modes that cut the power of the motors, as soon as the arm rests.
+#: Modes in which the power of the motors is cut, at the latest when the arm stands still.
 POWERLESS = frozenset(
     {
         SafetyMode.ROBOT_EMERGENCY_STOP,
@@ -98,7 +98,7 @@ _POWER_SEQUENCE = (RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE, Robo
 
 
 class SafetySystem:
-    """The mode of the safety system, and the time at which the mode began."""
+    """The safety mode, and the time at which it began."""
 
     def __init__(self, unlock_delay: float) -> None:
         """
@@ -133,7 +133,7 @@ class ArmPower:
     """The power of the arm: the present robot mode and the commanded robot mode."""
 
     def __init__(self, mode: RobotMode, power_on_time: float, brake_release_time: float) -> None:
-        """Begin in a robot mode; the two slow steps take these times [s]."""
+        """Begin in a robot mode; the steps to IDLE and to RUNNING take these times [s]."""
         self.mode = mode
         self._goal = mode
         self._times = {
@@ -148,7 +148,7 @@ class ArmPower:
         self._raise_goal(RobotMode.IDLE, now)
 
     def release_brakes(self, now: float) -> None:
-        """Go to RUNNING, through all modes before it."""
+        """Go to RUNNING, through the modes between."""
         self._raise_goal(RobotMode.RUNNING, now)
 
     def off(self) -> None:
@@ -161,6 +161,6 @@ class ArmPower:
         self._goal = max(self._goal, goal)
 
     def step(self, now: float) -> None:
-        """Go one mode towards the commanded mode when the time of the present mode is over."""
+        """Go one mode towards the commanded one, if the time of the present mode is over."""
         if self.mode < self._goal and now - self._since >= self._times[self.mode]:
             self.mode, self._since = _POWER_SEQUENCE[_POWER_SEQUENCE.index(self.mode) + 1], now

@@ -29,7 +29,7 @@ _PROPERTIES = ('stiffness', 'damping', 'friction')
 @dataclass(frozen=True, slots=True)
 class ContactBody:
     """
-    A body that is fixed in the robot's base.
+    A body that is fixed in the robot's base; all coordinates are in the base frame.
 
     :param shape: 'plane' = the half-space on the side of a plane away from its normal; 'box' = a
         box along the axes of the base.
@@ -89,7 +89,7 @@ class ContactBody:
         return replace(self, extent=scale(self.extent, 1.0 / length))
 
     def force(self, point: Vector3, velocity: Vector3) -> Vector3:
-        """Return the force [N] on a tool at a point [m] with a velocity [m/s]."""
+        """Return the force [N] of the body on a tool at a point [m] with a velocity [m/s]."""
         depth, normal = self._depth(point)
         if depth <= 0.0:
             return ZERO3
@@ -100,7 +100,7 @@ class ContactBody:
         return add(scale(normal, pressure), scale(sliding, -drag))
 
     def _depth(self, point: Vector3) -> tuple[float, Vector3]:
-        """Return the depth of a point in the body [m], and the normal of the nearest face."""
+        """Return a point's depth [m] (outside: negative) and the normal of the nearest face."""
         if self.shape == 'plane':
             return dot(subtract(self.place, point), self.extent), self.extent
         found: tuple[float, Vector3] = (float('inf'), ZERO3)

@@ -86,10 +86,10 @@ class ContactMotion:
     def __init__(self, motion: MotionGenerator, bodies: Sequence[ContactBody]) -> None:
         """Begin without contact and without force mode."""
         self._motion, self.bodies = motion, tuple(bodies)
-        #: Fraction of the remaining bend that happens in a cycle.
+        #: Fraction of the difference from the static bend that disappears in a cycle.
         self._share = motion.cycle / (motion.cycle + BENDING_TIME)
         self.force_mode: ForceMode | None = None
-        #: Factor of the compliance, set by programs.
+        #: Factor on :data:`COMPLIANCE`, set by programs.
         self.gain_scaling = 1.0
         #: Wrench of the bodies on the TCP, in base axes [N, Nm].
         self.wrench: Vector6 = ZERO6
@@ -102,17 +102,17 @@ class ContactMotion:
         #: The reason why the arm has to stop; None = no reason.
         self.fault: MotionFault | None = None
         self._zero: Vector6 = ZERO6
-        #: Displacement by force mode, in base axes.
+        #: Displacement by force mode, in base axes [m, rad].
         self._yielded: Vector6 = ZERO6
-        #: Rate of this displacement.
+        #: Rate of ``_yielded``.
         self._yield_rate: Vector6 = ZERO6
-        #: Bend of the arm, in base axes.
+        #: Bend of the arm under the contact forces, in base axes [m, rad].
         self._bent: Vector6 = ZERO6
         self._cycles_in_contact = 0
 
     @property
     def measured(self) -> Vector6:
-        """The wrench that the sensor measures, relative to the wrench when it was zeroed."""
+        """The wrench that the sensor measures, relative to the wrench at the last `zero`."""
         return subtract6(self.wrench, self._zero)
 
     def zero(self) -> None:
@@ -134,7 +134,8 @@ class ContactMotion:
         """
         Compute one cycle.
 
-        :param may_move: whether force mode can move the arm: with power, without pause or stop.
+        :param may_move: whether force mode can move the arm: it has power, and the program is
+            playing.
         """
         self.fault = None
         mode = self.force_mode
@@ -177,7 +178,7 @@ class ContactMotion:
         return (*force, 0.0, 0.0, 0.0)
 
     def _bend(self, wrench: Vector6, free: Sequence[bool] = (False,) * 6) -> None:
-        """Bend the arm along the axes that are not free; all values are in the same frame."""
+        """Bend the arm along the axes that are not compliant (``free``); all in one frame."""
         self._bent = vector6(
             0.0 if is_free else bent + self._share * (force / stiffness - bent)
             for is_free, bent, force, stiffness in zip(
@@ -220,7 +221,7 @@ class ContactMotion:
         self._yielded, self._bent = turned(to_base, yielded), turned(to_base, self._bent)
 
     def _yielding_target(self, rate: float) -> ArmState | None:
-        """Return the target displaced by force mode; if out of reach, the previous one."""
+        """Return the target displaced by force mode; if it is out of reach, the previous one."""
         motion, before = self._motion, self.target
         target, (x, y, z, *turn) = motion.T_base_tcp, self._yielded
         pose = Pose(
@@ -246,5 +247,5 @@ class ContactMotion:
 
 
 def turned(q: Quaternion, vector: Vector6) -> Vector6:
-    """Return a six-vector with both halves rotated."""
+    """Return a vector of two 3-vectors (twist, wrench) with both of them rotated."""
     return (*rotate(q, vector[:3]), *rotate(q, vector[3:]))

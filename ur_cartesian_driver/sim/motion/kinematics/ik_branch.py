@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Select the IK branch that is reached continuously from the current joints.
+Selects the IK branch that the arm reaches from its present joints without a jump.
 
 After a long step near a singularity, the solution on the other branch can be the nearest one, but
 an arm that passes the singularity swings round and stays on its branch. A step that changes the
@@ -22,9 +22,9 @@ from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import (
 )
 from ur_cartesian_driver.sim.motion.paths.move_paths import JointMovePath, MovePath, Setpoint
 
-# The remainder of a path is solved in at least this many steps.
+# The rest of a path, from the present pose to the end, is solved in at least this many steps.
 _WALK_STEPS = 8
-# If even a step of this fraction of the remainder fails, the joints would have to jump.
+# If even a step of this fraction of the rest fails, the joints would have to jump.
 _MIN_WALK_STEP = 1e-4
 # Steps are shortened until no step turns a joint by more than this angle [rad].
 _MAX_JOINT_STEP = 0.3
@@ -34,7 +34,7 @@ _FINE = 1e-5
 
 @dataclass(frozen=True, slots=True)
 class IkBranchTracker:
-    """Finds the joint positions that an arm reaches from its present joint positions."""
+    """Finds the joints that an arm reaches from its present joints ``q`` without a jump."""
 
     kinematics: JointKinematics
     q: Vector6
@@ -90,7 +90,9 @@ class IkBranchTracker:
         """
         Return the joints at the end of a step, which is halved while it changes the branch.
 
+        :param step: returns the set-point at a time from now [s].
         :param q: the joints at ``begin``; ``begin`` and ``end`` are times from now [s].
+        :param halvings: the largest number of times that the step is halved.
         """
         setpoint = step(end)
         after = self._nearest(setpoint, q)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The capabilities of the joints: inverse kinematics, speed and position limits, singularities."""
+"""Inverse kinematics of the simulated arm, with the limits of its joints and singularities."""
 
 from __future__ import annotations
 
@@ -80,8 +80,9 @@ class JointKinematics:
         """
         Return three numbers whose signs identify the branch.
 
-        The first is the distance [m] of the wrist centre in front of the shoulder, for the nominal
-        arm (a calibrated arm has the same sign); the others are the sines of elbow and wrist 2.
+        The first is the horizontal coordinate [m] of the wrist centre from the shoulder, in the
+        plane of the arm; it is computed for the nominal arm, because a calibrated arm has the same
+        sign. The others are the sines of elbow and wrist 2.
         """
         upper_arm, forearm, wrist = self._lengths
         angle = q[1] + q[2]
@@ -93,7 +94,7 @@ class JointKinematics:
 
     def overspeed_factor(self, q: Vector6, q_before: Vector6) -> float:
         """
-        Return the factor by which the step to ``q`` is too long for one cycle; inf = impossible.
+        Return the step to ``q`` as a multiple of the longest possible step; inf = impossible.
 
         A joint must not exceed its speed limit or the speed from which it can brake before the end
         of its range: v^2 = 2 a x.
@@ -181,9 +182,12 @@ class JointKinematics:
         self, move_path: MovePath, q: Vector6, T_tcp_flange: Pose, a: float, v: float
     ) -> ProfileParameters:
         """
-        Return the fractions ``a`` and ``v`` of the highest acceleration and speed of the joints.
+        Return profile parameters along a path that use fractions of the joint limits.
 
         The joint travel per path length is computed at a few samples of the path, from ``q`` on.
+
+        :param a: fraction of :data:`MAX_JOINT_ACCELERATION`; the jerk limit is used in full.
+        :param v: fraction of the speed limits of the joints.
         """
         step = move_path.length / _SAMPLES or 1.0
         speed = acceleration = inf
@@ -200,7 +204,7 @@ class JointKinematics:
                 acceleration = min(acceleration, MAX_JOINT_ACCELERATION / rate)
             q = after
         if speed == inf:
-            speed = acceleration = 1.0  # The move will fail at its beginning.
+            speed = acceleration = 1.0  # no sample can be reached: the move will fail
         jerk = acceleration * MAX_JOINT_JERK / MAX_JOINT_ACCELERATION
         return ProfileParameters(acceleration=a * acceleration, speed=v * speed, jerk=jerk)
 
@@ -212,7 +216,7 @@ def is_singular(q_before: Vector6, q: Vector6, before: Pose, pose: Pose) -> bool
 
 
 def max_joint_difference(a: Vector6, b: Vector6) -> float:
-    """Return the largest difference between positions of the same joint."""
+    """Return the largest absolute difference between values of the same joint."""
     return max(map(abs, subtract6(a, b)))
 
 

@@ -3,8 +3,9 @@
 """
 The motion of points of the arm, from joint speeds and accelerations.
 
-The controller reports the motion of some points (elbow, accelerometer, payload), which has to
-agree with the reported joints. All vectors are in base axes, in [m], [rad] and [s].
+The controller reports the motion of some points (elbow, accelerometer, payload). It is computed
+from the joints, so that it agrees with their reported motion. All vectors are in base axes, in
+[m], [rad] and [s].
 """
 
 from __future__ import annotations
