@@ -4,9 +4,9 @@
 URScript, the language of the robot's programs, without a robot.
 
 `parsing` turns text into tokens and a syntax tree, `compiling` resolves the names and turns the
-tree into Python code, and `running` runs them in threads, one controller cycle at a time, with
-the values of `script_values`. Builtins give a program access to a robot; the code that makes the
-interpreter provides them. `core_builtins` contains the builtins that need no robot.
+tree into Python code, and `running` runs this code in threads, one controller cycle at a time, on
+the values of `script_values`. Builtins give a program access to a robot; the code that makes a
+:class:`ScriptInterpreter` provides them. `core_builtins` contains the builtins that need no robot.
 """
 
 from ur_cartesian_driver.urscript.compiling.scopes import Builtin

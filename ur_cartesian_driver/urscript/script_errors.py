@@ -17,7 +17,7 @@ class CompileError(Exception):
     :param line: 1-based line in the text that was parsed.
     :param column: 1-based column of the offending token.
     :param text: the controller's own wording, as clients see it.
-    :param reason: one clause for people, such as what was expected.
+    :param reason: one clause for people, such as the token that was expected.
     """
 
     def __init__(self, line: int, column: int, text: str, reason: str) -> None:

@@ -34,7 +34,8 @@ INT_MIN = -(2**31)
 INT_MAX = 2**31 - 1
 #: Longest string that a controller makes.
 MAX_STRING = 1023
-#: The manual names no limit; without one a program could take all the memory.
+#: Largest number of items of a list, matrix or struct. The manual names no limit; without one a
+#: program could take all the memory.
 MAX_LIST_LENGTH = 100_000
 
 
@@ -114,7 +115,7 @@ def type_name(value: Value) -> str:
 NUMBERS = frozenset({int, float})
 
 
-#: The type of the items of most lists.
+#: The type of the items of most lists, as a set for quick checks.
 FLOATS = frozenset({float})
 
 
@@ -124,7 +125,7 @@ def is_number(value: Value) -> TypeGuard[int | float]:
 
 
 def copy(value: Value) -> Value:
-    """Return a value that shares nothing with the given one."""
+    """Return a copy that shares no list, matrix or struct with the value."""
     kind = type(value)
     if kind is list:
         return [copy(item) for item in value] if Struct in map(type, value) else value[:]
@@ -140,7 +141,7 @@ SIZED = frozenset({list, Matrix, Struct})
 
 
 def size_of(value: Value) -> int:
-    """Return the number of plain values that a value holds."""
+    """Return the number of numbers, texts and other plain values that a value holds."""
     kind = type(value)
     if kind not in SIZED:
         return 1
@@ -159,7 +160,7 @@ def work_on(a: Value, b: Value) -> int:
 
 
 def check_size(value: T) -> T:
-    """Return a value, or refuse a value that holds too many others, as nested structs can."""
+    """Return a value, or refuse one with more than ``MAX_LIST_LENGTH`` plain values."""
     if size_of(value) > MAX_LIST_LENGTH:
         raise RuntimeException(f'more than {MAX_LIST_LENGTH} items are not possible')
     return value

@@ -137,7 +137,7 @@ class ModbusBuiltins(BuiltinGroup):
 
     @without_effect
     def modbus_request_update_signal_value(self, signal_name: Value) -> None:
-        """Check the name of the signal, which a real robot would read at once."""
+        """Check the name; a real robot would read the signal at once."""
         self._signal(signal_name)
 
     @without_effect

@@ -3,7 +3,9 @@
 """
 Compiles syntax trees to Python code, once per program, so that a cycle costs little.
 
-Work is counted in nodes of the tree. Entering a block of statements pays for all its nodes.
+Work is counted in nodes of the syntax tree, because a thread may evaluate only so many in a cycle
+(its `fuel`). On entering a block of statements, the code takes the nodes of the block from the
+fuel: it pays for them.
 """
 
 from __future__ import annotations
@@ -53,7 +55,9 @@ def compile_program(
     """
     Compile a checked program.
 
-    :param known: the functions that exist already, by the identity of their scopes.
+    :param root: the scope of the program's body, from `resolve`.
+    :param known: the functions of a running program to which this one is added, by the identity
+        of their scopes.
     :param interleaves: whether threads may be switched between any two statements.
     :param prefix: first part of the names of all generated functions.
     :raises CompileError: loops are nested more deeply than Python allows.
@@ -83,7 +87,8 @@ def _function_code(scope: Scope, shared: Shared, names: Hashable) -> FunctionCod
     """
     Return the code of a function, from the cache if possible.
 
-    Clients send programs that differ in a constant or two, such as a port.
+    Many clients send programs that differ only in one or two constants, such as a port. Functions
+    without these constants are then found in the cache.
 
     :param names: the meanings of all names in the function, as a key of the cache; None = compile
         without the cache.
@@ -99,7 +104,7 @@ def _function_code(scope: Scope, shared: Shared, names: Hashable) -> FunctionCod
     return found
 
 
-#: Statements that leave a loop or the function around it.
+#: Jumps: statements that leave an iteration, a loop or the function around it.
 _BREAK, _CONTINUE, _RETURN = 'break', 'continue', 'return'
 
 
@@ -112,7 +117,7 @@ class _FunctionCompiler(ExpressionCompiler):
         self._parts: list[CodeType] = []
         #: Number of loops around the current statement in the current part.
         self._loops = 0
-        #: The jumps out of the current part; None = the current code is not in a part.
+        #: The jumps out of the current part (see `_part`); None = the code is not in a part.
         self._exits: set[str] | None = None
         #: Global variables that the current part assigns.
         self._assigned: set[str] = set()
@@ -231,7 +236,7 @@ class _FunctionCompiler(ExpressionCompiler):
         return self.node(ast.Return, self.constant(jump))
 
     def _statement_at_switch(self, node: tree.Statement) -> tuple[list[ast.stmt], int]:
-        """Compile a statement, after a place for a thread switch; return the code and its cost."""
+        """Compile a statement, after a point where threads can switch; return code and cost."""
         if isinstance(node, tree.LabelStatement | tree.FunctionDefinition):
             return [], 0
         python, weight = self._statement(node)

@@ -3,9 +3,9 @@
 """
 Compiles URScript expressions to Python expressions.
 
-Numbers are nearly always floats, so an operation on two of them is Python's own; everything else
-is a call of one of the `operations`. Lists are values in this language: a list that is stored,
-passed or returned is copied if it may also be stored elsewhere.
+Numbers are nearly always floats, so the code checks for two floats and then uses Python's own
+operation; for all other values it calls one of the `operations`. Lists are values in URScript: a
+list that is stored, passed or returned is copied if it may also be stored elsewhere.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ class ExpressionCompiler(PythonWriter):
         return CompiledExpression(self.call('truth', code.python), code.weight, is_truth=True)
 
     def copied(self, node: tree.Expression) -> CompiledExpression:
-        """Compile an expression whose value will be stored or passed on."""
+        """Compile an expression whose value will be stored or passed on: a list is copied."""
         if isinstance(node, tree.CallExpression) and self._scope.function(node.function) is None:
             call = self._builtin_call(node)
             self.at(node)
@@ -162,7 +162,7 @@ class ExpressionCompiler(PythonWriter):
         return self.keep(name, code.python), self.name(name)
 
     def variable(self, name: str, qualifier: str = '') -> str:
-        """Return the name of a variable in the code."""
+        """Return the name of a URScript variable in the generated code."""
         if name in self._scope.locals and qualifier != 'global':
             return local_name(name)
         return global_name(name)
@@ -240,7 +240,7 @@ class ExpressionCompiler(PythonWriter):
         return CompiledExpression(self.choose(is_quick, quick, slow), weight, is_truth)
 
     def _is_fixed(self, code: CompiledExpression) -> bool:
-        """Return whether only the compiled function itself can change the value of simple code."""
+        """Return whether the code is a constant or a local: no other function can change it."""
         return isinstance(code.python, ast.Constant) or (
             isinstance(code.python, ast.Name) and not code.python.id.startswith('g_')
         )
@@ -254,7 +254,7 @@ class ExpressionCompiler(PythonWriter):
         right_is_simple: bool,
     ) -> ast.expr | None:
         """
-        Return the condition for Python's own operation; None if both operands are constants.
+        Return the condition under which Python's own operation applies; None = two constants.
 
         The condition also evaluates both operands.
         """

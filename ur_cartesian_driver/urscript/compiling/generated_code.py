@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Python code generated from a program, and the way back from it to the program's text.
+Python code generated from a program, and the positions in the program's text that it keeps.
 
 Each function and thread of a program becomes a Python function; if it can take time, a generator
 function. The instructions have the lines and columns of the program's text, so an error or a call
@@ -28,12 +28,12 @@ FILE_NAME = '<URScript>'
 MAX_CALL_DEPTH = 100
 
 #: A thread yields SWITCH to let another thread run in the same controller cycle; it yields None to
-#: take time.
+#: wait for the next cycle.
 SWITCH = object()
 
 #: The steps of a thread. Each step ends when the thread takes time or lets another thread run.
 ScriptSteps = Generator[Any, None, Value]
-#: Line and column.
+#: Line and column in the program's text, from 1; 0, 0 = unknown.
 Place = tuple[int, int]
 
 
@@ -53,7 +53,7 @@ class GeneratedFunction:
 class FunctionCode:
     """The code of a function and of its parts."""
 
-    #: Each defines a Python function when executed.
+    #: Executing a unit defines a Python function: the function itself, or a part of it.
     units: Sequence[CodeType]
     #: Immutable values that the code looks up by name.
     constants: dict[str, Value]
@@ -61,7 +61,7 @@ class FunctionCode:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GeneratedCode:
-    """The code of a program or line. It holds no state, so any number of interpreters run it."""
+    """The code of a program or line. It holds no state, so many interpreters can run it."""
 
     scope: Scope
     main: GeneratedFunction
@@ -86,14 +86,14 @@ def local_name(variable: str) -> str:
 
 
 def place_of_call(frame: FrameType | None) -> Place:
-    """Return the place in the innermost generated code among a frame and its callers."""
+    """Return the position of the innermost generated code among a frame and its callers."""
     while frame is not None and frame.f_code.co_filename != FILE_NAME:
         frame = frame.f_back
     return (0, 0) if frame is None else _place(frame.f_code, frame.f_lasti)
 
 
 def place_of_steps(steps: ScriptSteps) -> Place:
-    """Return the place in generated code at which a thread waits; 0, 0 = it does not wait."""
+    """Return the position at which a thread waits; 0, 0 = it does not wait."""
     place = (0, 0)
     inner: Iterator[Any] | None = steps
     while isinstance(inner, GeneratorType):
@@ -104,7 +104,7 @@ def place_of_steps(steps: ScriptSteps) -> Place:
 
 
 def runtime_exception(error: Exception) -> RuntimeException:
-    """Turn an error of generated code or its callees into a runtime exception with a place."""
+    """Return the runtime exception, with its position, for an error of generated code."""
     traceback, innermost = error.__traceback__, None
     while traceback is not None:
         if traceback.tb_frame.f_code.co_filename == FILE_NAME:
@@ -138,7 +138,7 @@ def _place(code: CodeType, instruction: int) -> Place:
 
 
 def _called(code: CodeType, place: Place) -> str:
-    """Return the name of the builtin or method that is called at a place."""
+    """Return the name of the builtin or method that is called at a position."""
     for instruction in dis.get_instructions(code):
         positions, name = instruction.positions, instruction.argval
         if positions and (positions.lineno, positions.col_offset) == place:

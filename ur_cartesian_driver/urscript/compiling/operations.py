@@ -3,8 +3,8 @@
 """
 Operations for generated code, where Python's own operations differ from the language.
 
-Each operation pays for the items of long values, because these take longer than one node of the
-tree.
+Each operation pays for the items of long values: it takes them from the thread's `fuel`, because
+they take longer than one node of the tree.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Runtime(Protocol):
     in_critical_section: bool
 
     def exceed_budget(self) -> NoReturn:
-        """Raise an error: the thread used up its budget without yielding."""
+        """Raise the error of a thread that used up its fuel without yielding."""
 
     def switches_now(self) -> bool:
         """Return whether another thread runs before the next statement."""
@@ -65,7 +65,7 @@ class Runtime(Protocol):
 
 
 def operations(runtime: Runtime) -> dict[str, Any]:
-    """Return the operations by name, as global names for generated code."""
+    """Return the operations, and other values that generated code uses, by global name."""
 
     def pay(items: int) -> None:
         runtime.fuel -= items
@@ -105,7 +105,7 @@ def operations(runtime: Runtime) -> dict[str, Any]:
         """Call a method; if the result is a generator, the call takes time."""
         if isinstance(target, values.RemoteObject):
             return target.call(method, arguments)
-        # Shifting the items of a list is quicker than copying them.
+        # Shifting the items of a list is quicker than copying them: 16 items cost one node.
         pay(values.size_of(target) // 16)
         return call_method(target, method, arguments)
 
@@ -170,5 +170,5 @@ def _halt() -> NoReturn:
 
 
 def _refuse_depth() -> NoReturn:
-    """Raise the error for calls nested too deeply, at the place of the call."""
+    """Raise the error for calls nested too deeply, with the position of the call."""
     raise recursion_error(*place_of_call(sys._getframe(2)))

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Makes nodes of Python's syntax tree with the places of the program's nodes."""
+"""Makes nodes of Python's syntax tree with the positions of the program's nodes."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _LOAD, _STORE = ast.Load(), ast.Store()
 
 
 class PythonWriter:
-    """Makes nodes at the place of a program's node; `at` chooses that node."""
+    """Makes Python nodes with the position of a program's node, which `at` chooses."""
 
     def __init__(self) -> None:
-        #: Position arguments of the next nodes.
+        #: The position of the next nodes, as arguments.
         self._place: dict[str, Any] = {}
 
     def at(self, node: tree.SyntaxNode) -> None:
-        """Set the place of all nodes made from now on."""
+        """Make all further nodes with the position of this node."""
         line, column = node.line, node.column
         self._place = {
             'lineno': line, 'col_offset': column, 'end_lineno': line, 'end_col_offset': column,
@@ -96,14 +96,14 @@ class PythonWriter:
         return self.node(ast.If, condition, then, list(otherwise))
 
     def runtime(self, name: str, context: ast.expr_context = _LOAD) -> ast.Attribute:
-        """Return an attribute of the runtime."""
+        """Return an attribute of the interpreter, which is a global of the generated code."""
         return self.node(ast.Attribute, self.name('runtime'), name, context)
 
     def set_runtime(self, name: str, value: ast.expr) -> ast.stmt:
         return self.node(ast.Assign, [self.runtime(name, _STORE)], value)
 
     def pay(self, weight: int) -> ast.stmt:
-        """Return code that spends fuel."""
+        """Return code that takes ``weight`` from the thread's fuel."""
         fuel = self.runtime('fuel', _STORE)
         return self.node(ast.AugAssign, fuel, ast.Sub(), self.constant(weight))
 

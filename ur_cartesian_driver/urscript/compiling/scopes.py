@@ -11,7 +11,7 @@ wherever the text defines them, but not the locals of the enclosing function. If
 function twice, the later definition applies, because an exported program can include a file twice.
 
 The same walk finds unknown names, calls with wrong arguments, and the functions that can take
-time: only these functions need a Python generator.
+time, because only these have to become Python generators.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Scope:
 
     @property
     def body(self) -> tree.StatementBlock:
-        """The statements."""
+        """The statements of the function, or of the program's body."""
         return self.owner.body
 
     def function(self, name: str) -> Scope | None:
@@ -122,7 +122,7 @@ def _declare_global(scope: Scope, node: tree.AssignStatement, name: str) -> None
 
 
 def _assign_locals(scope: Scope) -> None:
-    """Collect the parameters and the local variables."""
+    """Collect the parameters and local variables of a function; a program's body has none."""
     if scope.definition is None:
         return
     scope.locals.update(parameter.name for parameter in scope.definition.parameters)

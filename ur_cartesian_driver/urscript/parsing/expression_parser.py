@@ -35,7 +35,7 @@ class ExpressionParser(TokenReader):
 
     def _expression(self, lowest: int = 1) -> tree.Expression:
         """
-        Read operand { operator operand }, left-associative.
+        Read operand { operator operand }; operators of one precedence associate to the left.
 
         :param lowest: operators of lower precedence end the expression.
         """

@@ -134,7 +134,7 @@ class Parser(ExpressionParser):
         Read { statement }, up to one of the keywords that close it.
 
         If an `end` is missing, the text does not show which block lacks it. So the error names the
-        first block whose `end` is not indented like the block's beginning.
+        first block whose `end` is not indented like the first line of the block.
 
         :param start: the token that began the block.
         """

@@ -46,7 +46,8 @@ class ConstantExpression(Expression):
     """A number, a string, True, False or None."""
 
     value: int | float | str | bool | None
-    #: The type of the value: 1, 1.0 and True are equal in Python, but not the same constant.
+    #: The type of the value, so that the nodes of 1, 1.0 and True are not equal, as the values
+    #: are.
     kind: str = field(init=False)
 
     def __post_init__(self) -> None:
@@ -55,7 +56,7 @@ class ConstantExpression(Expression):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NameExpression(Expression):
-    """A variable that is read, or is assigned to if it is the target of an assignment."""
+    """A variable: the target of an assignment, or else read."""
 
     identifier: str
 

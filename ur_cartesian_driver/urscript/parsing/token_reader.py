@@ -24,14 +24,14 @@ T = TypeVar('T')
 
 
 class SourcePosition(TypedDict):
-    """The arguments of a node that give its position."""
+    """The position of a node, as keyword arguments of its class."""
 
     line: int
     column: int
 
 
 def source_position(token: Token) -> SourcePosition:
-    """Return the position of a token, as arguments for a node."""
+    """Return the position of a token, as keyword arguments for a node."""
     return SourcePosition(line=token.line, column=token.column)
 
 
@@ -89,7 +89,7 @@ class TokenReader:
 
     @contextmanager
     def _nested(self) -> Iterator[None]:
-        """Go one level deeper, within MAX_NESTING."""
+        """Count one level of nesting; raise an error beyond MAX_NESTING levels."""
         self._nesting += 1
         if self._nesting > MAX_NESTING:
             raise self.error(f'more than {MAX_NESTING} levels inside one another')

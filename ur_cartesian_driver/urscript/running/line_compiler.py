@@ -23,7 +23,7 @@ from ur_cartesian_driver.urscript.script_errors import CompileError
 
 
 class LineRuntime(Protocol):
-    """The interpreter that runs the program."""
+    """The interpreter that runs the program, as the line compiler uses it."""
 
     interleaves: bool
 
@@ -39,7 +39,7 @@ class LineRuntime(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class CompiledLine:
-    """A line that can run once, in a thread of the program."""
+    """A compiled line; its steps can run once, in a thread of the program."""
 
     steps: ScriptSteps
     #: Names of the functions that its outermost statements call.
@@ -71,7 +71,7 @@ class LineCompiler:
 
     def compile(self, text: str) -> CompiledLine:
         """
-        Compile a line without running it; later lines know its functions from now on.
+        Compile a line without running it; later lines know its variables and functions.
 
         :raises CompileError: the text is not a line, has an unknown name, or has a call with wrong
             arguments.

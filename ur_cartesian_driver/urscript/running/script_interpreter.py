@@ -8,12 +8,13 @@ it ends or takes time: in a builtin that yields, in `join`, or in `pause`. A new
 same frame, after the threads that were started before it. Nothing else switches threads. A thread
 that evaluates more nodes than its budget in one frame ends the program with an error.
 
-The manual guarantees less than this, so two settings make the order of threads less certain. With
-`thread_delay` a new thread begins some frames later. With `interleaving` threads take turns at
-random: in a random order, between any two statements, and before an assignment stores its value in
-a global variable, except in a critical section. A critical section is not a lock; it only stops
-these switches. If a thread takes time in one, the other threads run and can enter critical
-sections, too. A thread that is killed in one blocks no other thread.
+The manual does not guarantee this order. For tests of programs that must not depend on it, two
+settings change the order. With `thread_delay` a new thread begins some frames later. With
+`interleaving` threads take turns at random: in a random order, between any two statements, and
+before an assignment stores its value in a global variable, except in a critical section. A
+critical section is not a lock; it only stops these switches. If a thread takes time in one, the
+other threads run and can enter critical sections, too. A thread that is killed in one blocks no
+other thread.
 
 The program ends when its main thread ends, and all other threads end with it. When a thread ends
 by itself, the threads that it started continue; when it is killed, they are killed, too.
@@ -51,8 +52,8 @@ BUDGET_EXCEEDED = (
     'The program used too much time without instructing the robot what to do. '
     'Consider using a Wait or sync() in the loop.'
 )
-#: The manual gives no limit; without one, threads that start threads would soon use all time and
-#: memory.
+#: Largest number of threads of a program. The manual gives no limit; without one, threads that
+#: start threads would soon use all time and memory.
 MAX_THREADS = 256
 #: Probability of a thread switch at each place where one is possible.
 SWITCH_PROBABILITY = 0.1
@@ -125,6 +126,7 @@ class ScriptInterpreter:
         self.paused = False
         #: The runtime exception that ended the program; None = no exception.
         self.error: RuntimeException | None = None
+        #: Number of nodes that the running thread may still evaluate in this frame.
         self.fuel = 0
         self.interleaves = interleaving is not None
         self._random = interleaving
@@ -208,7 +210,7 @@ class ScriptInterpreter:
             self._names.pop(name, None)
 
     def step(self) -> None:
-        """Run one frame: every live thread until it yields or ends."""
+        """Run one frame: every live thread until it takes time or ends."""
         if self.paused:
             return
         for thread in self._threads:
@@ -289,7 +291,7 @@ class ScriptInterpreter:
             self._end(thread)
 
     def _end(self, thread: _Thread) -> None:
-        """End a thread as the current thread, so that builtins clean up for it."""
+        """End a thread; it is the current thread while its builtins clean up."""
         thread.alive = False
         previous, self._current = self._current, thread
         try:
@@ -313,11 +315,11 @@ class ScriptInterpreter:
         self._running_thread.in_critical_section = value
 
     def exceed_budget(self) -> NoReturn:
-        """Raise an error: the thread used up its budget without yielding."""
+        """Raise the error of a thread that used up its budget without yielding."""
         raise RuntimeException(BUDGET_EXCEEDED)
 
     def switches_now(self) -> bool:
-        """Return whether another thread runs before the next statement."""
+        """Decide at random whether another thread runs before the next statement."""
         return (
             self._random is not None
             and not self.in_critical_section
@@ -325,7 +327,11 @@ class ScriptInterpreter:
         )
 
     def spawn(self, function: ThreadFunction) -> ThreadHandle:
-        """Start a thread; without a delay it can run in this frame."""
+        """
+        Start a thread; without a delay it can run in this frame.
+
+        :raises RuntimeException: the program is secondary, or has too many threads.
+        """
         if self._is_secondary:
             raise RuntimeException('A secondary program cannot start threads.')
         if len(self._threads) >= MAX_THREADS:
