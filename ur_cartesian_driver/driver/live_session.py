@@ -258,8 +258,8 @@ def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
         ),
         workspace=LiveWorkspace(
             planes=parse_planes(options.workspace_planes),
-            # The cylinders around the links are thicker than the arm, so that cylinders that
-            # touch need not mean a collision. They are checked only if goals are refused for it.
+            # The cylinders around the links are thicker than the arm, so the arm may be clear
+            # although they touch. They are checked only if goals are refused for this, too.
             min_clearance=options.min_clearance if options.self_collision == 'refuse' else None,
             tool_radius=options.tool_radius,
             cell=options.cell,

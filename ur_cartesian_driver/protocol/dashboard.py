@@ -122,7 +122,7 @@ COMMAND_SPECS: Mapping[str, CommandSpec] = {
 #: Patterns for the valid values of some replies, mainly of replies that are only a value.
 _VALUE_PATTERNS: Mapping[str, re.Pattern[str]] = {
     'running': re.compile('true|false'),
-    # The page for CB robots has True and False.
+    # The manual for CB robots writes True and False.
     'isProgramSaved': re.compile(r'(?i:true|false)(?: .*)?'),
     'programState': re.compile(r'(?:STOPPED|PLAYING|PAUSED)(?: .*)?'),
     'version': re.compile(r'\d+(?:\.\d+){1,3}'),
@@ -274,8 +274,9 @@ class DashboardServerCodec:
         """
         Take bytes from a client (``b''`` = end of stream) and return its commands.
 
-        Capital letters make no difference in the name of a command. A line that is not a command
-        is returned as text; such a line needs a reply, too (:func:`not_understood`).
+        Capital letters make no difference in the name of a command. A line that is not a command,
+        or whose argument is wrong, is returned as text; it needs a reply, too
+        (:func:`not_understood`).
 
         :raises RemoteProtocolError: a line is too long, or the stream ended inside one.
         """

@@ -259,7 +259,8 @@ class MotionRunner:
         """
         Pass an event to the running motion's machine, and carry out the machine's commands.
 
-        If no motion runs, a robot state goes to the :class:`TcpRestorer`.
+        If no motion runs, a robot state goes to the :class:`TcpRestorer`. Then the newest state is
+        published.
         """
         if self._machine is not None:
             self._step(self._machine, event)

@@ -76,7 +76,7 @@ class BodyLayout:
         parts = []
         for (layout, is_text), value in zip(self._items, values, strict=True):
             if is_text:
-                text = value.encode(errors='replace')  # a lone surrogate has no bytes
+                text = value.encode(errors='replace')  # a lone surrogate cannot be encoded
                 parts.append((pack(layout, len(text)) if layout.size else b'') + text)
             else:
                 parts.append(pack(layout, *_flat(value)))

@@ -337,9 +337,9 @@ _OPTIMOVES = frozenset((*_TYPES[OptimoveJ], *_TYPES[OptimoveL]))
 
 def motion_type(primitive: Instruction) -> MotionType:
     """
-    Return the motion type for the class of a primitive and the kind of its target (and via).
+    Return the motion type of an instruction, by its class and the kind of its target (and via).
 
-    :raises LocalProtocolError: the instruction is neither a primitive nor an output.
+    :raises LocalProtocolError: the instruction is no primitive, stop, output or law.
     """
     if isinstance(primitive, OutputRecord):
         return MotionType.SWITCH_OUTPUT

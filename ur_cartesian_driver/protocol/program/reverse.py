@@ -68,7 +68,7 @@ class ControlMode(IntEnum):
 
 
 class TrajectoryAction(IntEnum):
-    """Word 1 in FORWARD mode."""
+    """Word 1 in the modes FORWARD and BUFFERED_SERVO."""
 
     CANCEL = -1
     #: Only keeps the program alive.

@@ -78,7 +78,7 @@ class SafeOutputsAction(IntEnum):
 
     #: Forget the outputs.
     DISARM = 0
-    #: Remember the outputs, and set them once in the next stop.
+    #: Remember the outputs and their safe values, and set them once, in the next stop.
     ARM = 1
     #: Set the outputs now, and forget them.
     SET = 2

@@ -176,7 +176,8 @@ class RtdeClientCodec:
         :param frequency: rate of the packages [Hz]; 0 = the controller's highest.
         :param optional_outputs: outputs that the controller may lack.
         :param lower_registers: whether to request the registers 0 to 23 in place of 24 to 47.
-        :raises LocalProtocolError: no outputs, a duplicate name, or an impossible frequency.
+        :raises LocalProtocolError: no outputs, a duplicate name, or a frequency outside 0 to
+            500 Hz.
         """
         for names in (outputs, inputs):
             duplicates = sorted({name for name in names if list(names).count(name) > 1})
