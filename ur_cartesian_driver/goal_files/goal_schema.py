@@ -157,7 +157,7 @@ def _fields(values: object, schema: Mapping[str, Any], key: str) -> SimpleNamesp
 
 
 def default(schema: Any) -> Any:
-    """Return the default of a field with a schema."""
+    """Return the default value of a field that has this schema."""
     if isinstance(schema, dict):
         return SimpleNamespace(**{name: default(kind) for name, kind in schema.items()})
     if isinstance(schema, list):

@@ -47,7 +47,7 @@ def fields_of_goal(goal: Goal, *, packed: bool = False) -> Fields:
 
 
 def _record(kind: type, record: Any) -> Fields:
-    """Return the fields of an object of a goal dataclass."""
+    """Return the message fields of ``record``, an object of the goal dataclass ``kind``."""
     written: Fields = {}
     for each in in_order_of_files(goal_fields(kind)):
         _write(each, getattr(record, each.name), written)
@@ -55,7 +55,7 @@ def _record(kind: type, record: Any) -> Fields:
 
 
 def _rows(rows: GoalRows[Any]) -> list[Fields]:
-    """Return the fields of each row."""
+    """Return the message fields of each row."""
     written: list[Fields] = [{} for _ in range(len(rows))]
     columns = {each.field.name: each for each in rows.columns()}
     for each in in_order_of_files(goal_fields(rows.kind)):
@@ -65,7 +65,11 @@ def _rows(rows: GoalRows[Any]) -> list[Fields]:
 
 
 def _write(each: GoalField, value: Any, fields: Fields) -> None:
-    """Add a value to ``fields``, unless it is the default of an optional field (NaN never is)."""
+    """
+    Add a value to ``fields``, unless it is the default of an optional field.
+
+    NaN equals no default, so it is always added.
+    """
     default = each.default if each.has_default else 0
     if value == default and not each.is_always_sent:
         return

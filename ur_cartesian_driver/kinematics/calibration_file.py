@@ -9,9 +9,9 @@ x y z, and roll pitch yaw of R = Rz(yaw) Ry(pitch) Rx(roll). Each joint turns ab
 The DH frames of a calibrated arm make poor link frames. Its axes of shoulder lift, elbow
 and wrist 1 are so nearly parallel that their common normals may lie hundreds of metres away. But
 Rz(q) commutes with shifts along z and with turns about z, so a frame may lie anywhere on its axis,
-turned by any constant angle, and the chain stays the same for all q. Upper arm and forearm are
-placed as documented for ``ur_calibration`` of the UR ROS 2 driver (its "Calibration correction
-algorithm"), so both tools write the same poses.
+turned by any constant angle, and the chain stays the same for all q. The frames of upper arm and
+forearm are placed as documented for ``ur_calibration`` of the UR ROS 2 driver (its "Calibration
+correction algorithm"), so both tools write the same poses.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _MASK = 2**64 - 1
 
 def calibration_text(geometry: DhTable) -> str:
     """
-    Return the file of an arm.
+    Return the text of the calibration file of an arm.
 
     :param geometry: the DH table that the robot reports.
     :raises ValueError: the flange of the table is off the last axis.

@@ -52,7 +52,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 _RIM = 16
 # A mesh is convex if no vertex is farther than this outside the plane of a triangle [m].
 _FLAT = 2e-5
-# Rows that are bounded at a time, so few that their arrays stay in the CPU cache.
+# Number of rows whose lower bounds are computed at once; few, to keep arrays in the CPU cache.
 _ROWS = 256
 # Distances are cut off this much above the bound, so that rounding brings none below it [m].
 _ROUNDING = 1e-9
@@ -198,7 +198,7 @@ class CellDistances:
         return result
 
     def _bound(self, poses: Floats, result: Floats) -> None:
-        """Write the bounds of some rows."""
+        """Write the lower bounds (n, pairs) at ``poses`` into ``result``."""
         rotation, origin = _carrier_frames(poses)
         carriers = self._carriers_of_centres
         points = np.einsum('nkij,kj->nki', rotation[:, carriers], self._centres)
@@ -384,7 +384,7 @@ def _link_solid(shape: LinkShape) -> Solid:
 
 
 def _is_convex(mesh: Mesh) -> bool:
-    """Return whether no vertex of a mesh is outside the plane of a triangle."""
+    """Return whether no vertex is outside the plane of a triangle by more than ``_FLAT``."""
     corners = mesh.vertices[mesh.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]

@@ -58,7 +58,7 @@ class ChainFramesOf(Generic[N]):
     z: tuple[N, N, N]
 
     def point(self, in_flange: Vector3) -> tuple[N, N, N]:
-        """Return the position of a point of the flange frame [m]."""
+        """Return the position in base [m] of a point that is given in the flange frame [m]."""
         a, b, c = in_flange
         x, y, z = (
             p + a * x + b * y + c * z
@@ -193,7 +193,11 @@ class Arm:
 
 
 def table_frames(geometry: DhTable) -> list[Pose]:
-    """Return ``T_base_frame`` after theta and d of each DH row, with all joints at 0."""
+    """
+    Return a frame for each DH row, ``T_base_frame``, with all joints at 0.
+
+    The frame includes the row's theta and d, but not yet its a and alpha: it is on the row's axis.
+    """
     T, frames = IDENTITY, []
     for link in _links(geometry):
         half = 0.5 * link.theta
@@ -231,7 +235,7 @@ def pose_error(
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = frames.x, frames.y, frames.z
     (px, py, pz), (x, y, z) = frames.position, position
-    # Half the sum of axis x target axis.
+    # Half the sum of the cross products of each flange axis with the same axis of the target.
     ex = (xy * r31 - xz * r21) + (yy * r32 - yz * r22) + (zy * r33 - zz * r23)
     ey = (xz * r11 - xx * r31) + (yz * r12 - yx * r32) + (zz * r13 - zx * r33)
     ez = (xx * r21 - xy * r11) + (yx * r22 - yy * r12) + (zx * r23 - zy * r13)

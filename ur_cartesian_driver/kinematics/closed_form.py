@@ -154,7 +154,11 @@ def _elbow_angles(
 
 
 def _roots(square: float, slack: float) -> tuple[float, ...]:
-    """Return the roots, positive first; () if the square is below 0 by more than ``slack``."""
+    """
+    Return the roots, positive first; () if the square is below 0.
+
+    A square below 0 by no more than ``slack`` or ``FLANGE_ROUNDING`` is not refused.
+    """
     if square < -max(slack, FLANGE_ROUNDING):
         return ()
     square = max(square, 0.25 * slack)

@@ -3,9 +3,9 @@
 """
 Collision bodies of the arm: a few cylinders per link, for many configurations at once.
 
-A preflight checks tens of thousands of configurations for collisions of the arm with itself and
-with planes. Cylinders allow this in numpy for every model. They contain the true shape: if the
-cylinders do not collide, the arm does not. If they do, the arm may still be free;
+The preflight of a goal checks tens of thousands of configurations for collisions of the arm with
+itself and with planes. Cylinders allow this in numpy for every model. They contain the true shape:
+if the cylinders do not collide, the arm does not. If they do, the arm may still be free;
 :mod:`~.collision_meshes` decides exactly for the models that have meshes.
 
 All joint housings are cylinders about their own joint's axis, and all tubes run from axis to axis.
@@ -464,7 +464,7 @@ def _dot(u: Floats, v: Floats) -> Floats:
 
 
 def _link_bodies(size: BodySizes) -> list[_LinkBody]:
-    """Return the bodies of a size, in metres."""
+    """Return the bodies of an arm of this size, in metres."""
     bodies = []
     for (link, kind, axis), row in zip(_BODIES, size.rows, strict=True):
         if row is None:

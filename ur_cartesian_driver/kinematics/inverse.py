@@ -48,7 +48,7 @@ _MAX_JOINT_STEP = 0.5
 MIN_DAMPING = 1e-14
 # Another solution may be close if the smallest singular value of the Jacobian is below this.
 _NEARLY_SINGULAR = 0.05
-# Another solution may be close if the sine of theta5 is below this.
+# The twin of a straight wrist, half a turn away, is searched if the sine of theta5 is below this.
 _NEARLY_STRAIGHT = 0.1
 # Largest distance from a solution to its twin (see _twins) at which the twin is searched [rad].
 _MAX_TWIN_DISTANCE = 0.6

@@ -184,7 +184,7 @@ def _on_branch(
 
 
 def _within_limits(arm: Arm, q: Floats, q_near: Floats, max_step: Floats) -> tuple[Floats, Flags]:
-    """Return the rows clipped to the limits, and whether each is certain to be the nearest."""
+    """Return q clipped to the limits, and whether each row is certainly nearest to ``q_near``."""
     # Triangle inequality: if two branches are a distance apart, and one of them is within half
     # this distance of the previous configuration, it is the nearer one.
     change = q - q_near

@@ -129,7 +129,7 @@ class RobotModel:
 
     def limited_to(self, limits: JointLimits) -> RobotModel:
         """
-        Return the model with those limits of a controller that are tighter.
+        Return the model with those limits of a controller that are tighter than the model's.
 
         Limits that no joint can have (an empty range, no speed, NaN) are ignored.
         """

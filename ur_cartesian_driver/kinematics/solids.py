@@ -71,7 +71,7 @@ class CarrierFrames(NamedTuple):
         return cls(rotation, poses[:, :3])
 
     def local(self, points: Floats) -> Floats:
-        """Return points (n, k, 3) of base in this frame."""
+        """Return points (n, k, 3), given in base, in the frame of the carrier."""
         inside: Floats = np.matmul(points - self.origin[:, None], self.rotation)
         return inside
 

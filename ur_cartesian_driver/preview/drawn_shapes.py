@@ -14,15 +14,15 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 
 #: Side of the square that stands for a half-space [m].
 SQUARE_SIDE = 1.6
-#: Largest number of triangles of all meshes of a cell together, which they share equally; but each
-#: may have this smaller number at least.
+#: Largest number of triangles of all meshes of a cell together. Each mesh may have an equal share,
+#: or the second number if that is larger.
 MAX_TRIANGLES, _MIN_TRIANGLES = 20_000, 100
 #: Factor by which the cubes of the raster grow, from try to try, until few triangles are left.
 _COARSER = 1.3
 
 
 def triangles_per_mesh(cell: Cell) -> int:
-    """Return the largest number of triangles that each mesh of a cell is drawn with."""
+    """Return the largest number of triangles with which each mesh of a cell is drawn."""
     meshes = sum(isinstance(placed.shape, Mesh) for body in cell.bodies for placed in body.shapes)
     return max(_MIN_TRIANGLES, MAX_TRIANGLES // max(1, meshes))
 

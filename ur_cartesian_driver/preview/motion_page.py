@@ -126,7 +126,11 @@ def motion_page(plan: Plan, arm: Arm, options: PlanningOptions = NO_BODIES) -> s
 
 
 def _cells(plan: Plan, preview: Preview, arm: Arm, cell: Cell) -> dict[int, Cell]:
-    """Return the cell by the row of the preview from which it holds, until a part change."""
+    """
+    Return the cell at the start and after each part change.
+
+    The keys are the rows of the preview at which these cells begin to hold.
+    """
     cells = {0: cell}
     if not cell:  # no cell was given, so the changes of its parts are not drawn
         return cells
@@ -353,7 +357,7 @@ def _waypoints(plan: Plan) -> Iterator[tuple[int, Floats]]:
 
 
 def _outputs(plan: Plan) -> Iterator[tuple[str, Floats]]:
-    """Yield a text and the place for each output, wait for an input and call."""
+    """Yield a text and a position for each output, each wait for an input and each call."""
     for segment in plan.segments:
         stop = segment.primitive
         if not (segment.outputs or isinstance(stop, AwaitInput | CallFunction)):

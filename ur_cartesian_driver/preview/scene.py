@@ -100,7 +100,7 @@ class Scene:
         return REFUSED if name in self._touching else otherwise
 
     def set_tool(self, tcp: Pose) -> None:
-        """Draw the tool from flange to TCP, and the bodies, in place of the previous ones."""
+        """Draw the tool from flange to TCP in place of the last one; move bodies on the TCP."""
         T_link_tcp = self._frames.flange @ tcp
         reach = np.array([self._frames.flange.position, T_link_tcp.position])
         self._scene.add_line_segments(
@@ -278,7 +278,7 @@ class Scene:
 @contextmanager
 def serve(planes: Sequence[Plane], host: str = '127.0.0.1', port: int = 0) -> Iterator[Server]:
     """
-    Run a server of viser with floor and planes.
+    Run a viser server in a `with` block; its scene has a floor and the planes.
 
     :param port: the first port to try; 0 = any, for a server that only records a scene.
     :raises ImportError: viser is not installed; the text says how to get it.
