@@ -251,7 +251,8 @@ class PlanningOptions:
         check_parameters(self)
         parse_planes(self.workspace_planes)
         parse_safe_outputs(self.safe_outputs)
-        # replace() reads a file again only if the name of the file changes.
+        # replace() comes here, too. So a file is read again only if its name has changed, and not
+        # at all if its values were given in code.
         lead_file, twin_file, cell_file = self.read_files
         if self.lead_file != lead_file and (lead_file or not self.leads):
             object.__setattr__(self, 'leads', _read_leads(self.lead_file))

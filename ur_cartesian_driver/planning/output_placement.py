@@ -48,7 +48,8 @@ def place_outputs(
         several points [s]; None = each point is at the end of a motion.
     :param control_cycle: cycle of the controller [s], needed for pulses only.
     :param to_tcp: see :class:`TimedPath`.
-    :raises InvalidGoal: no motion leads to a point, or too many outputs are pending at once.
+    :raises InvalidGoal: no motion leads to a point, events of one output conflict, or too many
+        outputs are pending at once.
     """
     if not any(events.values()):
         return segments

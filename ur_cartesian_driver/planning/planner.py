@@ -240,7 +240,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
         planner.stops.waypoints,
     )
     segments = _planned_rows(paths, geometries, timings)
-    del paths  # frees memory: samples and reference path of long goals are large
+    del paths  # frees the samples before the reference path is made; both can be large
     motion = reference_path(
         state.actual_tcp_pose, geometries.begin, geometries.path, timings.chain.times
     )

@@ -12,6 +12,8 @@ Primitives are planned together with the last two points before them, because bl
 these. A spline needs no such context, as position, velocity and acceleration are its whole state;
 the ending of a spline is a piece that brakes after the last point
 (:func:`~ur_cartesian_driver.planning.spline.spline_planner.plan_stop`).
+
+See :mod:`~.appendable_goal` for client time and motion time.
 """
 
 from __future__ import annotations
@@ -220,6 +222,7 @@ class _PartPlanner:
             io_commands=self._pending_commands(first, start_time),
             keep_open=not appended.last,
         )
+        # Only the first point of a goal has to be near the arm.
         options = replace(
             self._options,
             max_approach_distance=0.0,
@@ -236,7 +239,7 @@ class _PartPlanner:
         return self.moves_part(plan, records_before, start_time)
 
     def _pending_commands(self, first: int, start_time: float) -> tuple[IOCommand, ...]:
-        """Return the part's commands, and earlier ones still due; waypoints count from first."""
+        """Return the part's commands and earlier ones still due, numbered from point ``first``."""
         old = []
         # Row of the replanned point whose motion is already committed; negative = none.
         committed = len(self._before.replannable) - 2
@@ -552,12 +555,12 @@ class _PartPlanner:
         timed: bool,
     ) -> AppendPlan:
         """
-        Return an append plan; ``next_goal`` also gets the counts of points and records.
+        Return an append plan, and set the counts of points and records in its ``next_goal``.
 
         :param ending: the number of motions of the ending.
         """
         last, rows = self._appended.last, plan.rows
-        # The plan of the first part has checked its own pulses, from their beginning.
+        # The pulses on the first part were checked, from their beginning, when it was planned.
         pulses = self._before.pulses if self._before.points else ()
         if pulses:
             clock = PathClock(plan.reference, is_spline=rows.are_spline)
@@ -566,7 +569,8 @@ class _PartPlanner:
                 check_speed(train, field, clock, self._arm.model.control_cycle, span)
         records = records_before + int(rows.records.sum())
         ending_records = int(rows.records[len(rows) - ending :].sum())
-        # After the last motion, the robot program waits until its outputs are switched.
+        # After the last motion, the robot program waits until its outputs are switched. So the
+        # plan ends after the longest of their delays.
         outputs = rows.outputs.get(len(rows) - 1, ())
         delay = max(
             (each.delay for each in outputs if isinstance(each, SwitchOutput)), default=0.0

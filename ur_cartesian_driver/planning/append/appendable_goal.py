@@ -1,6 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A goal with keep_open as planned so far, and the points that a client appends."""
+"""
+A goal with keep_open as planned so far, and the points that a client appends.
+
+*Client time* is the ``time_from_start`` of the points. *Motion time* is the planned time since the
+motion of the goal began; it does not run while the arm waits for points. Motion time is client
+time plus ``time_offset``.
+"""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ def first_replaceable(before: AppendableGoal, time: float) -> tuple[int, float]:
 
 
 def points_before(before: AppendableGoal, time: float) -> int:
-    """Return the number of points that a cut at a time [s] leaves; infinite = no cut."""
+    """Return the number of points that a cut at a motion time [s] leaves; infinite = no cut."""
     part = None if time == inf else _part_at(before, time)
     return before.points if part is None else int(part.waypoints[part.row_at(time)])
 

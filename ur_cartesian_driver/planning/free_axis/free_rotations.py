@@ -207,6 +207,7 @@ class _FreePath:
         self.free = free
         self.is_joint = IS_JOINT_MOVE[segments.types]
         self.low, self.high = segments.free_minima, segments.free_maxima
+        #: (n,) whether every rotation is allowed, which a goal expresses by two limits of 0.
         self.is_any = free & (self.low == 0.0) & (self.high == 0.0)
         #: (n,) whether there is more than one rotation to choose from.
         self.is_open = free & (self.is_any | (self.high > self.low))
@@ -229,7 +230,7 @@ class _FreePath:
 
     def _references(self) -> tuple[Floats, Floats]:
         """
-        Return the reference orientations (n, 4), and the rotations (n,) of the poses from them.
+        Return the reference orientations (n, 4), and the rotations (n,) [rad] from these to poses.
 
         Each reference is the previous one, turned the shortest way so that its free axis has the
         direction of the free axis of the pose.
@@ -297,7 +298,7 @@ class _FreePath:
 
     def _layers(self, ends: Indices, whole: Floats, tilts: Floats) -> list[Layer]:
         postures = self.goal.waypoints.postures
-        # Where a rotation has limits, the change from point to point in the goal must be allowed.
+        # Where a rotation has limits, the change that the poses of the goal make must be allowed.
         commanded = np.abs(np.diff(self.rotations, prepend=0.0))
         bound = ~self.is_any | np.append(False, ~self.is_any[:-1])
         tilted = tilts * self.sizes  # the axis deviates by tilt x turn / 8

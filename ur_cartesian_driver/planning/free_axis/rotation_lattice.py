@@ -456,7 +456,16 @@ class RotationLattice:
         cost: Floats,
         q: Floats,
     ) -> tuple[Floats, Floats, Int64s, Floats]:
-        """Return costs (b, k), joints (6, b, k), sources (b, k) and rotations (k,) of a layer."""
+        """
+        Return costs (b, k), joints (6, b, k), sources (b, k) and rotations (k,) of a layer.
+
+        Each node is one of b branches at one of k rotations; its values belong to the best way to
+        it. A source is an index of the flattened nodes of the layer before.
+
+        :param targets: the rotations of the nodes of ``layer``.
+        :param rotations: the rotations (j,) of the layer before.
+        :param cost: the costs (b, j) of its nodes; ``q``: their joints (6, b, j).
+        """
         reach = min(layer.max_change, _MAX_CHANGE) + 1e-9
         alive = np.flatnonzero(np.isfinite(cost).any(axis=0))
         first, last = int(alive[0]), int(alive[-1]) + 1

@@ -31,7 +31,7 @@ _MAX_CATCH_UP = 2.0
 _SAME = 1e-10
 #: A move whose duration deviates by at most this [s] counts as in time.
 _IN_TIME = 1e-7
-#: Greatest number of rounds of fits.
+#: Greatest number of rounds; in each, all moves that miss their wanted times are fitted.
 _MAX_FITS = 60
 #: Greatest number of steps of a fit.
 _FIT_STEPS = 14
@@ -325,7 +325,8 @@ class MoveChain:
         Change the speeds so that the moves take the wanted times, as far as possible.
 
         :param wanted: times from point to point (n,) [s]; NaN = the move stays as it is.
-        :param rate: rates of the moves (n,) [1/s], changed in place up to ``max_rate``.
+        :param rate: rates of the moves (n,) [1/s]: speed over length, or 1 / time on the wire.
+            They are changed in place, up to ``max_rate``.
         :param at_rate: function of rows and rates that returns the moves.
         :returns: the times that the moves take (n,) [s].
         """
@@ -423,10 +424,11 @@ def _blend_rates(moves: Moves, handed: Handover) -> tuple[Floats, Floats]:
     Return the rates at which blends begin and end.
 
     The rate changes towards the cruising speed of the move after the blend, within three bounds:
-    neither move may exceed its acceleration in the blend (r'' = 2 r s'^2), and the remainder of
-    the move after the blend must be long enough to brake. The acceleration of a move with a time
-    is the one that it needs from rest to rest. If the move before the blend has a time, its bound
-    is at least the next move's acceleration, scaled by the ratio of the two lengths.
+    neither move may exceed its acceleration in the blend (where it is the squared rate times the
+    length per unit of ``s``), and the remainder of the move after the blend must be long enough to
+    brake. The acceleration of a move with a time is the one that it needs from rest to rest. If
+    the move before the blend has a time, its bound is at least the next move's acceleration,
+    scaled by the ratio of the two lengths.
     """
     blended, timed = handed.rate > 0.0, moves.time > 0.0
     time = np.maximum(moves.time + handed.remaining, _TINY)

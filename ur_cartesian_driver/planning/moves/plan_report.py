@@ -126,7 +126,7 @@ def blend_remarks(
 
 
 def motion_version_remarks(options: PlanningOptions) -> list[str]:
-    """Return the remark on a motion version that plans do not follow, if the version is known."""
+    """Return the remark on a motion version above 1, which plans do not follow; else []."""
     motion_version = options.robot_motion_version
     if motion_version <= 1:
         return []

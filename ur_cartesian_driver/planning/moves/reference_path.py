@@ -58,7 +58,11 @@ def reference_path(start: Pose, begin: int, path: BlendedPath, times: MoveTimes)
 
 
 def _places(path: BlendedPath, times: MoveTimes) -> tuple[Indices, Floats]:
-    """Return curve number and curve parameter, each (n,), of all rows; the first is the start."""
+    """
+    Return curve number and curve parameter, each (n,), of all rows; the first row is the start.
+
+    Segment k has the curve number 2 k, and the blend after it 2 k + 1.
+    """
     curves, rows = path.curves, np.arange(len(path.u_join))
     begin, span = path.u_join, np.maximum(path.u_leave - path.u_join, 0.0)
     n = np.maximum(1, np.ceil(curves.chord_counts() * span)).astype(np.intp)

@@ -5,7 +5,7 @@ Find the lines, arcs and PROCESS motions that are planned slower than requested.
 
 Only motions that carry the tool along a path are examined. Joint moves and OPTIMIZED moves have no
 requested tool speed, and turns on the spot have no path. In a blend, the speed of the planned path
-counts, which follows an assumed law (:mod:`~.move_chain`).
+counts, which follows an assumed or a measured law (:mod:`~.move_chain`).
 """
 
 from __future__ import annotations

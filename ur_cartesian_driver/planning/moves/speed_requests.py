@@ -3,7 +3,9 @@
 """
 The speeds and times requested of moves, from the goal's times, its speeds or the defaults.
 
-All numbers refer to the leading quantity of a segment, see :mod:`~.speed_limits`.
+All numbers refer to the leading quantity of a segment, see :mod:`~.speed_limits`. On a line whose
+turn leads, the robot uses another length: the turn divided by the turn ratio, or the length of the
+line if that is larger.
 """
 
 from __future__ import annotations

@@ -77,6 +77,7 @@ def plan_with_travel(
         reason = str(error)
     else:
         raise refusal  # the arm gets to the first point; a travel is no remedy
+    # A travel may begin farther from the first point than a direct approach may.
     options = replace(options, max_approach_distance=0.0)
     planned = _Travel(goal, table, state, arm, options, plan).plan(reason)
     return replace(planned, travelled_goal=goal)
