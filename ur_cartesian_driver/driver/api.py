@@ -476,7 +476,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         return goal
 
     def _options_for(self, state: RobotState) -> PlanningOptions:
-        """Return the planning options, completed with what the connected robot reports."""
+        """Return the planning options, completed with reports of the connected robot."""
         status = self.status
         return self.options.for_program(
             self.config,

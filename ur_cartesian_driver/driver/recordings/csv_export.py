@@ -32,7 +32,7 @@ _PARTS = {
     'output': ('0', '1'),  # [A] or [V]
 }
 _SECONDS = ('time', 'lag', 'buffered')
-#: Packets converted to Python numbers at a time; those of an hour would together take gigabytes.
+#: Packets converted to Python numbers at a time; an hour of packets at once would take gigabytes.
 _BLOCK = 4096
 
 

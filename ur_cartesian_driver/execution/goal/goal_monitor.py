@@ -73,7 +73,7 @@ class GoalMonitor:
         #: The newest packet; None before the first packet.
         self.latest: RobotState | None = None
         self._applied_offset, self._feed = NO_OFFSET, FULL_FEED
-        #: Whether a watch beside the goal stops the arm at contact, and moves it back.
+        #: Whether a contact watch outside of the goal stops the arm at contact, and moves it back.
         self.contact_is_watched = False
         #: Scaled time: time since the start, as the controller's clock ran [s]; delay allowed to
         #: the goal, because the motion began late, waited or was slowed [s].
@@ -81,7 +81,7 @@ class GoalMonitor:
         #: Delay of the controller's clock by slider and pauses, in the interval before the newest
         #: packet [s], whether or not the arm moved.
         self.held_time = 0.0
-        #: Speed of the motion's clock just before the newest packet: 0 = stopped, 1 = real time.
+        #: Rate of the motion's time just before the newest packet: 0 = stopped, 1 = real time.
         self.rate = 0.0
 
     # ---- progress -----------------------------------------------------------------------------
@@ -311,7 +311,7 @@ class GoalMonitor:
         return None
 
     def law_clause(self) -> str:
-        """Return a clause if the robot's moves follow other laws than the plan, else ''."""
+        """Return a clause if the robot moves by other laws of motion than the plan, else ''."""
         job, version = self.job, 0 if self.latest is None else self.latest.motion_version
         is_moves = job.reports_points_begun and not job.execution.traits.is_spline
         if not is_moves or version <= 1:

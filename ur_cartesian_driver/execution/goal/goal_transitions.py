@@ -25,7 +25,7 @@ state, and the error code if the signal decides the outcome of the goal.
   inside the goal tolerance, within the goal's time tolerance. If the controller's target is not
   at the last point, the program skipped motions (DEVIATION).
 * A goal that ends when the tool touches (CONTACT) succeeds without SETTLING: the program has
-  moved the arm back to the place of contact. If a watch beside the goal ends it at contact
+  moved the arm back to the place of contact. If a contact watch outside of the goal stops the arm
   (TOUCHED), the goal fails, even at rest between or after its trajectories. It is cancelled, too,
   because the program may have read START just after the contact, and would run the trajectory.
 * **CANCELLING**: CANCEL has been sent. The program brakes, discards the points that it has not
