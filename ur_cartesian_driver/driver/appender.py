@@ -259,8 +259,10 @@ class Appender:
             return future.result(self._timeout)
         except TimeoutError:
             # The loop may have accepted the points, so it is unknown where further ones begin.
-            self._ended = 'The robot loop did not answer: nothing can be appended any more.'
-            return AnswerAppend(number=number, refusal=self._ended)
+            silent = 'The robot loop did not answer: nothing can be appended any more.'
+            with self._lock:
+                self._ended = self._ended or silent
+            return AnswerAppend(number=number, refusal=silent)
         finally:
             with self._lock:
                 self._pending_answers.pop(number, None)
