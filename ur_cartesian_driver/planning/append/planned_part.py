@@ -46,7 +46,11 @@ class PlannedPart:
         return max(int(np.searchsorted(times, time + SAME_TIME, side='right')) - 1, 0)
 
     def state(self, row: int, time: float) -> SplineState:
-        """Return the state at a motion time [s] on piece ``row``; on a cubic one, qdd is 0."""
+        """
+        Return the state at a motion time [s] on piece ``row``.
+
+        On a cubic piece, the acceleration is given as 0, because a cubic piece fixes none.
+        """
         coefficients = self.spline.coefficients[row : row + 1]
         rows = evaluate(coefficients, np.array([time - self.begin(row)]))
         q, qd, qdd = (vector6(values[0].tolist()) for values in rows)

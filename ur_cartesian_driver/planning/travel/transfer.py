@@ -88,8 +88,8 @@ def find_transfer(
     """
     Return a transfer to one of several configurations.
 
-    :param goals: at least one; if none of them has a free approach, the refusal of the first one
-        is raised.
+    :param goals: at least one; the search does not depend on their order. If none has a free
+        approach, the refusal of the first one is raised.
     :param where: the beginning of a refusal, such as ``The travel to point 0``.
     :raises CollisionPredicted: the arm touches something at the start, on the retract, or in each
         goal or on its approach; or no path was found.
