@@ -111,7 +111,7 @@ def check_writable(name: str) -> None:
 
 
 def picture_file(text: str) -> OutputFile:
-    """Return the name of a picture; before the work begins, check its format and its place."""
+    """Return the name of a picture; before the work begins, refuse one that cannot be written."""
     from ur_cartesian_driver.preview.pictures import check_suffix
 
     try:

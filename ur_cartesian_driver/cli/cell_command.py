@@ -33,7 +33,7 @@ from ur_cartesian_driver.sim.command_line.simulate import calibration
 
 
 def show_or_check(arguments: argparse.Namespace) -> int:
-    """Run ``cell show`` or ``cell check``; the latter returns 1 if any two are too close."""
+    """Run ``cell show`` or ``cell check``; the latter returns 1 if two parts are too close."""
     cell = read_cell(arguments.file)
     model = robot_model(arguments.model)
     arm = Arm(model, calibration(arguments, model))
@@ -89,7 +89,7 @@ def cell_table(cell: Cell) -> str:
 
 
 def cell_notes(cell: Cell) -> list[str]:
-    """Return the pairs that may touch, and remarks on oddities."""
+    """Return lines on the pairs that may touch, and on odd features of the cell."""
     pairs = sorted(map(sorted, cell.may_touch))
     return [*(f'may touch: {a} and {b}' for a, b in pairs), *cell_remarks(cell)]
 

@@ -62,7 +62,7 @@ def run(arms: Sequence[DemoArm]) -> int:
     """
     Run the demo; all arms move at the same time.
 
-    :returns: 0 only if all goals succeeded.
+    :returns: the exit status; 0 only if all goals succeeded.
     """
     environment = _environment()
     with ExitStack() as stack:

@@ -179,7 +179,11 @@ class ImportedPath:
         return bool((self.corners > 0.0).any())
 
     def take(self, rows: Int64s) -> ImportedPath:
-        """Return some rows, by rising indices; outputs of other rows move to the row before."""
+        """
+        Return some rows, by rising indices, which must include every row with a wait.
+
+        Outputs of the other rows move to the row kept before them.
+        """
         new_row = {int(row): i for i, row in enumerate(rows)}
         return replace(
             self,

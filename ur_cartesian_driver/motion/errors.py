@@ -41,7 +41,7 @@ _Error = TypeVar('_Error', bound='DriverError')
 
 
 class ErrorCode(IntEnum):
-    """The ``error_code`` of the action's result; 0 to -6 are as in FZI's action of this name."""
+    """The ``error_code`` of the result; 0 to -6 are as in FZI's cartesian_control_msgs."""
 
     SUCCESSFUL = 0
     INVALID_GOAL = -1
@@ -88,7 +88,7 @@ class DriverError(Exception):
     report: tuple[str, ...] = ()
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Copy and pickle by the finished text: some constructors take only parts of it."""
+        """Copy and pickle by the text, because some constructors take only parts of it."""
         return _restore, (type(self), str(self)), self.__dict__
 
 

@@ -106,7 +106,7 @@ def _of_axes(ex: Vector3, ey: Vector3, ez: Vector3) -> Quaternion:
     """
     Return the orientation of a frame from its axes.
 
-    The quaternion's largest component is found first: it is the one that is safely not zero.
+    It is computed from the quaternion's largest component, which is certainly not zero.
     """
     m = (ex, ey, ez)  # columns
     trace = ex[0] + ey[1] + ez[2]

@@ -322,7 +322,7 @@ class Path(PathWithEvents):
                 )
         first, start = self, self._start
         if other._start is not None:
-            rest = other._start.segment.dwell  # of a path that is reversed
+            rest = other._start.segment.dwell  # the dwell of a reversed path
             if not self._points and (start is None or rest):
                 start = other._start
             elif rest and not self._points[-1].segment.dwell:

@@ -34,11 +34,11 @@ class ConnectionStatus:
     robot_model: str = ''
     polyscope_version: str = ''
     serial_number: str = ''
-    #: A robot program is connected to us.
+    #: Whether a robot program is connected to us.
     program_running: bool = False
-    #: The connected program has proved that this driver rendered it.
+    #: Whether the connected program has proved that this driver rendered it.
     program_is_own: bool = False
-    #: The motion version of movej and movel that this program reports; 0 = unknown.
+    #: The motion version of movej and movel that the connected program reports; 0 = unknown.
     motion_version: int = 0
     calibration_known: bool = False
     #: The open ports, by the names of their parameters.

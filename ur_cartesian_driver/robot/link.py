@@ -207,7 +207,11 @@ class RobotLink:
         self._remote_control = remote
 
     def set_executing(self, busy: bool) -> None:
-        """Set whether a goal runs: this sets status and kind of keepalive, and resets the feed."""
+        """
+        Set whether a goal runs.
+
+        This changes the status and the kind of the keepalives, and ends a feed override.
+        """
         self.program.is_executing = busy
         self.program.feed = NO_OVERRIDE
         if busy:
@@ -413,7 +417,8 @@ class RobotLink:
         )
         before, self.robot, self.signals = self.robot, None, None
         self._state_time = inf
-        self.program.is_paused = False  # unknown; too many keepalives are better than none
+        # Whether it is paused is not known now; too many keepalives are better than none.
+        self.program.is_paused = False
         self.control.tracker.robot_lost()
         self._status.apply(
             ConnectionEvent.ROBOT_LOST,
@@ -445,7 +450,7 @@ class RobotLink:
             self._status.apply(ConnectionEvent.PROGRAM_PAUSED)
         elif not self.control.tcp_restore_pending:
             self._status.apply(ConnectionEvent.PROGRAM_CONNECTED)
-            if self.program.is_executing:  # a stop that did not end the goal is over
+            if self.program.is_executing:  # a stop is over, and has not ended the goal
                 self._status.apply(ConnectionEvent.GOAL_STARTED)
 
     def _takes_goals(self) -> bool:

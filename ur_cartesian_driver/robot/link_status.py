@@ -37,8 +37,8 @@ class LinkStatus:
         """
         Begin disconnected.
 
-        :param required_action: returns the next step in a state before a goal can run, as a
-            sentence.
+        :param required_action: returns, for a state of the connection, the next step before a
+            goal can run, as a sentence.
         """
         self._required_action, self._on_status, self._on_log = required_action, on_status, on_log
         self._attempts = AttemptLog(self._log_info, self._log_info)
@@ -50,7 +50,7 @@ class LinkStatus:
         return self.current.state
 
     def apply(self, event: ConnectionEvent, **changes: Any) -> None:
-        """Apply an event to the table of the life cycle, and change other fields as well."""
+        """Change the state by an event, as the life cycle's table says, and other fields, too."""
         self.update(state=next_state(self.state, event), **changes)
 
     def update(self, **changes: Any) -> None:
@@ -60,7 +60,8 @@ class LinkStatus:
             status = replace(status, message=self._required_action(status.state))
         if status != self.current:
             before, self.current = self.current, status
-            self._log_change(before, status)  # first: on_status resumes waiting code at once
+            # This comes first, because on_status resumes waiting code at once.
+            self._log_change(before, status)
             self._on_status(status)
 
     def error(self, text: str) -> None:

@@ -26,7 +26,7 @@ MAX_SIZE = 200_000
 
 def read_prelude(path: str) -> Prelude:
     """
-    Return the functions of a file.
+    Return the prelude in a file: its lines of code, and the functions that goals can call.
 
     :raises ValueError: the file cannot be read or is no prelude; the text names file and line.
     """
@@ -44,7 +44,7 @@ def read_prelude(path: str) -> Prelude:
 
 def compile_prelude(text: str, name: str) -> Prelude:
     """
-    Return the functions of a text.
+    Return the prelude in a text: its lines of code, and the functions that goals can call.
 
     :param name: name of the file, for error texts.
     :raises ValueError: the text is no prelude; the error text names file and line.
@@ -97,7 +97,7 @@ def compile_prelude(text: str, name: str) -> Prelude:
 
 def _code_lines(text: str, name: str) -> Iterator[str]:
     """
-    Yield the lines of code; comments are left out, as some are markers of External Control.
+    Yield the lines of code, without comments, because External Control's markers are comments.
 
     :raises ValueError: a line of code contains a marker.
     """

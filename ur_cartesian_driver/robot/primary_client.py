@@ -106,7 +106,7 @@ class PrimaryClient:
         return True
 
     def reconnect(self) -> None:
-        """Connect again: the right to send may have changed."""
+        """Connect again, because the right to send may have changed."""
         if self._connection is not None and not self._is_reconnecting:
             self._is_reconnecting = True
             self._connection.close('to connect again')
@@ -157,7 +157,8 @@ class PrimaryClient:
         self._decoder = primary.PrimaryDecoder()
         self._has_configuration = False
         self._connection = TcpConnection(
-            # ``closed`` is cancelled if the link is closed while this method waits.
+            # If the link is closed while this method waits, ``closed`` is cancelled, and must not
+            # get a result.
             self._on_data,
             lambda reason: None if closed.done() else closed.set_result(reason),
         )

@@ -75,7 +75,11 @@ class TcpConnection(asyncio.BufferedProtocol):
         self._reason = ''
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Switch off Nagle's algorithm: every message is one small segment to be sent at once."""
+        """
+        Switch off Nagle's algorithm, and call ``on_open``.
+
+        Every message is one small segment that has to be sent at once.
+        """
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
         sock = transport.get_extra_info('socket')

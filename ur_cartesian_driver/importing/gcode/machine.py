@@ -39,7 +39,7 @@ _AXIS_WORDS = frozenset('XYZABCE')
 _WITH_AXES = ('G28', 'G30', 'G53')
 #: The codes by which a lathe is known, and those that end a feed per turn.
 _LATHE_CODE = re.compile(r'G\s*0*(50|92|94|96|98|99)(?![.\d])', re.I)
-#: Goes home along X by increments, which only a lathe or a wire has.
+#: Matches a move home along X by an increment U, which only a lathe or a wire machine has.
 _LATHE_HOME = re.compile(r'G\s*0*(28|30)(?![.\d]).*U\s*[-+.\d]', re.I)
 _S_WORD, _F_WORD, _AXIS = (
     re.compile(rf'{letter}\s*[-+.\d]', re.I) for letter in ('S', 'F', '[XYZ]')
@@ -150,7 +150,7 @@ class GcodeMachine:
             self._move(words)
 
     def _obey(self, codes: Sequence[str], words: _Words, bare: str) -> None:
-        """Execute a line with other codes than one motion code, or with bare letters."""
+        """Execute a line that is more than one motion: other codes, several, or bare letters."""
         rows = [self._row(code, words, is_alone=len(codes) == 1) for code in codes]
         if len(rows) == 1 and rows[0].alone:
             self._do(codes[0], rows[0], words, bare)
@@ -475,7 +475,7 @@ class GcodeMachine:
     @cached_property
     def _is_lathe(self) -> bool:
         """
-        Return whether the program is one of a lathe.
+        Return whether the program is for a lathe.
 
         It has a surface speed, or limits it, or feeds per turn, or goes home along U without V.
         """

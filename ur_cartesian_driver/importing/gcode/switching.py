@@ -46,7 +46,7 @@ class CodeOutputs:
 
     def set_power(self, line: int, value: float, *, beside_spindle: bool) -> None:
         """
-        Set the power.
+        Set the power, the number of an S word.
 
         :param beside_spindle: whether M3, M4 or M5 is on the same line, and so acts next.
         """

@@ -44,9 +44,9 @@ _M_CODE = re.compile(r'(?:N-?[0-9]+)?M([0-9]+(?:\.[0-9]+)?)')
 _QUOTED = re.compile(r'"[^"]*"')
 _NAME = re.compile(r'\s*([A-Za-z_]{2}\w*)')
 _PROGRAM_NUMBER = re.compile(r'[O:]([0-9]{1,8})')
-# Fanuc's names of programs, behind a number or in place of it.
+# Matches Fanuc's name of a program, which follows the program's number or replaces it.
 _PROGRAM_NAME = re.compile(r'<[^<>]+>$')
-# A CNC has T1 S500, too: without an L it is not a printer's.
+# Matches a printer's commands. A CNC writes T1 S500, too, so a T needs an L to be a printer's.
 _TOOL_OF_PRINTER = re.compile(r'(?:T[0-9]+S[01]L[0-2]|P[0-9]+S[01](?:L[0-2])?)(?:D[01])?')
 
 

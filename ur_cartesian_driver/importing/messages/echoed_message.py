@@ -4,8 +4,8 @@
 Messages as ``ros2 topic echo`` and ``rostopic echo`` print them.
 
 Such a text is YAML with a document for each message, and consists of mappings, lists, numbers and
-texts only. Every parsed value carries its line number. Only PyYAML's event parser is used: the
-texts of its other errors and its limits on nesting differ between versions.
+texts only. Every parsed value carries its line number. Only PyYAML's event parser is used, because
+the texts of its other errors and its limits on nesting differ between versions.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _END_OF_MESSAGE = re.compile(r'^---[ \t]*$', re.MULTILINE)
 _BLANK_LINES = re.compile(r'(?:[ \t]*\n)*')
 #: The notice of a lost message; the hyphens at its end are not on a line of their own.
 _LOST = re.compile(r'^A message was lost!!!\n\ttotal count change:.*\n\ttotal count:.*---$', re.M)
-#: What a writer of YAML may put before the first document.
+#: Matches the directives that YAML allows before the first document.
 _DIRECTIVES = re.compile(r'\A(?:%(?:YAML|TAG)[ \t][^\n]*\n)+(?=---)')
 #: Only YAML 1.1 treats these as ends of lines, which would shift the line numbers.
 _NO_LINE_ENDS = str.maketrans('\x85\u2028\u2029', '   ')

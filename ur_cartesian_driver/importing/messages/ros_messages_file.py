@@ -179,7 +179,7 @@ def _is_default(value: Any) -> bool:
 
 
 def _line(thing: Any, index: int) -> int:
-    """Return the line of a part of a text, or the number (from 1) of a part of a message."""
+    """Return the line of a value from a text; for a value of a message, its number from 1."""
     return int(getattr(thing, 'line', index + 1))
 
 

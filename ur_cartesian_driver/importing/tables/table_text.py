@@ -88,7 +88,7 @@ def read_table(
     lines: list[str], is_header: Callable[[list[str]], bool], unit: str, remarks: ImportNotes
 ) -> Table:
     """
-    Find header and dialect.
+    Return the table in the lines of a file; find its header and dialect.
 
     :param is_header: returns whether titles name a position.
     :param unit: the unit for three columns without a header; empty = such a table is refused.

@@ -23,7 +23,8 @@ def fit_frame(known: Floats, measured: Floats) -> tuple[Pose, Floats]:
 
     :param known: (n, 3) points in the frame that is sought [m].
     :param measured: (n, 3) the same points as measured [m].
-    :returns: the pose, and the distance (n,) of each measured point from its known one [m].
+    :returns: the pose, and the distances (n,) of the known points, put at it, from the measured
+        ones [m].
     :raises ValueError: fewer than three points, or all of them on a line.
     """
     centre, other = known.mean(axis=0), measured.mean(axis=0)

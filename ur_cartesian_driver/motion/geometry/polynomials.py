@@ -70,7 +70,7 @@ def values(coefficients: Floats, t: Floats) -> Floats:
     :param coefficients: (m, 6, k).
     :param t: (m,) or (c, m): one time, or c times, since each piece began [s].
     """
-    # Contiguous in memory: strided access would take as long as several products.
+    # Contiguous in memory, because strided access would take as long as several products.
     powers = np.ascontiguousarray(coefficients.swapaxes(0, 1))
     t = np.repeat(t[..., None], powers.shape[2], axis=-1)
     x: Floats = powers[5] * t + powers[4]
@@ -88,7 +88,7 @@ def evaluate(coefficients: Floats, t: Floats) -> MotionRows:
     :param t: (m,) times since the pieces began [s].
     """
     x = coefficients[:, 5].copy()
-    t = np.repeat(t[:, None], x.shape[1], axis=1)  # see values
+    t = np.repeat(t[:, None], x.shape[1], axis=1)  # contiguous, as in values()
     v, a = np.zeros_like(x), np.zeros_like(x)
     for power in range(4, -1, -1):  # Horner, with both derivatives
         a *= t

@@ -29,7 +29,7 @@ class ExecutionMode(IntEnum):
     @property
     def traits(self) -> ModeTraits:
         """
-        The capabilities of the mode.
+        The capabilities of the execution mode.
 
         :raises KeyError: the mode is AUTO, which planning resolves to another mode.
         """

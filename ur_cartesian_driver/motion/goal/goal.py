@@ -260,7 +260,7 @@ class Segment:
     dwell: Annotated[float, NOT_NEGATIVE, Mark.OF_POINT] = 0.0
     #: 0 = derived from the times of the goal, or the default velocity if the goal has no times.
     velocity: Annotated[float, NOT_NEGATIVE] = 0.0
-    #: 0 = derived or the default, likewise.
+    #: 0 = derived from the times of the goal, or the default acceleration.
     acceleration: Annotated[float, NOT_NEGATIVE] = 0.0
     #: A pose on the arc; only for CIRCULAR.
     via: Pose | None = None
@@ -384,7 +384,7 @@ class PayloadChange:
 class PartAction(IntEnum):
     """The change of a body of the cell, numbered as in ``PartChange.action``."""
 
-    #: From the point on, the body moves with the flange, at the pose on it that it has then.
+    #: From the point on, the body moves with the flange, and keeps its pose relative to it.
     ATTACH = 0
     #: From the point on, the body stays at the place where it was put.
     RELEASE = 1

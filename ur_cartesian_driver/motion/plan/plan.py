@@ -142,7 +142,7 @@ class PlannedSegment:
 
 
 class LateLines(Sequence[str]):
-    """Lines of a report, made when they are read: long goals have many."""
+    """Lines of a report, made only when they are read, because long goals have many."""
 
     def __init__(self, rows: range, make: Callable[[range], Sequence[str]]) -> None:
         """
@@ -242,7 +242,7 @@ class PlannedRows(Rows[PlannedSegment]):
         angles: Floats,
         report_lines: Sequence[str],
     ) -> PlannedRows:
-        """Return pieces of a spline as rows; the parameters are columns."""
+        """Return pieces of a spline as rows; the other parameters are columns of the rows."""
         return cls(
             waypoints=waypoints,
             lengths=lengths,
@@ -265,7 +265,7 @@ class PlannedRows(Rows[PlannedSegment]):
     @property
     def kinds(self) -> dict[int, str]:
         """
-        The name of the class of the motion to each point, by the index of the point.
+        The class name of the motion to each point, by point index.
 
         A point that is passed within a motion has the class of that motion; the point at the end
         of a travel has the class of the travel's last motion.

@@ -137,7 +137,7 @@ class SwitchOutput:
     #: Digital 0 or 1; analog a fraction of the range.
     value: float
     domain: AnalogDomain = AnalogDomain.CURRENT
-    #: Pose of the TCP in base at which to switch; None = when the motion before has ended.
+    #: Pose of the TCP in base at which to switch; None = when the preceding motion has ended.
     trigger_pose: Pose | None = None
     #: Unit direction of the motion at the trigger pose, linear or angular, in the axes of this
     #: pose. The output switches when the tool crosses, in this direction, the plane through it.
@@ -226,7 +226,7 @@ class Wait:
     """
     The arm rests for some time; the robot program counts the rest as a motion.
 
-    :param duration: time since the end of the motion before [s], without pauses of the program.
+    :param duration: time since the end of the preceding motion [s], without pauses of the program.
     """
 
     duration: float

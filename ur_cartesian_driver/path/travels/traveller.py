@@ -134,7 +134,7 @@ class Traveller:
     """
 
     def __init__(self, by: AirTravel, place: ArmStand, there: PathBegin, where: str) -> None:
-        """Create the space of the joints."""
+        """Prepare the kinematics of the arm with the path's tool, and its joint space."""
         self._by, self._place, self._there, self._where = by, place, there, where
         T_flange_tool = there.goal.T_flange_controlled or by.state.T_flange_tcp
         self._kinematics = TcpKinematics(by.arm, T_flange_tool)
@@ -152,7 +152,7 @@ class Traveller:
         refusal: GoalRefused | None = None
         every = self.space.configurations(self._there.in_base, self._place.q)
         are_free = self.space.free(np.array(every).reshape(-1, 6))
-        # If none is free, the first one tells why.
+        # If no configuration is free of collisions, the refusal is about the first one.
         for q in [q for q, free in zip(every, are_free, strict=True) if free] or every[:1]:
             try:
                 found[q] = self._by.end_of(self._there.goal, replace(self._place, q=q))

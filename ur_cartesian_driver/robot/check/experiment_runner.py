@@ -180,7 +180,7 @@ def _samples(recorder: RtdeRecorder, stop_sent: float) -> MotionSamples:
 
 
 def _distance(recorder: RtdeRecorder, name: str) -> Floats:
-    """Return the distance (n,) [m] of each recorded position of a pose from the first."""
+    """Return the distances (n,) [m] of a pose output's positions from the first of them."""
     positions = recorder.column(name)[:, :3]
     distances: Floats = np.linalg.norm(positions - positions[0], axis=1)
     return distances

@@ -28,7 +28,7 @@ class Finding:
 
     :param check: name of the check, as in the table of doc/robot_program.md.
     :param text: one sentence.
-    :param data: numbers behind the text, for the report; never the robot's identity or address.
+    :param data: the numbers in the text, for the report; never the robot's identity or address.
     """
 
     check: str

@@ -52,7 +52,7 @@ async def motion_refusal(address: RobotAddress) -> str:
 
 class ProgramRun:
     """
-    The connections for running programs, one after the other; used once.
+    Runs programs, one after the other, on connections that are opened and closed once.
 
     All methods that wait raise OSError if RTDE is lost, and :class:`Surprise` if the robot stops,
     the primary interface is lost, or ``watch`` finds a fault.

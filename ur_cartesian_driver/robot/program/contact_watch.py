@@ -39,7 +39,7 @@ class ContactWatch:
 
     @property
     def is_active(self) -> bool:
-        """Whether a watch has begun and the program has not answered yet, even after its end."""
+        """Whether a watch has begun that the program has not answered yet, ended or not."""
         return self._answer is not None
 
     def begin(self) -> Awaitable[bool]:

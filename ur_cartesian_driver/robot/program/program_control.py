@@ -89,7 +89,7 @@ class ProgramControl:
         self._sockets.send_servo(on)
 
     def _note(self, done: str) -> None:
-        """Note a message to the robot program, if one is connected."""
+        """Note in the event log what the driver has done to the program, if one is connected."""
         if self._sockets.connected:
             self._event_log.note(f'the driver {done}')
 

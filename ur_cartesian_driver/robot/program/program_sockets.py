@@ -66,17 +66,18 @@ class ProgramSockets:
         self.text = ''
         #: Random number, not 0, by which we recognise our program.
         self.program_number = 1 + secrets.randbelow(INT32_MAX)
-        #: A goal runs: keepalives are then NOOP actions of its trajectory.
+        #: Whether a goal runs; keepalives are then NOOP actions of its trajectory.
         self.is_executing = False
         #: The feed override of the running goal; every message of a trajectory repeats it.
         self.feed = reverse.NO_OVERRIDE
-        #: The goal uses the buffered servo: keepalives then repeat the message that enters it.
+        #: Whether the goal uses the buffered servo; each keepalive then repeats the message that
+        #: enters it.
         self.servo = False
-        #: The program is paused and reads nothing. Keepalives pause, too: otherwise the resumed
-        #: program might have an hour of them to read before a START.
+        #: Whether the program is paused, and so reads nothing. Keepalives pause, too, because
+        #: otherwise the resumed program might have an hour of them to read before a START.
         self.is_paused = False
-        #: The robot reports that no program runs: the client that holds the sockets is dead, for
-        #: instance because a cable was cut, and another client may replace it.
+        #: Whether the robot reports that no program runs. A client that still holds the sockets is
+        #: then dead, for instance because a cable was cut, and another client may replace it.
         self.ended = False
         self.connected = False
         #: The longest pause between two keepalives since this number was last set to 0 [s].

@@ -12,7 +12,7 @@ from ur_cartesian_driver.protocol.program.registers import PROGRAM_VERSION
 from ur_cartesian_driver.robot.connection_status import has_ended, is_paused
 from ur_cartesian_driver.robot.program.program_sockets import ProgramSockets
 
-#: Time after which a program loses its sockets, if the robot reports that none runs [s].
+#: Time for which the robot has to report that no program runs before the sockets are closed [s].
 DEAD_PROGRAM_TIMEOUT = 0.5
 #: Time in which our own program proves its identity after connecting [s].
 IDENTITY_TIMEOUT = 0.5

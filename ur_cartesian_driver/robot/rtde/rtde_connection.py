@@ -58,8 +58,10 @@ class RtdeConnection:
         #: Shortest time between a request of the handshake and its answer [s].
         self.round_trip = inf
         self._version: ControllerVersion | None = None
-        self._patience = asyncio.timeout(None)  # each request sets its end
-        self._answered = asyncio.Event()  # the handshake is done, or the connection closed
+        #: The timeout of the handshake; each of its requests sets a new end.
+        self._patience = asyncio.timeout(None)
+        #: Set when the handshake is done, or the connection is closed.
+        self._answered = asyncio.Event()
         self._closed: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         self._connection = TcpConnection(self._on_data, self._on_closed)
 
@@ -155,7 +157,7 @@ class RtdeConnection:
             self._on_text(event.text)
 
     def _take_values(self, values: RtdeValues) -> None:
-        self._on_values(self._names, values)  # first: it may make the driver send a CANCEL
+        self._on_values(self._names, values)  # first, because it may send a CANCEL
         self._last_packet = asyncio.get_running_loop().time()
 
     def _on_closed(self, reason: str) -> None:

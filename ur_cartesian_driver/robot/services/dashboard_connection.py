@@ -111,7 +111,8 @@ class DashboardConnection:
         """
         Send a request, and pass the bytes that come back to ``feed`` until it is answered.
 
-        :raises OSError: the dashboard does not answer ``within`` this time [s], or hangs up.
+        :param within: longest wait for the answer [s].
+        :raises OSError: the dashboard does not answer in time, or hangs up.
         :raises ProtocolError: ``feed`` refuses the bytes.
         """
         ended: asyncio.Future[str] = asyncio.get_running_loop().create_future()

@@ -17,7 +17,7 @@ POLL_PERIOD = 0.02
 async def wait_for_state(
     link: RobotLink, predicate: Callable[[RobotState], bool], within: float
 ) -> bool:
-    """Wait until the state meets a condition; return whether it does ``within`` this time [s]."""
+    """Wait up to ``within`` [s] for the state to meet a condition; return whether it does."""
     loop = asyncio.get_running_loop()
     end = loop.time() + within
     while loop.time() < end:

@@ -221,7 +221,7 @@ class ServiceDispatcher:
         return None
 
     def _paused(self) -> ServiceAnswer | None:
-        """Return a refusal if the program is not playing, because it would act at a later time."""
+        """Return a refusal if the program is not playing: it would act on a command only later."""
         robot = self._link.robot
         if robot is None or robot.runtime_state is RuntimeState.PLAYING:
             return None

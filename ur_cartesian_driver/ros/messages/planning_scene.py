@@ -66,7 +66,7 @@ class SceneArm:
 
 def updated_scene(scene: SceneBodies, message: Any, place: SceneArm) -> SceneBodies:
     """
-    Return a scene after a message of the type moveit_msgs/PlanningScene.
+    Return a scene as changed by a message of the type moveit_msgs/PlanningScene.
 
     :raises ValueError: the message cannot be honoured; the text is a clause that says why.
     """
@@ -213,7 +213,7 @@ class _Update:
 
 
 def _operation(item: Any) -> _Operation:
-    """Return the operation of an object, which is a byte."""
+    """Return the operation of an object, which messages hold in a byte."""
     value = item.operation
     number = value[0] if isinstance(value, bytes) else value
     try:

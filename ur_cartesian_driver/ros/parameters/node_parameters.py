@@ -79,7 +79,7 @@ def declare_parameters(node: Node, others: Iterable[str] = ()) -> Settings:
 
     :param node: created with ``automatically_declare_parameters_from_overrides``, which makes
         unknown names visible, for example mistyped ones.
-    :param others: the names of the parameters of the node ur_driver_names.
+    :param others: the parameters of the node ur_driver_names, which get a refusal of their own.
     :raises ParameterError: a name is unknown or a value invalid.
     """
     names = node.list_parameters([], 0).names

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Every parameter of the node, as it is declared in the dataclass that uses its value.
+The table of the node's parameters, made from the dataclasses that use their values.
 
-So a program without ROS has the same defaults and bounds.
+The dataclasses declare types, defaults and bounds, so a program without ROS has the same ones.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from ur_cartesian_driver.robot.services.service_calls import failed, ServiceAnsw
 from ur_cartesian_driver.ros.services.deferred_service import DeferredService, RequestQueue
 from ur_cartesian_driver.srv import ChangeCell
 
-#: Name of the text with bodies in refusals.
+#: Name that refusals give to the text with the bodies.
 TEXT = 'bodies'
 
 

@@ -39,7 +39,7 @@ _DIGITAL = (
     (8, SetIO.Request.CONFIGURABLE_DIGITAL),
     (0, SetIO.Request.STANDARD_DIGITAL),
 )
-#: The last pin of the outputs of each function of SetIO.
+#: The largest pin for each function of SetIO.
 _LAST_PIN = {'FUN_SET_DIGITAL_OUT': 17, 'FUN_SET_ANALOG_OUT': 1}
 _TOOL_VOLTAGES = (0, 12, 24)
 

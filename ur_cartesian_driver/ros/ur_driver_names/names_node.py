@@ -34,7 +34,8 @@ from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 from ur_cartesian_driver.ros.ur_driver_names.offered_name import Absent
 
 NODE_NAME = 'ur_driver_names'
-#: Makes :func:`main` end when its standard input does: the driver that started it has ended.
+#: With this argument :func:`main` ends when its standard input is closed, because the driver that
+#: started it has then ended.
 WITH_PARENT = '--with-parent'
 
 

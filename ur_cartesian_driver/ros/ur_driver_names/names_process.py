@@ -31,7 +31,8 @@ class NamesProcess:
         module = f'{__package__}.names_node'
         self._process = subprocess.Popen(
             [sys.executable, '-m', module, '--with-parent', *own, *arguments],
-            stdin=subprocess.PIPE,  # its end, whatever causes it, ends the process
+            # It is closed when the driver ends, for whatever reason; then the process ends, too.
+            stdin=subprocess.PIPE,
             # Ctrl-C reaches the driver alone, whose goals still get their results.
             start_new_session=True,
         )

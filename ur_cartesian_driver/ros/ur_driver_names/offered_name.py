@@ -47,7 +47,7 @@ class UrName:
 
     @property
     def served_by(self) -> str:
-        """The driver's interface behind the name, or ''."""
+        """The driver's topics, services or actions that serve the name, as text; '' = none."""
         return ', '.join(f'`~/{name}`' for name in self.source.split(', ') if name)
 
     def offer(self, driver: DriverNode, settings: NamesSettings, kind: Any) -> object:
@@ -76,7 +76,7 @@ class ByDriver(UrName):
 
     @property
     def served_by(self) -> str:
-        """The driver."""
+        """The name itself, because the driver publishes it."""
         return f'`{self.name}`'
 
 
