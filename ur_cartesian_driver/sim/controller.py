@@ -267,7 +267,7 @@ class Controller:
 
     @property
     def takes_scripts(self) -> bool:
-        """Whether clients can send programs; always true for a robot without remote control."""
+        """Whether clients can send programs; always true if the remote control feature is off."""
         return self.remote_control or not self.config.has_remote_control
 
     def joint_history(self, steps: int) -> Vector6:

@@ -146,7 +146,7 @@ class SimulatorConfig:
     external_control_port: int = 50002
 
     def __post_init__(self) -> None:
-        """Refuse values that cannot be simulated; the error names the field."""
+        """Refuse values that cannot be simulated, and compute the derived fields."""
         if len(self.q) != 6:
             raise ValueError(f'q has {len(self.q)} values; give one for each of the 6 joints.')
         declare_types(self)

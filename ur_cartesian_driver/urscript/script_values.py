@@ -136,7 +136,7 @@ def copy(value: Value) -> Value:
     return value
 
 
-#: Types whose values hold other values, and so have a size.
+#: Types whose values hold any number of other values, and so have a size.
 SIZED = frozenset({list, Matrix, Struct})
 
 

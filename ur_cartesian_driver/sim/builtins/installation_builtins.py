@@ -85,47 +85,47 @@ class InstallationBuiltins(BuiltinGroup):
 
     @without_effect
     def set_input_actions_to_default(self) -> None:
-        """Remove the actions of all inputs."""
+        """Ignore a call to remove the actions of all inputs."""
 
     @without_effect
     def set_tool_analog_input_domain(self, port: Value, domain: Value) -> None:
-        """Choose the domain of a tool input: 0 = current, 1 = voltage."""
+        """Check the number of a tool input, and its domain: 0 = current, 1 = voltage."""
         index(port, 'port', 2)
         index(domain, 'domain', 2)
 
     @without_effect
     def set_analog_inputrange(self, port: Value, range: Value) -> None:
-        """Choose the range of an input, given by its old number: standard 0-1, tool 2-3."""
+        """Check the range of an input, and its old number: standard 0-1, tool 2-3."""
         index(port, 'port', 4)
         index(range, 'range', 5)
 
     @without_effect
     def set_tool_output_mode(self, mode: Value) -> None:
-        """Choose the use of the tool's output pins: 0 = digital outputs, 1 = power from both."""
+        """Check the use of the tool's output pins: 0 = digital outputs, 1 = power from both."""
         index(mode, 'mode', 2)
 
     @without_effect
     def set_tool_digital_output_mode(self, n: Value, mode: Value) -> None:
-        """Choose the mode of a tool output: 1 = sinking, 2 = sourcing, 3 = both."""
+        """Check the number of a tool output, and its mode: 1 = sinking, 2 = sourcing, 3 = both."""
         index(n, 'n', 2)
         one_of(mode, 'mode', (1, 2, 3))
 
     @without_effect
     def set_safety_mode_transition_hardness(self, type: Value) -> None:
-        """Choose the transition between safety modes: 0 = hard, 1 = soft."""
+        """Check the kind of transition between safety modes: 0 = hard, 1 = soft."""
         index(type, 'type', 2)
 
     @without_effect
     def set_baselight_off(self) -> None:
-        """Switch the light at the base off."""
+        """Ignore a call to switch the light at the base off."""
 
     @without_effect
     def set_baselight_iec(self) -> None:
-        """Let the light at the base show stops, freedrive and the operational mode."""
+        """Ignore a call to show stops, freedrive and operational mode by the light at the base."""
 
     @without_effect
     def set_baselight_solid(self, r: Value, g: Value, b: Value) -> None:
-        """Choose the colour of the light at the base, each part 0..255."""
+        """Check the colour of the light at the base, each part 0..255."""
         for value, name in ((r, 'r'), (g, 'g'), (b, 'b')):
             index(value, name, 256)
 
@@ -187,6 +187,6 @@ class EuromapBuiltins(BuiltinGroup):
     def set_euromap_runstate_dependent_choice(
         self, port_number: Value, runstate_choice: Value
     ) -> None:
-        """Tie an output to the program state."""
+        """Check the number of an output and the number of a program state."""
         index(port_number, 'port_number', EUROMAP_PINS)
         index(runstate_choice, 'runstate_choice', EUROMAP_RUN_STATES)

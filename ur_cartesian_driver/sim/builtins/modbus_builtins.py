@@ -4,7 +4,7 @@
 The Modbus signals of programs, kept in memory without any devices.
 
 To a program, each device seems to answer but does nothing: inputs stay 0, and outputs keep the
-values that were written. A program therefore runs until it waits for a machine to react.
+values that programs write. A program therefore runs until it waits for a machine to react.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ SIGNAL_TYPES = {
     15: (False, True),
     16: (0, True),
 }
+#: Largest number of values of a signal.
 MAX_REGISTERS = 123
 
 
@@ -99,7 +100,7 @@ class ModbusBuiltins(BuiltinGroup):
         signal_name: Value,
         sequential_mode: Value = False,
     ) -> None:
-        """Add or replace a signal that reads some registers and writes others."""
+        """Add or replace a signal that reads registers (always 0) and writes others (ignored)."""
         text(IP, 'IP')
         index(slave_number, 'slave_number', 256)
         index(read_address, 'read_address', 2**16)

@@ -41,7 +41,11 @@ class MotionBuiltins(BuiltinGroup):
         return self._controller.motion
 
     def _take(self, waypoint: Pose | None = None) -> None:
-        """Take ownership of the motion, and note the waypoint (None for set-point streams)."""
+        """
+        Take ownership of the motion, and note the waypoint (None for set-point streams).
+
+        :raises RuntimeException: the arm is in freedrive, or another thread owns the motion.
+        """
         freedrive = self._controller.freedrive
         if freedrive is not FreedriveState.OFF:
             raise RuntimeException(f'The robot cannot move: it is in {freedrive.value}.')

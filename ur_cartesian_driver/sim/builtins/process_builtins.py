@@ -82,7 +82,7 @@ class ProcessBuiltins(BuiltinGroup):
 
     @without_effect
     def end_screw_driving(self) -> None:
-        """End screw driving; harmless if it has not begun."""
+        """Ignore a call to end screw driving."""
 
     @without_effect
     def tool_wrench_limit_set(
@@ -109,15 +109,15 @@ class ProcessBuiltins(BuiltinGroup):
 
     @without_effect
     def tool_wrench_limit_disable(self) -> None:
-        """Remove the limits of `tool_wrench_limit_set`."""
+        """Ignore a call to remove the limits of `tool_wrench_limit_set`."""
 
     @without_effect
     def high_holding_torque_enable(self) -> None:
-        """Hold an arm at rest with high torque, as by default."""
+        """Ignore a call to hold an arm at rest with high torque, which is the default."""
 
     @without_effect
     def high_holding_torque_disable(self) -> None:
-        """Hold an arm at rest with normal torque until the program ends."""
+        """Ignore a call to hold an arm at rest with normal torque until the program ends."""
 
     @without_effect
     def position_deviation_warning(self, enabled: Value, threshold: Value = 0.8) -> None:

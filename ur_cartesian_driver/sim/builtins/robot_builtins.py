@@ -188,7 +188,7 @@ class RobotBuiltins(BuiltinGroup):
     def set_target_payload(
         self, m: Value, cog: Value, inertia: Value = None, transition_time: Value = 0
     ) -> None:
-        """Set mass [kg], centre of gravity [m] and inertia [kg m^2], all at once."""
+        """Set mass [kg], centre of gravity [m] and inertia [kg m^2], without a transition time."""
         not_negative(transition_time, 'transition_time')
         matrix = (0.0,) * 6 if inertia is None else six(inertia, 'inertia')
         if min(matrix[:3]) < 0.0 or max(abs(item) for item in matrix) > 133.0:

@@ -68,6 +68,7 @@ class Fault:
 class InterfaceFault(Fault):
     """Something that goes wrong with the connections of an interface."""
 
+    #: Name of the interface, such as rtde or dashboard.
     interface: str
 
 

@@ -226,7 +226,7 @@ class FaultInjector:
         )
 
     def _impairments(self) -> dict[str, Impairment]:
-        """Return the impairment of each interface that has connection faults, all combined."""
+        """Return the impairment of each impaired interface, combined from all its faults."""
         found: dict[str, Impairment] = {}
         for running in self._active:
             fault = running.fault

@@ -186,8 +186,9 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = {
     'shutdown': Controller.power_off,
     'close popup': Controller.close_popups,
 }
-#: Commands that are answered when the program has left a state: the manufacturer's page for CB3
-#: says that they return when stopping or pausing is completed; assumed for e-Series.
+#: Command -> state that the program must have left before the command is answered. The
+#: manufacturer's page for CB3 says that these commands return when stopping or pausing is
+#: completed; assumed for e-Series.
 _AWAITED = {'stop': RuntimeState.STOPPING, 'pause': RuntimeState.PAUSING}
 #: Handlers of commands that need more than a call of the controller.
 _HANDLERS: Mapping[

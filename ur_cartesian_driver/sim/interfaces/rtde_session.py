@@ -24,7 +24,7 @@ from ur_cartesian_driver.sim.rtde_output_values import output_getter
 
 
 class _OutputSchedule:
-    """A recipe, the functions that compute its values, and the cycles in which it is due."""
+    """A recipe, the functions that compute its values, and the cycles that need a package."""
 
     def __init__(self, output: OutputStream, maximum: float) -> None:
         self.output = output

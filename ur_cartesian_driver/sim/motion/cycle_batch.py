@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Solve several hundred cycles of a path together, before they are due.
+Solves several hundred cycles of a path together, before they are due.
 
 While the speed scaling does not change, the cycles up to the end of a section of the path are
 known. Solving these cycles together with numpy takes a small fraction of the time for solving

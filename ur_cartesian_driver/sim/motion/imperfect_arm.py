@@ -251,7 +251,7 @@ class _Joint:
         self.position, self.speed = q + self._drag, 0.0
         #: Whether the joint stays at rest until its target moves.
         self.is_settled = True
-        #: Whether the measured speed is not exactly 0.
+        #: False = the measured speed is exactly 0.
         self.reads_speed = False
 
     def follow(self, q: float, qd: float, qdd: float) -> None:

@@ -59,7 +59,7 @@ class UrCap:
         )
 
     def _reason(self, error: OSError) -> str:
-        """Return the message of Java's exception."""
+        """Return the message of Java's exception for an error."""
         if isinstance(error, TimeoutError) and error.errno is None:
             return 'connect timed out'
         if _is_unknown_host(error):
@@ -69,7 +69,8 @@ class UrCap:
     def fetched(self, answer: HostAnswer) -> FetchedScript:
         """Return the parts of the fetched script; after a failure, of one that shows a window."""
         if isinstance(answer, str):
-            # The URCap reads lines; if the host hangs up, the line is Java's null.
+            # The URCap reads lines; if the host hangs up without one, it takes Java's null as a
+            # line.
             lines = answer.splitlines() or ['null']
             header, control_loop = _split('\n'.join(f' {line}' for line in lines))
             return FetchedScript(header=header, control_loop=control_loop)
@@ -93,7 +94,7 @@ class UrCapX(UrCap):
         return f'Connectivity problem with {self._host}:{self._port}: {self._words(reason)}'
 
     def _words(self, reason: str | OSError) -> str:
-        """Return the message of Python's exception."""
+        """Return the message of Python's exception for a failure."""
         if isinstance(reason, TimeoutError) and reason.errno is None:
             return str(reason) or 'timed out'
         if isinstance(reason, OSError) and reason.errno and not _is_unknown_host(reason):

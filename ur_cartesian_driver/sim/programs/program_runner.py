@@ -102,7 +102,7 @@ class ProgramArm(Protocol):
         """Make the first path move of a program start slowly."""
 
     def end_modes(self) -> None:
-        """End the modes that a program has switched on: force mode, freedrive, watchdogs."""
+        """End the modes that a program has switched on, such as force mode and freedrive."""
 
     def end_of_frame(self) -> None:
         """Brake if a thread was killed in a motion that no other thread continues."""

@@ -72,10 +72,11 @@ class MemorySocket:
 
 
 class MemorySockets:
-    """Connections to listeners in this process: port -> function that gets each connection."""
+    """Connections in memory to listeners in this process."""
 
     def __init__(self) -> None:
         """Begin without listeners."""
+        #: Port -> function that gets each connection to the port.
         self.listeners: dict[int, Callable[[MemorySocket], None]] = {}
         self._sockets: dict[str, MemorySocket] = {}
 

@@ -12,7 +12,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Payload:
-    """The payload: mass [kg], centre of gravity [m], inertia [kg m^2]."""
+    """The payload: mass [kg], centre of gravity in the flange frame [m], inertia [kg m^2]."""
 
     mass: float = 0.0
     cog: Vector3 = (0.0, 0.0, 0.0)
@@ -47,9 +47,9 @@ class Pendant:
 class StoredSettings:
     """Settings that programs store and read back; they outlive programs and affect no motion."""
 
-    #: 0.01 to 1.
+    #: Factor on the jerk of smooth moves, 0.01 to 1.
     jerk_gain_scaling: float = 1.0
-    #: 0 to 1.
+    #: Damping of force mode, 0 to 1.
     force_damping: float = 0.005
     #: Acceleration of the robot's base [m/s^2].
     base_acceleration: Vector3 = (0.0, 0.0, 0.0)

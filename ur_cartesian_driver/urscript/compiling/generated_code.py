@@ -38,7 +38,7 @@ Place = tuple[int, int]
 
 
 class ProgramHalted(BaseException):
-    """Unwinds the running thread because the program ends; not an error."""
+    """Raised in the running thread to end it, because the program ends; not an error."""
 
 
 @dataclass(frozen=True, slots=True)

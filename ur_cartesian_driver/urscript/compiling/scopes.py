@@ -60,7 +60,7 @@ class Scope:
         return self.owner.body
 
     def function(self, name: str) -> Scope | None:
-        """Find a function or thread of the program by name."""
+        """Return the scope of a function or thread, also of the scopes around; None = unknown."""
         scope: Scope | None = self
         while scope is not None:
             if name in scope.functions:

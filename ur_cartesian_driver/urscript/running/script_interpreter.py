@@ -64,7 +64,7 @@ ThreadFunction = Callable[[int], Any]
 
 
 class _ThreadKilled(BaseException):
-    """Unwinds a thread that has killed itself or one of its ancestors."""
+    """Raised in a thread that has killed itself or one of its ancestors, to end it."""
 
 
 @dataclass(slots=True, eq=False)
@@ -141,7 +141,7 @@ class ScriptInterpreter:
             code = _compile(program, builtins, self.interleaves)
         #: The compiled program; it never changes.
         self.code = code
-        #: The global variables, and all else that the code finds by name.
+        #: The global variables, functions, constants and operations of the code, by name.
         self._names: dict[str, Any] = operations(self) | {
             builtin_name(name): function for name, function in builtins.items()
         }
