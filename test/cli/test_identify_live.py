@@ -8,6 +8,7 @@ from io import StringIO
 from math import pi
 from random import Random
 import sys
+from threading import Thread
 
 import pytest
 from waiting import wait_for
@@ -161,6 +162,43 @@ def test_a_protective_stop_ends_the_experiments_and_stays(identify, ur_sim, name
     # What was recorded until then shows this very stop.
     low, high = read_twin(tmp_path / 'twin.yaml').estimates['protective_stop_time'].interval
     assert low - 3e-4 <= HIDDEN.estimates['protective_stop_time'].value <= high + 3e-4
+
+
+@pytest.mark.slow
+@hidden_arm
+@pytest.mark.parametrize(
+    ('fault', 'words', 'said'),
+    [
+        ('protective_stop', 'the robot stopped, with safety mode PROTECTIVE', 'was interrupted'),
+        ('pause', 'the program was paused', 'was interrupted'),
+        ('stop', 'the program ended', 'was interrupted'),
+        ('slider 0.5', 'the speed slider was moved', 'the speed slider was below 100 %'),
+        ('drop rtde', '127.0.0.1 port', ''),
+    ],
+)
+def test_what_disturbs_servoj_ends_it(identify, ur_sim, fault, words, said, tmp_path):
+    """The arm rests, and no law is found that the arm does not have."""
+
+    def disturb():
+        wait_for(lambda: abs(ur_sim.state().q[5] - HOME[5]) > 0.05, 30.0)
+        ur_sim.inject(fault)
+
+    disturbing = Thread(target=disturb)
+    disturbing.start()
+    status, printed, outcomes = identify('--only', 'servoj,wrist_fast')
+    disturbing.join()
+    assert status == 1, printed
+    assert outcomes['servoj'].startswith(f'ended: {words}')
+    assert outcomes['wrist_fast'] == 'not begun'
+    rests(ur_sim)
+    found = read_twin(tmp_path / 'twin.yaml')
+    for name in ('servo_gain_factor', 'servo_lookahead_factor'):
+        if said:
+            assert said in found.not_identified[name]
+        elif name in found.estimates:
+            assert found.estimates[name].value == pytest.approx(
+                HIDDEN.estimates[name].value, rel=1e-3
+            )
 
 
 @pytest.mark.slow
