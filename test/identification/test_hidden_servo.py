@@ -7,6 +7,7 @@ from dataclasses import replace
 from math import sqrt
 from random import Random
 
+from hidden_arm import Laws, Program
 from hidden_servo import drawn_calls, drawn_motion, drawn_run, record_servo, ServoLaw
 import numpy as np
 import pytest
@@ -128,6 +129,17 @@ def test_a_motion_that_is_too_short_shows_no_filter():
     motion = record_servo(law, random, drawn_calls(random, start, angle=0.005), start, 0.002)
     found = results_of(motion)['servo_gain_factor']
     assert found.reason == '1 motion of servoj turned no joint by a degree'
+
+
+def test_motions_of_servoj_do_not_make_the_moves_beside_them_doubtful(motion):
+    laws = Laws.drawn(Random(4))
+    program = Program(laws=laws, random=Random(4))
+    program.movej([0.9, 0.2, 0.0, 0.0, 0.0, 0.1], a=1.0, v=0.5)
+    recordings = [motion.samples, program.record('move')]
+    found = identify(recordings, [motion.command, *program.commands])
+    assert found.summary() == '2 moves: 1 joint move, 1 motion of servoj.'
+    low, high = found.results['start_time'].interval
+    assert low <= laws.start_time <= high
 
 
 def test_calls_that_were_others_are_noticed(motion):

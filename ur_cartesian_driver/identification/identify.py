@@ -84,9 +84,11 @@ def identify(
     :param commands_name: the file of the calls, for error texts.
     :raises ValueError: the calls do not match the moves.
     """
-    moves = without_chance_fits([move for samples in recordings for move in find_moves(samples)])
+    moves = [move for samples in recordings for move in find_moves(samples)]
     if commands:
         moves = join_commands(moves, commands, commands_name)
+    # After the calls are known: a motion of servoj is no trapezoid, on any arm.
+    moves = without_chance_fits(moves)
     joint, linear = (estimators.left_out(moves, kind) for kind in (Kind.JOINT, Kind.LINE))
     found: dict[str, Result] = {
         'start_time': estimators.start_time(moves),
