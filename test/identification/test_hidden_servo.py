@@ -95,7 +95,7 @@ def motion():
 def test_the_evidence_names_the_step_of_the_law(motion):
     found = results_of(motion)['servo_gain_factor']
     assert found.interval[0] < 1.2 < found.interval[1]
-    assert found.evidence.endswith('in 1 motion of servoj, by a law that is stepped every 2 ms')
+    assert found.evidence.endswith(' in 1 motion of servoj, by a law in steps of 2 ms')
     assert found.left_over.endswith(' urad rms')
 
 

@@ -326,9 +326,9 @@ def servo_filter(moves: Sequence[FoundMove]) -> dict[str, Result]:
         )
     elif motions and not filters:
         reason = f'{plural(motions, "motion")} of servoj turned no joint by a degree'
-    stepped = sorted({each.step for each in filters if each.step})
-    evidence = f'{plural(len(filters), "joint")} in {plural(motions, "motion")} of servoj' + (
-        f', by a law that is stepped every {1e3 * stepped[0]:g} ms' if len(stepped) == 1 else ''
+    evidence = (
+        f'{plural(len(filters), "joint")} in {plural(motions, "motion")} of servoj, by '
+        + ' and '.join(sorted({each.law for each in filters}))
     )
     experiment = (
         'record a joint that calls of servoj turn by 10 degrees and back, at 6 degrees/s, with '

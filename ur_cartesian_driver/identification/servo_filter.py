@@ -59,6 +59,11 @@ class ServoFilter:
     step: float
     rms: float
 
+    @property
+    def law(self) -> str:
+        """The law, for people."""
+        return f'a law in steps of {1e3 * self.step:g} ms' if self.step else 'a law without steps'
+
 
 def find_filter(
     time: Floats, q: Floats, follows: Flags, points: SetPoints, joint: int, begin: float
