@@ -21,6 +21,7 @@ from ur_cartesian_driver.identification.moves import (
 )
 from ur_cartesian_driver.identification.profile import Misfit
 from ur_cartesian_driver.identification.recorded_calls import MotionCommand
+from ur_cartesian_driver.identification.servo.servo_laws import servo_laws
 from ur_cartesian_driver.motion.twin.laws import LAWS
 
 #: Laws that no recording identifies so far.
@@ -98,10 +99,9 @@ def identify(
         'timed_joint_speed': joint[1],
         'timed_linear_acceleration': linear[0],
         'timed_linear_speed': linear[1],
-        'set_point_deceleration': estimators.set_point_deceleration(moves),
-        **estimators.servo_filter(moves),
         'idle_between_moves': estimators.idle_between_moves(moves),
         **blend_laws(moves),
+        **servo_laws(moves),
         **estimators.arm_figures(recordings),
         **estimators.packet_gaps(recordings),
     }
