@@ -3,15 +3,17 @@
 """
 Check the clearance of the arm, and of the bodies that it carries, from the cell.
 
-The whole motion is checked, not only its samples. Between two rows, no body moves farther than the
-box around all bodies on its carrier. So one distance, measured in the middle of a stretch of rows,
-proves the whole stretch if it is large enough; otherwise the stretch is halved. Halving continues
-between two rows, along the straight line between their poses, until the bodies move less than
-:data:`RESOLUTION`. The second differences of the rows and the turns of the joints bound the
-deviation of the true motion from this line.
+A motion is given as rows of joint positions. It is checked everywhere, not only at its rows. Each
+body moves with a carrier: the base or a link of the arm. The box around all bodies on a carrier
+bounds the motion of each of them. The distance of a pair is measured in the middle of a stretch of
+rows. If it exceeds the clearance by more than the bodies move between there and the ends of the
+stretch, the pair keeps its clearance on the whole stretch; otherwise the stretch is halved.
+Halving continues between two rows, along the straight line between their poses, until the bodies
+move less than :data:`RESOLUTION`. The deviation of the true motion from this line is bounded by
+second differences of the boxes and by the turns of the joints.
 
-A pair that is too close at the start may separate, as in the check for self-collisions
-(:mod:`~.clearance`).
+A pair that is too close at the start is accepted while its distance only grows, as in the check
+for self-collisions (:mod:`~.clearance`).
 """
 
 from __future__ import annotations
@@ -30,28 +32,31 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 RESOLUTION = 2e-5
 # Rows of the longest stretch, and rows per block: blocks bound the memory.
 _STRETCH, _BLOCK = 64, 8192
-# Least number of stretches of a motion: bounding one more costs less than halving one.
+# Blocks with enough rows are divided into at least this many stretches, because bounding the
+# distances on one more stretch costs less than halving a stretch.
 _PARTS = 8
 # A separating pair may come closer by this much [m], because of rounding.
 _RECEDING_TOLERANCE = 1e-4
-# Greatest motion of a separating pair between two measurements [m].
+# The bodies of a separating pair together move at most this far between two measurements [m].
 _LEAVING_STEP = 0.002
-# Number of places between two rows at which a pair that is too close there is measured.
+# A pair that is too close between two rows is measured at this many places from one to the other.
 _LOOKS = 9
 # Larger than any distance in a cell [m].
 _FAR = 1e3
-# Accuracy of the smallest distance on a path: this fraction of it or this length [m], if larger.
+# The smallest distance on a path is found to within this fraction of it or this length [m],
+# whichever is larger.
 _CLOSEST_FRACTION, _CLOSEST_LENGTH = 0.25, 0.001
 
 
 class Place(NamedTuple):
-    """A place of a path at which two bodies are close."""
+    """A place on a path at which two bodies are close."""
 
-    #: The number of the row before it, and the fraction of the way to the next; -1 = the start.
+    #: The index of the row before the place, plus the fraction of the way to the next row; the
+    #: start configuration counts as row -1.
     at: float
-    #: The number of the pair in :attr:`CellDistances.pairs`.
+    #: The index of the pair in :attr:`CellDistances.pairs`.
     pair: int
-    #: [m], at most 0 where the bodies touch.
+    #: The distance between the two bodies [m], at most 0 where they touch.
     distance: float
 
     @property
@@ -68,28 +73,29 @@ class Place(NamedTuple):
 
 
 class CellResult(NamedTuple):
-    """The result of the check of a path."""
+    """The clearance of a path from the cell."""
 
-    #: The first place at which a pair is closer than its clearance; between two rows, the place at
-    #: which it is closest. None = there is none.
+    #: The first place at which a pair is closer than its clearance; if this is between two rows,
+    #: the place between them at which the pair is closest. None = no pair is refused.
     violation: Place | None
-    #: The place at which a pair is closest; None = nothing is measured. Bodies on neighbouring
-    #: links do not count: they are always close.
+    #: The place with the smallest distance of all pairs; None = no distance was recorded. Pairs on
+    #: neighbouring links are left out, because they are always close.
     closest: Place | None
-    #: Lower bound of the distances of all pairs on the whole path [m].
+    #: Lower bound of the distances of these pairs [m], on the whole path or up to the violation;
+    #: infinite if ``closest`` is None.
     at_least: float
 
 
 @dataclass(slots=True)
 class _Stretches:
-    """Stretches of a block by the rows of their ends; a fraction lies between two rows."""
+    """Stretches of a block, by the row indices of their ends; fractions lie between two rows."""
 
     begin: Floats
     end: Floats
 
     @property
     def middle(self) -> Floats:
-        """The middle of each stretch, rounded to a row if the stretch has a row inside."""
+        """The middle of each stretch, rounded down to a row if the stretch has a row inside."""
         middle = 0.5 * (self.begin + self.end)
         return np.where(self.end - self.begin > 1.0, np.floor(middle), middle)
 
@@ -102,28 +108,29 @@ class _Stretches:
 
 
 class _Motion:
-    """Consecutive rows of joints, with bounds on the motion of bodies between any two of them."""
+    """Consecutive rows of joints, with bounds on the motion of bodies between any two rows."""
 
     def __init__(self, bodies: CellDistances, q: Floats) -> None:
         self.poses = bodies.poses(q)
         points = bodies.box_points(self.poses)
         changes = np.diff(points, axis=0)
         steps, bends = _summed_lengths(changes), _summed_lengths(np.diff(changes, axis=0))
-        # A curve deviates from its chord by an eighth of its second difference; twice as much is
-        # safe.
+        # A curve deviates from its chord by about an eighth of its second difference. A quarter is
+        # used as a safe bound.
         padded = np.pad(bends, ((1, 1), (0, 0)))
         bends = 0.25 * np.maximum(padded[1:], padded[:-1])
-        # In a corner of the path this bound is too large; the turns of the joints give another.
+        # In a corner of the path this bound is far too large. The turns of the joints give
+        # another bound, and the smaller one is used.
         turns = np.cumsum(np.abs(np.diff(q, axis=0)), axis=1)
         turned = np.pad(turns, ((0, 0), (1, 0)))[:, :CARRIERS]
         by_turns = 0.25 * turned**2 * bodies.reaches
-        #: (n - 1, carriers) greatest deviation of the motion from the line between two rows [m].
+        #: (n - 1, carriers) bound on the deviation of bodies from the line between two rows [m].
         self.bends = np.minimum(bends, by_turns) if len(q) > 2 else by_turns
-        #: (n, carriers) upper bound of the motion of bodies since the first row [m].
+        #: (n, carriers) bound on the distance that bodies have moved since the first row [m].
         self.moved = np.vstack([np.zeros(CARRIERS), np.cumsum(steps + 2.0 * self.bends, axis=0)])
 
     def at(self, places: Floats) -> Floats:
-        """Return the poses of the carriers (k, carriers, 7) at places between rows."""
+        """Return the poses of the carriers (k, carriers, 7) at fractional row indices (k,)."""
         row = np.minimum(places.astype(np.intp), len(self.poses) - 1)
         part = places - row
         poses = self.poses[row]
@@ -139,33 +146,33 @@ class _Motion:
         return poses
 
     def moved_of(self, carriers: Indices) -> Floats:
-        """Return the sum (n,) [m] of the motions of two carriers up to each row."""
+        """Return the summed motion (n,) [m] of two carriers from the first row to each row."""
         a, b = carriers.tolist()
         return self.moved[:, a] + self.moved[:, b] if b else self.moved[:, a]
 
     def bend(self, places: Floats, carriers: Indices) -> Floats:
-        """Return the bound (k,) [m] on the deviation of poses between rows; 0 in a row."""
+        """Return bounds (k,) [m] on the errors of two interpolated carriers; 0 in a row."""
         row = places.astype(np.intp)
         bends = self.bends[np.minimum(row, len(self.bends) - 1)][:, carriers].sum(axis=1)
         return np.where(places == row, 0.0, bends)
 
 
 def _summed_lengths(changes: Floats) -> Floats:
-    """Return the summed lengths (n, carriers) [m] of the four vectors of each carrier."""
+    """Return the summed lengths (n, carriers) [m] of the four vectors of each carrier's box."""
     lengths = np.sqrt(np.einsum('nckx,nckx->nck', changes, changes))
     together: Floats = np.einsum('nck->nc', lengths)
     return together
 
 
 def _at(moved: Floats, places: Floats) -> Floats:
-    """Return the interpolated motion of bodies up to places between rows [m]."""
+    """Return the motion since the first row [m], interpolated at fractional row indices."""
     row = np.minimum(places.astype(np.intp), len(moved) - 2)
     found: Floats = moved[row] + (places - row) * (moved[row + 1] - moved[row])
     return found
 
 
 def _dense_places(moved: Floats) -> Floats:
-    """Return all rows but the first, and enough places between for :data:`_LEAVING_STEP`."""
+    """Return all rows but the first, and places between, at most :data:`_LEAVING_STEP` apart."""
     counts = np.maximum(1, np.ceil(np.diff(moved) / _LEAVING_STEP)).astype(np.intp)
     row = np.repeat(np.arange(len(counts)), counts)
     number = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -180,7 +187,7 @@ class CellClearance:
         self.bodies = bodies
 
     def too_close(self, q: Floats) -> Flags:
-        """Return whether each configuration (n, 6) [rad] is closer to a body than allowed."""
+        """Return for each configuration (n, 6) [rad] whether a pair is below its clearance."""
         close = np.zeros(len(q), dtype=np.bool_)
         bodies = self.bodies
         for begin in range(0, len(q), _BLOCK):
@@ -201,7 +208,7 @@ class CellClearance:
 
         :param q: (n, 6) [rad], in order of time.
         :param q_start: the start configuration; pairs that are too close there may separate.
-        :param closest: whether to search for the closest pair, too, which takes longer.
+        :param closest: whether to search for the closest pair as well, which takes longer.
         """
         search = _Search(self.bodies, closest)
         before = np.array([q_start])
@@ -221,31 +228,32 @@ class _Search:
         self._bodies, self._seeks_closest = bodies, seeks_closest
         self.violation: Place | None = None
         self.closest: Place | None = None
-        #: By pair that has been too close since the start: its greatest distance so far [m].
+        #: The pairs that have been too close since the start, with their greatest distances [m].
         self._pending: dict[int, float] = {}
 
     @property
     def at_least(self) -> float:
-        """The proved lower bound of the distances of all pairs so far [m]."""
+        """Proved lower bound of the distances so far [m], neighbouring links excepted."""
         if self.closest is None:
             return inf
         distance = self.closest.distance
         proved = distance - max(_CLOSEST_LENGTH, _CLOSEST_FRACTION * distance)
-        # All pairs keep their clearances, unless one has been too close since the start.
+        # A pair keeps its clearance, unless it has been too close since the start. Then it has
+        # been measured, and is no closer than ``distance``.
         return max(proved, min(distance, float(self._bodies.clearances.min())))
 
     def block(self, motion: _Motion, offset: int, *, is_first: bool) -> None:
         """
         Search the rows of a block.
 
-        :param offset: the number of the block's first row among all rows.
+        :param offset: the index of the block's first row among all rows; -1 = the start.
         """
         bodies, last = self._bodies, len(motion.poses) - 1
         length = min(_STRETCH, max(1, last // _PARTS))
         begins = np.arange(0, last, length, dtype=np.float64)
         stretches = _Stretches(begins, np.minimum(begins + length, last))
         middle = stretches.middle.astype(np.intp)
-        # The first row is in the same call, because calls cost more than rows.
+        # The first row is bounded in the same call, because a call costs more than a row.
         first, *_ = lower = bodies.lower_bounds(motion.poses[np.append(0, middle)])
         lower = lower[1:]
         moved = motion.moved
@@ -273,7 +281,11 @@ class _Search:
     def _look_where_close(
         self, motion: _Motion, rows: Indices, lower: Floats, offset: int
     ) -> None:
-        """Measure the pair and row that are probably closest, to spare measuring most others."""
+        """
+        Measure the pair that is probably closest of all, in the row where it is closest.
+
+        Most other pairs then need no measurement, because they are certainly farther apart.
+        """
         if not (self._seeks_closest and lower.size):
             return
         far = np.where(self._bodies.are_neighbours, inf, lower)
@@ -283,14 +295,14 @@ class _Search:
         self._remember(int(column), some.astype(np.float64), distance, offset)
 
     def _enough(self, column: int) -> float:
-        """Return the distance [m] from which on a pair needs no closer look."""
+        """Return the distance [m] at and above which a pair needs no exact measurement."""
         clearance = float(self._bodies.clearances[column])
         if not self._seeks_closest or self._bodies.are_neighbours[column]:
             return clearance
         return max(clearance, min(self.at_least, _FAR))
 
     def _find_pending(self, motion: _Motion, lower: Floats) -> None:
-        """Find the pairs that are too close in the first row; ``lower``: their lower bounds."""
+        """Find the pairs that are too close in the first row, from the lower bounds (pairs,)."""
         bodies, first = self._bodies, motion.poses[:1]
         near = lower < bodies.clearances
         for column in np.flatnonzero(near).tolist():
@@ -304,8 +316,8 @@ class _Search:
         """
         Follow a pair that was too close at the start.
 
-        :returns: the place from which on the pair is clear; None = it stays too close, or comes
-            closer.
+        :returns: the place in the block from which on the pair is clear; None = it stays too close
+            to the end of the block, or comes closer, which is recorded as a violation.
         """
         clearance = float(self._bodies.clearances[column])
         moved = motion.moved_of(self._bodies.carriers[column])
@@ -330,7 +342,11 @@ class _Search:
     def _search_pair(
         self, column: int, motion: _Motion, offset: int, stretches: _Stretches
     ) -> None:
-        """Search stretches for a violation of one pair, halving those that are not proved."""
+        """
+        Search stretches for a violation and the smallest distance of one pair.
+
+        Stretches on which its distance may be below :meth:`_enough` are halved.
+        """
         bodies, carriers = self._bodies, self._bodies.carriers[column]
         clearance, moved = float(bodies.clearances[column]), motion.moved_of(carriers)
         first = float(stretches.begin[0]) if len(stretches.begin) else 0.0
@@ -358,7 +374,7 @@ class _Search:
         self, column: int, motion: _Motion, place: float, first: float, offset: int
     ) -> Place:
         """
-        Return the place at which a pair is nearest between the two rows around a place.
+        Return the place between the two rows around ``place`` at which a pair is closest.
 
         :param first: the first place to measure; before it, the pair may still be separating.
         """
@@ -372,12 +388,12 @@ class _Search:
         return Place(offset + float(places[k]), column, float(sure[k]))
 
     def _remember(self, column: int, places: Floats, distances: Floats, offset: int) -> None:
-        """Record the closest of some places if it is closer than all before."""
+        """Record the smallest of some distances if it is smaller than all before."""
         if not (self._seeks_closest and len(places)) or self._bodies.are_neighbours[column]:
             return
         k = int(np.argmin(distances))
         before = inf if self.closest is None else self.closest.distance
-        # A distance of at least ``_enough`` may be a mere lower bound.
+        # A distance that is not below ``_enough`` may be only a lower bound.
         if distances[k] < min(before, self._enough(column)):
             self.closest = Place(offset + float(places[k]), column, float(distances[k]))
 

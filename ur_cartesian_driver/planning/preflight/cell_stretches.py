@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The cell along a path on which the tool takes and releases bodies.
+The cell on each stretch of a path along which the tool takes and releases bodies.
 
 A body on the tool keeps its pose in the flange frame; a released body keeps its pose in base.
 """
@@ -34,12 +34,12 @@ class CellStretch(NamedTuple):
 
 def attached(cell: Cell, name: str, arm: Arm, q: Joints, T_flange_tcp: Pose) -> Cell:
     """
-    Return the cell with a body attached to the tool at its present place.
+    Return the cell with a body attached to the tool in the body's present pose.
 
     :param q: the joint positions at which the tool takes the body [rad].
-    :param T_flange_tcp: the active TCP, which may carry bodies.
-    :raises ValueError: the cell has no such body, it is on the tool already, or the tool cannot
-        carry it; the text is a clause.
+    :param T_flange_tcp: the active TCP, for a body that is given in ``tool0_controller``.
+    :raises ValueError: the cell has no such body, the body is on the tool already, or the tool
+        cannot carry it; the text is a clause.
     """
     body = cell.body(name)
     if body.is_on_tool:
@@ -50,10 +50,11 @@ def attached(cell: Cell, name: str, arm: Arm, q: Joints, T_flange_tcp: Pose) -> 
 
 def released(cell: Cell, name: str, arm: Arm, q: Joints, T_flange_tcp: Pose) -> Cell:
     """
-    Return the cell with a body released from the tool at its present place.
+    Return the cell with a body released from the tool in the body's present pose.
 
     :param q: the joint positions at which the tool releases the body [rad].
-    :raises ValueError: the cell has no such body, or it is not on the tool; a clause.
+    :raises ValueError: the cell has no such body, or the body is not on the tool; the text is a
+        clause.
     """
     body = cell.body(name)
     if not body.is_on_tool:
@@ -65,7 +66,8 @@ def changed(cell: Cell, change: PartChange, arm: Arm, q: Joints, T_flange_tcp: P
     """
     Return the cell after a change at a point of a goal.
 
-    :raises ValueError: the change cannot be made; a clause.
+    :param q: the joint positions at this point [rad].
+    :raises ValueError: the change cannot be made; the text is a clause.
     """
     make = attached if change.action is PartAction.ATTACH else released
     return make(cell, change.body, arm, q, T_flange_tcp)
@@ -81,9 +83,9 @@ def cell_stretches(
     cell: Cell,
 ) -> Iterator[CellStretch]:
     """
-    Yield the stretches of a path, none if the path has no rows.
+    Yield the stretches of a path on which the cell stays as it is; none if the path has no rows.
 
-    :param changes: the checked changes, in any order.
+    :param changes: changes that can all be made (see :func:`changed`), in any order.
     :param segment: (n,) the segment of each row, by the number of the point at its end, not
         decreasing.
     :param q: (n, 6) [rad].

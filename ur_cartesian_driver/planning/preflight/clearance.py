@@ -3,12 +3,12 @@
 """
 Check the clearance of the arm from itself, the workspace planes and the cell along its path.
 
-Cylinders are checked in every row. Where cylinders come close, meshes are measured, if the model
-has them (:mod:`~ur_cartesian_driver.kinematics.collision_meshes`). Whether a distance below
-`min_clearance` is refused or only reported depends on `self_collision` and the model, never on
-whether meshes are installed. An arm that starts too close can move away: a pair that is too close
-at the start is accepted while its distance only grows. Once the pair is clear, it is treated like
-all others.
+In every row of joint positions, cylinders that contain the links are measured. Where cylinders
+come close, meshes are measured, if the model has them
+(:mod:`~ur_cartesian_driver.kinematics.collision_meshes`). Whether a distance below `min_clearance`
+is refused or only reported depends on `self_collision` and the model, never on whether meshes are
+installed. An arm that starts too close can move away: a pair that is too close at the start is
+accepted while its distance only grows. Once the pair is clear, it is treated like all others.
 """
 
 from __future__ import annotations
@@ -39,18 +39,18 @@ from ur_cartesian_driver.planning.preflight.cell_clearance import CellClearance
 from ur_cartesian_driver.planning.preflight.cell_stretches import cell_stretches
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
-# Rows per block: blocks bound the memory, and a refusal ends the check early.
+# Rows per block. Blocks bound the memory, and blocks after a refusal are not checked.
 _BLOCK = 4096
 # A separating pair may come closer by this much [m], because of rounding.
 _RECEDING_TOLERANCE = 1e-4
-# Bodies that overlap by less than this [m] touch.
+# Bodies that overlap by less than this [m] are reported as touching.
 _DEPTH_SHOWN = 1e-4
-# Rounding error by which a tool that works on a plane without a margin may be beyond it [m].
+# A tool that works on a plane may be beyond the plane's margin by this rounding error [m].
 _ON_PLANE = 1e-6
 
 
 class JointSamples(NamedTuple):
-    """The joints along the path of a goal; columns (n,)."""
+    """The joints along the path of a goal, in columns of n samples."""
 
     #: The segment of each sample, by the number of the point at its end.
     segment: Int32s
@@ -62,7 +62,7 @@ class JointSamples(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Violation:
-    """The first row at which a pair is too close."""
+    """A row at which a pair is too close, with the texts about it."""
 
     #: The row, as an index of the checked configurations.
     row: int
@@ -70,9 +70,9 @@ class Violation:
     text: str
     #: A clause: how to avoid the violation.
     remedy: str
-    #: The names of the two bodies.
+    #: The names of the two bodies, if the violation is in the cell.
     bodies: tuple[str, ...] = ()
-    #: The joints at the violation [rad].
+    #: The joints at the violation [rad], if it is in the cell.
     q: Joints | None = None
 
 
@@ -85,7 +85,7 @@ class ClosestInCell(NamedTuple):
     bodies: tuple[str, str]
     #: [m]
     distance: float
-    #: Lower bound of the distances of all pairs on the whole path [m].
+    #: Lower bound of the distances of all pairs but neighbouring links on the whole path [m].
     at_least: float
 
 
@@ -97,12 +97,13 @@ class ClearanceResult:
     violation: Violation | None
     #: The violation of which the report only warns.
     warning: Violation | None
-    #: The smallest distance in all rows [m]: negative if cylinders overlap or a plane is crossed,
-    #: infinite if nothing is checked, a lower bound if measured between cylinders.
+    #: The smallest distance from the arm itself and from the planes [m]: negative if cylinders
+    #: overlap or a plane is crossed, infinite if neither is checked, a lower bound if measured
+    #: between cylinders.
     margin: float
-    #: The pair with that distance, and the shapes between which it was measured.
+    #: The pair with the distance ``margin``, and the shapes between which it was measured.
     description: str
-    #: The closest pair in the cell; None = no pair is measured.
+    #: The closest pair in the cell; None = no pair was measured.
     in_cell: ClosestInCell | None = None
 
 
@@ -110,11 +111,11 @@ class Clearance:
     """
     The clearance of one arm with one tool.
 
-    :param T_flange_tcp: the TCP of the goal; the cylinder of the tool leads from the flange to it.
+    :param T_flange_tcp: the TCP of the goal, to which the cylinder of the tool reaches.
     :param options: self_collision, min_clearance, tool_radius, workspace_planes and cell are used.
     :param T_flange_active: the active TCP, for bodies in ``tool0_controller``; None = the TCP of
         the goal.
-    :raises NotAvailable: the cell has a mesh, and pinocchio is not installed.
+    :raises NotAvailable: the cell has a mesh, and pinocchio, which measures it, is not installed.
     """
 
     def __init__(
@@ -136,7 +137,12 @@ class Clearance:
         )
 
     def too_close(self, q: Floats) -> Flags:
-        """Return whether each configuration (n, 6) [rad] is too close, regardless of the start."""
+        """
+        Return for each configuration (n, 6) [rad] whether a pair is too close.
+
+        Pairs that would only be warned of count, too. There is no exception for a start that is
+        too close.
+        """
         close = np.zeros(len(q), dtype=np.bool_)
         for checker in self._checkers:
             exact = np.zeros(len(checker.bounds), dtype=np.bool_)
@@ -150,7 +156,7 @@ class Clearance:
         return close
 
     def violation_at(self, q: Joints) -> Violation | None:
-        """Return the violation in a configuration [rad], regardless of the start."""
+        """Return a violation if :meth:`too_close` is true of this configuration [rad]."""
         row = np.array([q])
         for checker in self._checkers:
             _, distances = checker.measure(row, np.ones(len(checker.bounds), dtype=np.bool_))
@@ -166,8 +172,8 @@ class Clearance:
         Return the smallest distance and the closest pair in the cell for each configuration.
 
         :param q: (n, 6) [rad].
-        :returns: (n,) the smallest distance [m], infinite if no pair is measured, and the closest
-            pair.
+        :returns: (n,) the smallest distances [m], infinite if the cell has no pairs, and the names
+            of the closest pairs.
         """
         if self._cell is None or not self._cell.bodies.pairs:
             return np.full(len(q), inf), [('', '')] * len(q)
@@ -183,7 +189,7 @@ class Clearance:
         :param q_start: the start configuration; pairs that are too close there may separate.
         :param closest: whether to search for the closest pair in the cell, which takes longer.
         """
-        #: The first violation that is refused (True), and the first with only a warning (False).
+        #: By ``checker.refuses``: the first violation that is refused, and the first warning.
         found: dict[bool, Violation] = {}
         margin, description = inf, ''
         start = np.array([q_start])
@@ -236,7 +242,7 @@ class Clearance:
 
 
 def _violation_in_cell(pair: Pair, distance: float, row: int, q: Joints) -> Violation:
-    """Return the violation of a pair that is closer than its clearance [m], in a row."""
+    """Return the violation of a pair whose distance [m] in a row is below its clearance."""
     if distance > 0.0:
         found, bound = format_distinct(distance, pair.clearance)
         near, than = (
@@ -257,16 +263,17 @@ def _violation_in_cell(pair: Pair, distance: float, row: int, q: Joints) -> Viol
 
 @lru_cache(maxsize=8)
 def _bodies(arm: Arm, T_flange_tcp: Pose, tool_radius: float) -> CollisionBodies:
-    """Return the bodies of an arm; cached, because the same arm is planned for repeatedly."""
+    """Return the bodies of an arm, cached because goals for the same arm follow each other."""
     return CollisionBodies(arm, T_flange_tcp, tool_radius)
 
 
-# A goal may take and release a dozen parts, and each corner of its offsets needs all these cells.
+# A goal may take and release a dozen parts. Each corner of its offset band is checked with all the
+# cells that result.
 @lru_cache(maxsize=32)
 def _cell_clearance(
     arm: Arm, T_flange_active: Pose, cell: Cell, tool_radius: float, T_flange_tip: Pose
 ) -> CellClearance | None:
-    """Return the clearance from a cell; cached likewise. None = the cell is empty."""
+    """Return the clearance from a cell, cached like :func:`_bodies`; None = the cell is empty."""
     if not cell:
         return None
     if problem := missing_coal(cell):
@@ -279,7 +286,7 @@ def clearance_remarks(clear: ClearanceResult, segment: Int32s, fraction: Floats)
     Return the report lines about the clearance.
 
     :param segment: (n,) the segment of each row.
-    :param fraction: (n,) the fraction of that segment, 0..1.
+    :param fraction: (n,) the fraction of its segment before each row, 0..1.
     :raises CollisionPredicted: there is a violation for which the goal is refused.
     """
     if clear.violation is not None:
@@ -319,7 +326,7 @@ def clearance_lines(
 ) -> list[str]:
     """Return the report lines about the clearance; for errors see :func:`clearances`."""
     found = clearances(arm, tool_tips, options, path, q_start, part_changes)
-    # Two tips often have the same line.
+    # Two tool tips often give the same line.
     return list(dict.fromkeys(line for _, lines in found for line in lines))
 
 
@@ -337,9 +344,9 @@ def clearances(
     """
     Yield the clearance of each stretch of a path with each tool tip, and its report lines.
 
-    :param tool_tips: the active TCP first.
+    :param tool_tips: the tips in the flange frame, the active TCP first.
     :param part_changes: the bodies that the tool takes or puts down along the path.
-    :param displaced: (n, 6) joints displaced by an offset [rad], to check in place of the path's.
+    :param displaced: (n, 6) joints displaced by an offset [rad], to check in place of ``path.q``.
     :param closest: whether to search for the closest pair in the cell, which takes longer.
     :raises CollisionPredicted: there is a violation for which the goal is refused.
     """
@@ -352,7 +359,7 @@ def clearances(
         used = options if cell is options.cell else replace(options, cell=cell)
         for tip in tool_tips:
             if tip is not active and cell and not options.tool_radius:
-                used = replace(used, cell=EMPTY_CELL)  # nothing in the cell depends on the tip
+                used = replace(used, cell=EMPTY_CELL)  # no shape depends on this tip
             clear = Clearance(arm, tip, used, active).check(checked[rows], start, closest=closest)
             try:
                 lines = clearance_remarks(clear, path.segment[rows], path.fraction[rows])
@@ -374,9 +381,11 @@ class _InitialViolations:
 
     def refused(self, lower: Floats, distances: Floats) -> Flags:
         """
-        Return whether each pair is refused in each row (rows, columns).
+        Return whether each pair is too close in each row (rows, columns), and not separating.
 
-        :param lower: the distances of the cylinders; where meshes touch, they tell whether the
+        Call it with consecutive rows, because it follows the separating pairs.
+
+        :param lower: the distances between cylinders; where meshes touch, they tell whether the
             links separate.
         :param distances: the distances to compare with the bounds.
         """
@@ -393,7 +402,11 @@ class _InitialViolations:
 
 
 def _is_receding(values: Floats, reached: Floats) -> tuple[Floats, Flags]:
-    """Return each column's largest value, and whether each value is at least all before it."""
+    """
+    Return each column's largest value, and whether each value is at least all before it.
+
+    :param reached: the largest values before the first row.
+    """
     largest = np.maximum.accumulate(np.vstack([reached, values]))
     receding: Flags = values >= largest[:-1] - _RECEDING_TOLERANCE
     return largest[-1], receding
@@ -408,19 +421,19 @@ class _SelfCollisionChecker:
         self._bodies, self._tcp, self._options = bodies, T_flange_tcp, options
         self._name = bodies.arm.model.name
         self._bound = options.min_clearance
-        #: The minimum distance of each pair.
+        #: The distance that each pair has to keep [m].
         self.bounds = np.full(len(bodies.pairs), self._bound)
         #: Whether a distance below its bound is refused.
         self.refuses = refuses_self_collision(self._name, options)
 
     @cached_property
     def _meshes(self) -> CollisionMeshes | None:
-        """The meshes, loaded when cylinders first come close: most goals need none."""
+        """The meshes; loaded when cylinders first come close, because most goals need none."""
         if missing_meshes(self._name):
             return None
         try:
             return CollisionMeshes(self._bodies.arm, self._tcp, self._options.tool_radius)
-        except ImportError:  # pinocchio is installed but broken: built for another numpy, say
+        except ImportError:  # pinocchio is broken, for example built for another numpy
             return None
 
     def description(self, column: int, lower: float) -> str:
@@ -437,8 +450,9 @@ class _SelfCollisionChecker:
         """
         Return the cylinders' distances, and distances to compare with the bounds, (n, columns).
 
-        :param pending: whether each column needs exact distances. In the other columns, a distance
-            below the bound is returned as 0 if it is refused anyway, which is faster.
+        :param pending: whether each column needs exact distances. In the other columns, if this
+            check refuses, a distance below the bound may be returned as 0, and a larger one as a
+            lower bound, which is faster.
         """
         lower = self._bodies.distances(q, inf if pending.any() else self._bound)
         close = np.flatnonzero((lower < self._bound).any(axis=0))
@@ -474,13 +488,13 @@ class _SelfCollisionChecker:
 
 
 def refuses_self_collision(name: str, options: PlanningOptions) -> bool:
-    """Return whether a goal is refused if it brings an arm of a model too close to itself."""
+    """Return whether self-collisions of a model are refused, and not only warned of."""
     choice = options.self_collision
     return choice == 'refuse' or (choice == 'auto' and name in MODELS_WITH_MESHES)
 
 
 def self_collision_remark(name: str, options: PlanningOptions) -> str:
-    """Return a sentence on the meshes that the check of a model lacks; '' if none are needed."""
+    """Return a sentence about missing meshes of a model and the effect; '' = none is missing."""
     missing, refuses = missing_meshes(name), refuses_self_collision(name, options)
     if not missing or options.self_collision == 'off':
         return ''
@@ -518,7 +532,11 @@ class _PlaneChecker:
         return f'{self._names[which]} and the plane "{self._planes[number].name}"'
 
     def measure(self, q: Floats, pending: Flags) -> tuple[Floats, Floats]:
-        """Return the heights (n, columns) of links and TCP above the planes, twice the same."""
+        """
+        Return the heights (n, columns) of links and TCP above the planes [m].
+
+        They are returned twice, as both results of :meth:`_SelfCollisionChecker.measure`.
+        """
         low = self._bodies.heights(q, self._normals)[:, :, self._moving]
         links = np.minimum.reduceat(low, self._begins, axis=2)
         tcp = np.array(self._arm.frames_rows(q).point(self._tcp))

@@ -4,8 +4,8 @@
 Find goals in which the frames of part and tool are probably exchanged.
 
 Exchanged frames give another valid path, so nothing proves a mistake. But paths usually begin near
-the arm. So a mistake is reported if the path as given begins far from the arm, and would begin
-near it with the frames exchanged.
+the tool. So an exchange is suspected if the path as given begins far from the tool, and would
+begin near it with the frames exchanged.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 #: Length that is equivalent to a turn by one radian [m/rad].
 _TURN = 0.1
-#: The path as given begins at least this far away [m], and more than this many times as far as
-#: with the frames exchanged.
+#: An exchange is suspected if the path as given begins farther than _FAR [m] from the tool, and
+#: more than _TIMES times as far as with the frames exchanged.
 _FAR, _TIMES = 0.1, 3.0
 
 
 def exchanged_frames(goal: GoalTable, state: RobotState) -> str:
-    """Return a clause about frames that are probably exchanged; '' = nothing suggests it."""
+    """Return a clause about frames that are probably exchanged; '' = no exchange suspected."""
     T_base_flange = state.actual_tcp_pose @ state.T_flange_tcp.inverse()
     held, first = goal.moving_frame, goal.waypoints.pose(0)
     if held is not None:

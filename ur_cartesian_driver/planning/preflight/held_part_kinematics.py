@@ -3,10 +3,11 @@
 """
 The kinematics of an arm that leads a held part along a tool that is fixed in the cell.
 
-The path is given as poses of the tool in the frame on the part. The position p of the tool is
-fixed in base. At p, the part has the velocity v, the turn rate w and the acceleration a, in its
-own axes. So the tool moves in the part with the velocity -v and the turn rate -w. Because p stands
-still while the part turns, the acceleration of the tool in the part is -(a - 2 w x v).
+The path is given as poses of the tool in a frame on the part. The position p of the tool is fixed
+in base. The point of the part that is at p has the velocity v and the acceleration a, and the part
+turns at the rate w, all in the axes of the part. So the tool moves in the part with the velocity
+-v and the turn rate -w. Because the part turns and its point at p changes, the acceleration of the
+tool in the part is -(a - 2 w x v).
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ class HeldPartKinematics(TcpKinematics):
     """
     The kinematics of a path in a frame that the flange carries.
 
-    :param T_flange_tcp: the active TCP, whose speed in base is limited like any tool's.
+    :param T_flange_tcp: the active TCP, whose speed in base is limited, too.
+    :param frame: the frame on the part, in the flange frame, and the pose of the tool in base.
     """
 
     frame_moves = True
@@ -83,7 +85,7 @@ class HeldPartKinematics(TcpKinematics):
         return inverse_rows(transform_rows(self._T_tool_base, T_base_frame))
 
     def tool_rates(self, q: Floats, qd: Floats, qdd: Floats) -> tuple[Floats, Floats]:
-        """Return twist and acceleration (n, 6) of the tool in the axes of the frame."""
+        """Return twist and acceleration (n, 6) of the tool in the frame on the part."""
         twist, acceleration = tool_rates(self.arm, self._point, q, qd, qdd)
         acceleration[:, :3] -= _twice_turned(twist)
         to_frame = conjugate_rows(self._orientations(q))
@@ -99,7 +101,12 @@ class HeldPartKinematics(TcpKinematics):
     def largest_joint_rates(
         self, q: Floats, rates: tuple[float, float], accelerations: tuple[float, float]
     ) -> tuple[Floats, Floats]:
-        """Return bounds of the joint velocities and accelerations (n, 6)."""
+        """
+        Return bounds of the joint velocities and accelerations (n, 6).
+
+        :param rates: bounds on the linear and angular velocity of the tool in the frame on the
+            part [m/s], [rad/s]; ``accelerations`` likewise.
+        """
         linear, angular = accelerations
         changed = linear + 2.0 * rates[0] * rates[1], angular
         return largest_joint_rates(self.arm, self._point, q, rates, changed)
@@ -111,7 +118,7 @@ class HeldPartKinematics(TcpKinematics):
 
     @property
     def reach(self) -> float:
-        """The greatest distance of the tool from the frame on the part [m]."""
+        """Upper bound of the distance of the tool from the frame on the part [m]."""
         lever = hypot(*self._frame.T_flange_frame.position)
         return self.arm.model.max_reach + hypot(*self._frame.T_base_tool.position) + lever
 
@@ -122,7 +129,7 @@ class HeldPartKinematics(TcpKinematics):
 
 
 def kinematics_of(frame: MovingFrame | None, arm: Arm, T_flange_tcp: Pose) -> TcpKinematics:
-    """Return the kinematics of a path in a moving frame; None = the frame is fixed in base."""
+    """Return the kinematics of a path in ``frame``; None = the path is given in base."""
     if frame is None:
         return TcpKinematics(arm, T_flange_tcp)
     return HeldPartKinematics(arm, T_flange_tcp, frame)

@@ -3,11 +3,11 @@
 """
 Solve the joint path along sampled curves, or find why the arm cannot follow them.
 
-All samples of a goal are solved together. Between two samples the arm can move farther than their
-solutions suggest: near a singularity, joints swing round within a millimetre, and the closest
-solution after such a step may belong to another branch. So samples are added, down to 2 um apart,
-if a joint turns far from one sample to the next, the branch changes, or there is no solution. A
-jump that then remains is real.
+The samples of a goal are solved in large blocks. Between two samples the arm can move farther than
+their solutions suggest: near a singularity, joints swing round within a millimetre, and the
+closest solution after such a step may belong to another branch. So samples are added, down to 2 um
+apart, if a joint turns far from one sample to the next, the branch changes, or there is no
+solution. If a joint still jumps between two samples so close, the arm cannot follow the path.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ from ur_cartesian_driver.planning.request.goal_fields import point_field
 
 #: Samples are added until no joint turns farther than this from one sample to the next [rad].
 _MAX_STEP = 0.1
-#: No samples are added between two that are this close [m], [rad]. If a joint still turns farther
-#: than _MAX_JUMP [rad] between them, this is a jump.
+#: No samples are added between two that are this close in position [m] or orientation [rad]. If a
+#: joint still turns farther than _MAX_JUMP [rad] between them, it jumps.
 _MIN_LENGTH = 2e-6
 _MIN_ANGLE = 2e-5
 _MAX_JUMP = 0.5
 #: Configurations that differ by less than this [rad] are the same.
 _SAME = 1e-6
-#: Number of samples in the first block after a refinement, and in the longest block: longer ones
-#: would only need more memory.
+#: Number of samples in the first block after a refinement changed the solutions, and in the
+#: longest block, because a longer one would only need more memory.
 _FIRST_BLOCK, _LONGEST_BLOCK = 64, 8192
 #: Number of samples on the rest of a piece, to find how far a joint would leave its range.
 _SAMPLES_BEYOND = 16
-#: After a block that is solved to its end, the next block is longer by this factor.
+#: After a block that is solved to its end, the next block is this many times as long.
 _GROWTH = 8
 
 
@@ -55,7 +55,7 @@ class JointPath:
     """The samples that the arm reaches on consecutive pieces, with their joint positions."""
 
     pieces: CurvePieces
-    #: (n,) number of each sample's piece, not decreasing.
+    #: (n,) index of each sample's piece, not decreasing.
     piece: Indices
     #: (n,) curve parameter on this piece.
     t: Floats
@@ -65,11 +65,11 @@ class JointPath:
     q: Floats
     #: The refusal of the first place that the arm does not reach; None = it reaches all samples.
     refusal: GoalRefused | None = None
-    #: Segment of the refusal; -1 = none.
+    #: The segment in which this place is; -1 = no refusal.
     refused_segment: int = -1
     #: (n,) segment of each sample.
     segments: Int32s = field(init=False)
-    #: (n,) fraction of this segment.
+    #: (n,) fraction of this segment before the sample.
     fractions: Floats = field(init=False)
 
     def __post_init__(self) -> None:
@@ -91,18 +91,18 @@ _NO_SAMPLES: _Samples = (
 
 @dataclass(frozen=True, slots=True)
 class _Refinement:
-    """Samples added on one piece."""
+    """Samples on one piece, from one given sample (excluded) to the next (included)."""
 
     t: list[float]
     poses: list[Pose]
     q: list[Joints]
-    #: The curve parameter at which the arm cannot follow any farther; None = it reaches the end.
+    #: The first curve parameter that the arm does not reach; None = it reaches the next sample.
     stop: float | None = None
-    #: The solution at ``stop``, to which the arm would have to jump; None = there is no solution.
+    #: The solution at ``stop``, to which the arm would have to jump; None = it has no solution.
     jump: Joints | None = None
 
     def samples(self, piece: int) -> _Samples:
-        """Return the samples, labelled with the number of their piece."""
+        """Return the samples, labelled with the index of their piece."""
         return (
             np.full(len(self.t), piece),
             np.array(self.t),
@@ -114,7 +114,7 @@ class _Refinement:
 def sample_joint_move(
     kinematics: TcpKinematics, pieces: CurvePieces, path: BlendedPath
 ) -> JointPath:
-    """Return the samples on a single piece in joint space."""
+    """Return the samples on a single piece, which is a joint move."""
     piece, t = sample_parameters(pieces)
     q = path.joint_rows(int(pieces.number[0]), t)
     return JointPath(pieces, piece, t, kinematics.pose_rows(q), q)
@@ -164,12 +164,18 @@ def solve_joint_path(kinematics: TcpKinematics, pieces: CurvePieces, q_start: Jo
 
 
 def _solve_block(kinematics: TcpKinematics, poses: Floats, q: Joints) -> tuple[Floats, list[int]]:
-    """Return the joints (n, 6) of samples, and the rows before which to refine."""
+    """
+    Return the joints (n, 6) of samples, and the rows before which to add samples.
+
+    The result ends with the first sample that has no solution.
+
+    :param q: the configuration before the first sample [rad].
+    """
     path = solve_path(kinematics.arm, kinematics.flange_rows(poses), q, skip_gaps=False)
     branch = branch_measures(kinematics.arm, np.concatenate([[q], path.q])).branch
     bad = (path.step > _MAX_STEP) | (np.diff(branch) != 0) | ~path.found
     lost = np.flatnonzero(~path.found)
-    if len(lost):  # the next block begins after the first sample without a solution
+    if len(lost):
         stop = int(lost[0]) + 1
         return path.q[:stop], np.flatnonzero(bad[:stop]).tolist()
     return path.q, np.flatnonzero(bad).tolist()
@@ -183,7 +189,15 @@ def _refine(
     row: int,
     q: Joints,
 ) -> _Refinement:
-    """Return samples from ``row - 1`` (excluded) to ``row``, as dense as the joints require."""
+    """
+    Return samples from ``row - 1`` (excluded) to ``row``, as dense as the joints require.
+
+    The first row of a piece has no sample before it on the piece, so its samples begin with the
+    piece.
+
+    :param piece: (n,) index of each sample's piece; ``at``: (n,) curve parameter on this piece.
+    :param q: the configuration before the first of them [rad].
+    """
     k = int(piece[row])
     length, turn = pieces.extent(k)
     is_first = row == 0 or piece[row - 1] != k
@@ -211,7 +225,12 @@ def _refine(
 def _refusal_at(
     kinematics: TcpKinematics, pieces: CurvePieces, k: int, refinement: _Refinement, q: Joints
 ) -> tuple[GoalRefused, int]:
-    """Return the refusal of a path that cannot go on from a configuration, and its segment."""
+    """
+    Return the refusal of a path beyond ``q``, and the segment in which it becomes impossible.
+
+    :param refinement: its ``stop`` is the first place that the arm does not reach.
+    :param q: the last configuration before this place [rad].
+    """
     stop = refinement.stop
     assert stop is not None
     index, fraction = pieces.locate_one(k, stop)
@@ -225,8 +244,8 @@ def _refusal_at(
         return kinematics.discontinuity_error(pose, q, refinement.jump, where, poses_beyond), index
     refusal = kinematics.no_solution_error(pose, where)
     if not pieces.is_blend[k] and fraction < 1.0:
-        # At the place where the path becomes unreachable, the distance is only just out of bounds;
-        # the distance at the waypoint is more helpful in the refusal.
+        # Where the path becomes unreachable, it is only just out of reach. How far the waypoint is
+        # out of reach is more helpful in the refusal.
         end = pieces.pose(k, 1.0)
         at_end = kinematics.no_solution_error(end, where, 'at the point ')
         if type(at_end) is type(refusal) and kinematics.solution(end, q) is None:
@@ -246,10 +265,10 @@ def describe_location(index: int, fraction: float) -> str:
 
 def _may_leave_line(kinematics: TcpKinematics, q: Joints, q_next: Joints) -> bool:
     """
-    Return whether the arm may leave the straight joint line between two configurations.
+    Return whether the arm may move otherwise than straight from one configuration to the next.
 
-    Near a singularity another branch may be closer after a long step, while in small steps the
-    arm swings round and stays on its branch.
+    Near a singularity, the solution closest after a long step may be on another branch, although
+    the arm would swing round and stay on its branch in small steps.
     """
     if max_joint_change(q, q_next) > _MAX_STEP:
         return True
@@ -259,5 +278,5 @@ def _may_leave_line(kinematics: TcpKinematics, q: Joints, q_next: Joints) -> boo
 
 def max_path_length(kinematics: TcpKinematics) -> float:
     """Return an upper bound [m] on the length of lines and arcs that the arm can follow."""
-    # In a ball of radius r a circle is no longer than 2 pi r.
+    # In a ball of radius r a circle is no longer than 2 pi r; 0.1 m is a margin for the reach.
     return 2.0 * pi * (kinematics.reach + 0.1)

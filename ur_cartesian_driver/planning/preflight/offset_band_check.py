@@ -3,12 +3,13 @@
 """
 The band in which path offsets may move the tool (``path_offset``): its frames, gaps and checks.
 
-The frame of the path turns with the path. No offset is possible where this turn alone would move a
-displaced tool faster, or accelerate it more, than offsets may: in corners where the arm stops, and
-in arcs that are too tight. The offset fades out before these places and before the end of the
-path.
+Offsets are given in the frame of the path, which turns with the path. No offset is possible where
+this turn alone would move a displaced tool faster, or accelerate it more, than offsets may: in
+corners where the arm stops, and in arcs that are too tight. The offset fades out before these
+places and before the end of the path.
 
-The corners of the band are checked along the whole path, as the path itself was before.
+The corners of the band are all combinations of the largest offsets. The path is checked with each
+of them, after it has been checked without an offset.
 """
 
 from __future__ import annotations
@@ -49,10 +50,10 @@ from ur_cartesian_driver.planning.request.path_offset import offset_motion
 STEP = 0.01
 #: Each frame is a mean over twice this time [s], so that no frame turns abruptly.
 SMOOTHING = 0.08
-#: An edge of the path that is shorter than this [m] has no direction.
+#: An edge (the line from one sample of the path to the next) has no frame of its own if it is
+#: shorter than this across the z axis of the tool [m]. Its frames are interpolated instead.
 _MIN_EDGE = 1e-7
-#: If the sine of the angle between path and tool axis is less than this, an edge has no frame of
-#: its own: frames are interpolated between the edges around it.
+#: Nor has an edge whose angle to the z axis of the tool has a sine below this.
 _MIN_ANGLE_SINE = 0.05
 #: The time for fading out is this many times as long as the motion of the offset needs.
 _FADE_MARGIN = 1.1
@@ -60,11 +61,12 @@ _FADE_MARGIN = 1.1
 #: it [s]: five time constants of the filter, a packet to the robot and back, and the lag of the
 #: program after a change of the speed scaling.
 FILTER_SETTLING = 0.2
-#: Time between two samples for the checks [s]; samples are added to the paths of the robot's own
-#: motions.
+#: Longest time between two samples for the checks [s]; :func:`dense_path` adds samples, because
+#: the paths of the robot's own motions have fewer.
 _CHECK_STEP = 0.02
 #: The joints at a corner of the band are found from the joints on the path in steps of at most
-#: _STRIDE [m]. A joint that turns farther than _MAX_CHANGE [rad] in a step changes the branch.
+#: _STRIDE [m]. If a joint turns farther than _MAX_CHANGE [rad] in a step, the path is refused,
+#: because the arm has changed its branch.
 _STRIDE, _MAX_CHANGE = 0.02, 0.5
 
 
@@ -75,11 +77,12 @@ def offset_band(
     settling_time: float = 0.0,
 ) -> OffsetBand:
     """
-    Return the band of a path.
+    Return the band in which the offsets of a goal may move the tool.
 
+    :param reference: the path of the TCP.
     :param T_tcp_controlled: the controlled frame, whose path is offset.
     :param settling_time: time from the end of an offset's motion until the offset is gone [s].
-    :raises InvalidGoal: no offset is possible anywhere on the path.
+    :raises InvalidGoal: no offset is possible anywhere on the path, or no edge of it has a frame.
     """
     speed, acceleration, timeout = offset_motion(wanted)
     frames = _frames(reference, T_tcp_controlled)
@@ -111,7 +114,7 @@ def offset_band(
 
 
 def dense_path(path: ReferencePath) -> ReferencePath:
-    """Return the path with samples added in between, for the checks."""
+    """Return the path with samples added, so that they are at most _CHECK_STEP apart."""
     first, last = path.time[0], path.time[-1]
     times = np.union1d(path.time, np.arange(first, last, _CHECK_STEP))
     row = np.clip(np.searchsorted(path.time, times, side='right') - 1, 0, len(path.time) - 2)
@@ -131,7 +134,7 @@ def dense_path(path: ReferencePath) -> ReferencePath:
 
 def speeds_beside(q: Floats, time: Floats) -> Floats:
     """
-    Return the larger joint speed before or after each row of joints (n, 6) [rad/s].
+    Return each joint's speed before or after each row, whichever is larger (n, 6) [rad/s].
 
     :param q: (n, 6) [rad].
     :param time: (n,) [s].
@@ -143,8 +146,8 @@ def speeds_beside(q: Floats, time: Floats) -> Floats:
 
 def fade_time(limit: float, speed: float, acceleration: float) -> float:
     """Return the longest time that an offset at its limit takes to fade out [s]."""
-    # The offset brakes, comes back from where it stopped, and brakes again; braking uses less than
-    # the allowed acceleration.
+    # At worst the offset still moves outwards: it brakes, comes back from where it has stopped,
+    # and brakes again. Braking uses less than the allowed acceleration.
     return _FADE_MARGIN * (2.2 * speed / acceleration + limit / speed) + 2.0 * STEP
 
 
@@ -186,7 +189,7 @@ def _units(vectors: Floats) -> Floats:
 
 
 def _smoothed(vectors: Floats) -> Floats:
-    """Return moving averages of columns."""
+    """Return moving averages of columns over :data:`SMOOTHING`."""
     half = round(0.5 * SMOOTHING / STEP)
     sums = np.cumsum(np.pad(vectors, ((half + 1, half), (0, 0)), mode='edge'), axis=0)
     width = 2 * half + 1
@@ -195,7 +198,13 @@ def _smoothed(vectors: Floats) -> Floats:
 
 
 def _turns_too_fast(frames: Floats, reach: float, speed: float, acceleration: float) -> Flags:
-    """Return whether each frame (n,) turns too fast for a tool at the distance ``reach`` [m]."""
+    """
+    Return whether each frame (n,) turns too fast for offsets.
+
+    :param reach: largest distance of the tool from the path [m].
+    :param speed: largest speed [m/s] that the turn may give the tool at this distance;
+        ``acceleration`` [m/s^2] likewise.
+    """
     change = np.diff(frames, axis=0)
     rates = _sizes(change) / STEP
     bends = _sizes(np.diff(change, axis=0)) / STEP**2
@@ -210,7 +219,7 @@ def _turns_too_fast(frames: Floats, reach: float, speed: float, acceleration: fl
 
 
 def _sizes(changes: Floats) -> Floats:
-    """Return the sizes of changes of frames (n,): for small turns, the angle [rad]."""
+    """Return the sizes (n,) of changes of frames; for a small turn, this is its angle [rad]."""
     sizes: Floats = np.linalg.norm(changes, axis=(1, 2)) / np.sqrt(2.0)
     return sizes
 
@@ -238,7 +247,8 @@ class OffsetBandCheck:
         """
         Check all corners of the band, and return the warnings about them.
 
-        :raises GoalRefused: a corner fails a check; the text names corner, point and bound.
+        :raises GoalRefused: a check fails; the text names the point and the bound, and also the
+            corner, unless the bound is max_tool_speed.
         """
         self._check_tool_speeds()
         q, axes = self.q, self._axes()
@@ -284,7 +294,8 @@ class OffsetBandCheck:
         steps = np.linalg.norm(np.diff(path.poses[:, :3], axis=0), axis=1)
         on_path = steps / np.maximum(np.diff(path.time), 1e-6)
         along, *across = (band.speed if limit else 0.0 for limit in band.limits)
-        # The turning of the frame adds at most the speed of an offset.
+        # The turning of the frame adds at most the speed of an offset: where it would add more,
+        # the band is closed.
         speeds = np.hypot(on_path + along, np.linalg.norm(across)) + band.speed
         row = int(np.argmax(speeds))
         if speeds[row] > bound:
@@ -299,7 +310,7 @@ class OffsetBandCheck:
         """Return the joint speeds (n, 6) [rad/s] that offsets at their full speed need."""
         speeds = np.zeros_like(q)
         for k in np.flatnonzero(self.band.limits).tolist():
-            # The turning of the frame adds at most the same speed.
+            # Twice, because the turning of the frame adds at most the same speed.
             twist = np.zeros_like(q)
             twist[:, :3] = 2.0 * self.band.speed * axes[:, k]
             speeds += np.abs(self.kinematics.joint_rates(q, twist, np.zeros_like(q))[0])
@@ -331,7 +342,7 @@ class OffsetBandCheck:
         return list(dict.fromkeys(warnings))
 
     def _joints_at(self, corner: Vector3, axes: Floats, q: Floats) -> Floats:
-        """Return the joint positions along a corner (n, 6), reached in steps from the path."""
+        """Return the joint positions along a corner (n, 6) [rad], found in steps from the path."""
         kinematics, path = self.kinematics, self.reference
         steps = max(1, ceil(norm(corner) / _STRIDE))
         shift, before = np.einsum('k,nkx->nx', np.array(corner), axes), q
@@ -339,7 +350,7 @@ class OffsetBandCheck:
             poses = path.poses.copy()
             poses[:, :3] += step / steps * shift
             there = nearest_rows(kinematics.arm, kinematics.flange_rows(poses), before)
-            lost = ~(np.abs(there - before).max(axis=1) < _MAX_CHANGE)  # NaN, too
+            lost = ~(np.abs(there - before).max(axis=1) < _MAX_CHANGE)  # NaN counts as lost
             if lost.any():
                 row = int(np.argmax(lost))
                 pose, where = pose_from_row(poses[row].tolist()), self._where(row)
@@ -355,7 +366,7 @@ class OffsetBandCheck:
         on_path, displaced = (singularity_distance_rows(arm, rows) for rows in (q, there))
         for k, measure in enumerate(SINGULARITY_MEASURES):
             bound = float(getattr(self.options, measure.option))
-            # If the path itself is within the bound (possible at its start), it was accepted.
+            # Where the path itself is within the bound, it was accepted (near its start only).
             near = (displaced[:, k] < bound) & (on_path[:, k] >= bound)
             if near.any():
                 row = int(np.argmax(near))
@@ -369,7 +380,7 @@ class OffsetBandCheck:
     def _check_joint_speeds(self, q: Floats, there: Floats, joint_speeds: Floats) -> None:
         times = self.reference.time
         steps = np.maximum(np.diff(times), 1e-6)[:, None]
-        # A displaced arm may have to turn faster. The arm is not displaced in a closed band.
+        # A displaced arm may have to turn faster. Where the band is closed, no arm is displaced.
         is_open = np.array([self.band.opens(time) for time in times[1:].tolist()])
         extra = np.abs(np.diff(there - q, axis=0) / steps) * is_open[:, None]
         speeds = joint_speeds.copy()

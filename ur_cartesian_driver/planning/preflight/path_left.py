@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Check the remainder of a planned path in another cell.
+Check the remainder of a planned path in a changed cell.
 
 Plans are checked when they are made. If the cell changes before or during the motion, only the
 distances from the bodies of the cell are checked again.
@@ -44,22 +44,24 @@ class PathLeft:
     """A planned path, and the time from which another path takes its place."""
 
     reference: ReferencePath
-    #: The joints over time of a goal in SPLINE or SERVO; None = they follow from the path.
+    #: The joints over time of a goal in SPLINE or SERVO; None = they are solved from the path.
     spline: JointSpline | None
     #: The joint moves of the path, if there is no spline.
     joint_moves: tuple[JointMove, ...] = ()
+    #: The TCP whose poses the path has.
     T_flange_tcp: Pose
+    #: The tool tips to check, the active TCP first.
     tool_tips: tuple[Pose, ...]
     #: The band in which offsets may move the tool; None = offsets are not allowed.
     band: OffsetBand | None = None
     #: The moving frame of the path; None = the frame is fixed in base.
     moving_frame: MovingFrame | None = None
-    #: Time from which another path is in effect [s].
+    #: Time since the start of the goal from which another path takes its place [s].
     until: float = inf
 
     @classmethod
     def of(cls, plan: Plan, spline: JointSpline | None = None) -> Self:
-        """Return the whole path of a plan; ``spline``: its joints over time, if they are known."""
+        """Return the whole path of a plan; ``spline``: see :func:`spline_of`."""
         return cls(
             reference=plan.reference,
             spline=spline,
@@ -72,7 +74,7 @@ class PathLeft:
 
     @property
     def end(self) -> float:
-        """The time at which the path ends [s]."""
+        """The time since the start of the goal at which the path ends [s]."""
         return min(float(self.reference.time[-1]), self.until)
 
     def check(
@@ -84,13 +86,13 @@ class PathLeft:
         time: float = 0.0,
     ) -> Joints:
         """
-        Check the path from a time on.
+        Check the clearance of the path from a time on.
 
         :param options: with the cell as it is at this time.
         :param q: the joint positions at this time [rad].
-        :param part_changes: the changes after this time.
+        :param part_changes: the bodies that the tool takes or puts down after this time.
         :param time: since the start of the goal [s].
-        :returns: the joint positions at the end of the path [rad].
+        :returns: the joint positions at the end of the path [rad]; ``q`` if the path has ended.
         :raises GoalRefused: the arm would come too close to a body, or cannot reach a pose.
         """
         path = self.reference.since(time)
@@ -133,12 +135,16 @@ class PathLeft:
 
 
 def spline_of(plan: Plan) -> JointSpline | None:
-    """Return the joints over time of a plan that is a spline; None = they follow from its path."""
+    """Return a plan's joints over time if it is executed as a spline, else None."""
     return plan.joint_spline if plan.execution.traits.is_spline else None
 
 
 def joints_at(plan: Plan, waypoint: int) -> Joints:
-    """Return the joint positions at a point at which the arm stops [rad]."""
+    """
+    Return the joint positions after the motion to a waypoint [rad].
+
+    The arm must stop there: with a blend, it does not pass through these positions.
+    """
     rows = plan.rows
     row = int(np.searchsorted(rows.waypoints, waypoint, side='right')) - 1
     return plan.start if row < 0 else vector6(rows.joints[row].tolist())

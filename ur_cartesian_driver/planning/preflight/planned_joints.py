@@ -3,9 +3,10 @@
 """
 The joints along the reference path of a plan.
 
-A plan keeps poses. Along lines and arcs the arm stays on its branch of solutions, so each solution
-is the nearest to the solution before. A joint move may pass through singularities, where branches
-meet, so its solutions are the nearest to the straight line between the joints at both ends.
+A plan keeps only poses along its path, so the joints are solved again. Along lines and arcs the
+arm stays on its branch of solutions, so each solution is the one nearest to the solution before. A
+joint move may pass through singularities, where branches meet, so its solutions are the ones
+nearest to the straight line between the joints at both ends.
 """
 
 from __future__ import annotations
@@ -33,15 +34,17 @@ _JOINT_MOVES = MoveJ, OptimoveJ
 
 @dataclass(frozen=True, slots=True)
 class JointMove:
-    """A joint move between two rows of the reference path; its rows are evenly spaced."""
+    """A joint move on the reference path; from row to row, the joints turn by the same amount."""
 
+    #: The joint positions at both ends [rad].
     q_start: Joints
     q_end: Joints
+    #: The rows of the reference path at both ends.
     first: int
     last: int
 
     def at(self, places: Floats) -> Floats:
-        """Return the joints (n, 6) [rad] on the straight line at places between rows (n,)."""
+        """Return the joints (n, 6) [rad] at places (n,), which are row numbers with fractions."""
         start = np.array(self.q_start)
         u = np.clip((places - self.first) / max(1, self.last - self.first), 0.0, 1.0)
         joints: Floats = start + u[:, None] * (np.array(self.q_end) - start)
@@ -54,7 +57,7 @@ def joint_moves(plan: Plan) -> tuple[JointMove, ...]:
     numbers = _joint_move_rows(planned.primitives)
     waypoints = planned.waypoints[numbers]
     first, last = (np.searchsorted(reference.point, waypoints + k) for k in (0, 1))
-    # A travel has several motions to the same point; their rows are told apart by their times.
+    # A travel has several motions to the same point, so the times tell which rows are whose.
     shared = np.isin(waypoints, planned.waypoints[1:][np.diff(planned.waypoints) == 0])
     if shared.any():
         ends = np.cumsum(planned.durations)[numbers]
@@ -74,7 +77,7 @@ def joint_moves(plan: Plan) -> tuple[JointMove, ...]:
 
 
 def _joint_move_rows(primitives: Sequence[Primitive]) -> Indices:
-    """Return the rows of joint moves, without making objects of the many moves to poses."""
+    """Return the indices of joint moves, without making objects of all the other moves."""
     columns = primitives if isinstance(primitives, MoveRows) else None
     objects = range(len(primitives)) if columns is None else columns.others
     found = {k for k in objects if isinstance(primitives[k], _JOINT_MOVES)}
@@ -87,9 +90,9 @@ def _joint_move_rows(primitives: Sequence[Primitive]) -> Indices:
 
 def row_places(reference: ReferencePath, time: Floats) -> Floats:
     """
-    Return the place (n,) of each time on a path: row + fraction of the way to the next row.
+    Return the place (n,) at each time on a path: the row number plus the fraction to the next row.
 
-    If rows have the same time, the last of them is used.
+    If several rows have this time, the last of them is used.
 
     :param time: (n,) [s].
     """
@@ -110,7 +113,7 @@ def joints_along(
     Return the joints (n, 6) [rad] for consecutive flange poses; NaN if there is no solution.
 
     :param flange_poses: (n, 7).
-    :param places: (n,) the places of these poses between the rows of the reference path.
+    :param places: (n,) the places of these poses on the reference path, see :func:`row_places`.
     :param moves: the joint moves of the path.
     :param start: the joints before the first pose [rad].
     """
@@ -147,7 +150,7 @@ def solved_joints(
     """
     Return the joints (n, 6) [rad] along a part of the reference path.
 
-    :param path: the part, which may have samples of its own.
+    :param path: the part; its samples may be others than those of ``reference``.
     :param moves: the joint moves of the reference path.
     :param start: the joints before the first sample [rad].
     :raises GoalRefused: a pose has no solution.

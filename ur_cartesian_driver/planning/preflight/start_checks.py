@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Check the pose of the robot when a goal begins."""
+"""Check the robot's pose at the start of a goal."""
 
 from __future__ import annotations
 
@@ -19,7 +19,11 @@ MAX_MISMATCH_ANGLE = 0.05
 
 
 def check_reported_tcp(state: RobotState, kinematics: TcpKinematics) -> None:
-    """Refuse a robot whose TCP is not where the kinematics puts it."""
+    """
+    Refuse a robot that reports its TCP elsewhere than the kinematics predicts.
+
+    :raises RobotNotReady: the model, the calibration or the TCP is probably wrong.
+    """
     predicted = kinematics.arm.forward(state.actual_q) @ state.T_flange_tcp
     reported = kinematics.tcp(state.actual_tcp_pose)
     distance = predicted.distance_to(reported)
@@ -34,7 +38,7 @@ def check_reported_tcp(state: RobotState, kinematics: TcpKinematics) -> None:
 
 
 def check_approach(state: RobotState, target: Pose, options: PlanningOptions) -> None:
-    """Refuse a first point that is too far away from the tool."""
+    """Refuse a first point that is farther from the tool than max_approach_distance (0 = off)."""
     distance = state.actual_tcp_pose.distance_to(target)
     bound = options.max_approach_distance
     if 0.0 < bound < distance:
@@ -72,7 +76,7 @@ def check_start(
         )
     if posture:
         where = point_field(0, 'pose')
-        # The robot is within the tolerance of the first point, not exactly at it.
+        # The robot is not exactly at the first point, so the solution there is compared.
         near = kinematics.nearest(target, state.actual_q, where)
         _, clause = kinematics.compare_posture(target, posture, near, where, options.tf_prefix)
         if clause:

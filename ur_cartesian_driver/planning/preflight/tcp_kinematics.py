@@ -47,8 +47,8 @@ from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.request.joint_points import named_joints
 
-#: An arm arrives in a posture if each named joint is at most this far from the chosen solution
-#: [rad]. Full turns are not ignored.
+#: An arm arrives in a posture if each named joint is at most this far from the solution that the
+#: posture selects [rad]. A joint that is a full turn away has not arrived.
 ARRIVAL_TOLERANCE = 0.01
 #: A solution continues a configuration if no joint turns farther than this [rad].
 _MAX_CONTINUED_STEP = 0.5
@@ -64,7 +64,7 @@ class TcpKinematics:
 
     Planners use poses and rates of the tool in the frame of the path; this class converts them to
     poses of the flange and rates of the joints, and back. Here the frame of the path is the base,
-    and the tool is the TCP. A subclass for a moving frame overrides the methods down to
+    and the tool is the TCP. A subclass for a moving frame overrides all methods up to
     :attr:`reach`.
 
     :param arm: nominal or calibrated.
@@ -125,18 +125,18 @@ class TcpKinematics:
 
     @property
     def reach(self) -> float:
-        """The greatest distance of the tool from the frame of the path [m]."""
+        """Upper bound of the distance of the tool from the frame of the path [m]."""
         return self.arm.model.max_reach + hypot(*self.T_flange_tcp.position)
 
     def solution(self, T_base_tcp: Pose, q_near: Joints) -> Joints | None:
-        """Return the solution nearest to a configuration; None if none is within the limits."""
+        """Return the solution nearest to ``q_near``; None if none is within the joint limits."""
         return nearest(self.arm, self.flange(T_base_tcp), q_near)
 
     def nearest(self, T_base_tcp: Pose, q_near: Joints, where: str) -> Joints:
         """
-        Return the solution nearest to a configuration.
+        Return the solution nearest to ``q_near``.
 
-        :param where: the beginning of a refusal, such as ``trajectory.points[2].pose``.
+        :param where: the name of the pose in a refusal, such as ``trajectory.points[2].pose``.
         :raises Unreachable: there is no solution.
         :raises JointLimitExceeded: each solution is outside the range of a joint.
         """
@@ -153,6 +153,8 @@ class TcpKinematics:
 
         This is the solution nearest in the named joints; of several that are equally near, the one
         nearest to ``q_before``. Errors as for :meth:`nearest`.
+
+        :param named: the values [rad] of the posture by joint number.
         """
         # An arm that is already within the tolerance keeps its configuration.
         if hypot(*(q_before[k] - value for k, value in named.items())) <= ARRIVAL_TOLERANCE:
@@ -168,7 +170,9 @@ class TcpKinematics:
         """
         Return the refusal of a pose without a solution: out of reach, or outside joint limits.
 
-        :param there: a phrase for the place of the pose if this is not ``where``.
+        :param where: the beginning of the refusal.
+        :param there: a phrase before the reason, if the reason is about another place than
+            ``where``.
         """
         T_base_flange = self.flange(T_base_tcp)
         reason = there + explain_unreachable(self.arm, T_base_flange)
@@ -190,9 +194,15 @@ class TcpKinematics:
         poses_beyond: Iterable[Pose] = (),
     ) -> GoalRefused:
         """
-        Return the refusal of a path that the arm cannot continue: a joint limit, or a singularity.
+        Return the refusal of a path that the arm cannot continue.
 
-        :param poses_beyond: the poses of the path after this one, in small steps.
+        It is a JointLimitExceeded if the arm could continue without the limit of a joint,
+        otherwise a NearSingularity.
+
+        :param T_base_tcp: the first pose that the arm does not reach.
+        :param q: the last configuration before it [rad].
+        :param q_next: the solution at the pose, to which the arm would have to jump [rad].
+        :param poses_beyond: the poses of the path from this one on, in small steps.
         """
         goes_on = self._continue_branch(T_base_tcp, q)
         for k, (low, high) in enumerate(self.arm.model.position_limits):
@@ -216,7 +226,7 @@ class TcpKinematics:
         )
 
     def nearest_singularity(self, q: Joints) -> str:
-        """Return the nearest singularity: wrist, elbow or shoulder."""
+        """Return the name of the nearest singularity: wrist, elbow or shoulder."""
         measures = branch_measures(self.arm, np.array([q]))
         distances = {
             'wrist': abs(float(measures.wrist[0])),
@@ -267,7 +277,7 @@ class TcpKinematics:
     def _joint_positions_beyond(
         self, k: int, q: Joints, poses_beyond: Iterable[Pose]
     ) -> Iterator[float]:
-        """Yield the positions of a joint [rad] along poses, until the arm cannot follow."""
+        """Yield the positions of joint ``k`` [rad] at ``q`` and at the poses that continue it."""
         yield q[k]
         for pose in poses_beyond:
             goes_on = self._continue_branch(pose, q)
@@ -298,10 +308,11 @@ def max_joint_change(a: Joints, b: Joints) -> float:
 
 def describe_miss(q: Joints, chosen: Joints, named: dict[int, float]) -> str:
     """
-    Return a clause with the first named joint that misses its value; '' if all arrive.
+    Return a clause about the first named joint that misses ``chosen``; '' if none does.
 
     :param q: the configuration in which the motion arrives [rad].
-    :param chosen: the solution that the posture selects.
+    :param chosen: the solution that the posture selects [rad].
+    :param named: the joints that the posture names, by number.
     """
     for k in sorted(named):
         if abs(q[k] - chosen[k]) > ARRIVAL_TOLERANCE:

@@ -3,10 +3,10 @@
 """
 Margins: distances of the arm from its singularities and joint limits.
 
-At each of three singularities two solutions of the arm meet: the wrist is straight (axes 4 and 6
-parallel), the elbow is stretched or folded, or the wrist centre is above or below the shoulder.
-The distances are the angle of wrist 2, the angle of the elbow, and the distance of the wrist
-centre from the plane of axes 1 and 2.
+The arm has three singularities, at each of which two of its solutions meet: the wrist is straight
+(axes 4 and 6 parallel), the elbow is stretched or folded, or the wrist centre is above or below
+the shoulder. The distances from them are the angle between axes 4 and 6, the angle by which the
+elbow is bent or unfolded, and the distance of the wrist centre from the plane of axes 1 and 2.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ from ur_cartesian_driver.planning.preflight.joint_path_solver import describe_lo
 START_LENGTH = 0.001
 #: Turn [rad] after a start at rest during which the arm is allowed to be near a singularity.
 START_ANGLE = 0.01
-#: Rounding error by which a growing distance from a singularity may shrink.
+#: A distance from a singularity counts as growing if it shrinks by no more than this rounding
+#: error.
 _ROUNDING = 1e-9
 #: Rows per block, so that intermediate arrays stay in the CPU cache.
 _BLOCK = 8192
@@ -46,7 +47,7 @@ class SingularityMeasure:
     unit: str
     #: The singular configuration, in words.
     meaning: str
-    #: Distances are compared as fractions of this scale.
+    #: Distances from different singularities are compared after division by their scales.
     scale: float
 
     @property
@@ -70,13 +71,18 @@ _QUANTITIES = (
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
 class TightestMargins(Rows[str]):
-    """The smallest distances of segments from singularities and joint limits, in words."""
+    """
+    The smallest distance of each segment from singularities and joint limits.
+
+    As a sequence, it has a phrase for each segment.
+    """
 
     #: (n,) the segment of each margin.
     segments: Int32s
-    #: (n,) the number of the nearest singularity, or 3 + the number of the joint.
+    #: (n,) the number of the nearest singularity, or 3 + the number of the joint nearest to a
+    #: limit.
     kinds: Indices
-    #: (n,) the distance from it [m] or [rad].
+    #: (n,) the distance from this singularity or limit [m] or [rad].
     values: Floats
     #: (n,) the fraction of the segment at which this distance is smallest.
     fractions: Floats
@@ -100,7 +106,11 @@ class TightestMargins(Rows[str]):
 
 
 def singularity_distance_rows(arm: Arm, q: Floats) -> Floats:
-    """Return the SINGULARITY_MEASURES (n, 3), all >= 0, of configurations (n, 6)."""
+    """
+    Return the distances (n, 3), all >= 0, of configurations (n, 6) [rad] from singularities.
+
+    The columns have the order and the units of :data:`SINGULARITY_MEASURES`.
+    """
     of = branch_measures(arm, q)
     return np.stack(
         (
@@ -113,7 +123,7 @@ def singularity_distance_rows(arm: Arm, q: Floats) -> Floats:
 
 
 def joint_limit_distances(arm: Arm, q: Floats) -> Floats:
-    """Return the distances of the joints from their limits (n, 6) [rad]."""
+    """Return the distances of the joints from their limits (n, 6) [rad], negative outside."""
     low, high = np.array(arm.model.position_limits).T
     distances: Floats = np.minimum(q - low, high - q)
     return distances
@@ -130,13 +140,14 @@ def first_refusal(
     joint_path: JointPath, measures: Floats, options: PlanningOptions
 ) -> tuple[GoalRefused | None, int]:
     """
-    Return the first refusal along a path (None = the arm can follow), and its segment.
+    Return the first refusal along a path, and its segment; None, -1 = the arm can follow.
 
     :param measures: (n, 3) the distances from singularities at the samples of the path.
     """
     refusal, index = joint_path.refusal, joint_path.refused_segment
     near = near_singularity_refusal(joint_path, measures, options)
-    # Near a singularity joints swing to a limit: the singularity is the cause.
+    # Near a singularity joints swing round, and may reach a limit. Then the refusal names the
+    # singularity, which is the cause.
     if near is not None and (
         refusal is None
         or near[1] < index
@@ -150,7 +161,9 @@ def near_singularity_refusal(
     joint_path: JointPath, measures: Floats, options: PlanningOptions
 ) -> tuple[NearSingularity, int] | None:
     """
-    Return the refusal of the first segment that is too close to a singularity, and its index.
+    Return the refusal of the first segment that is too close to a singularity, and its number.
+
+    Its text has the place that is closest in relation to the bound of its singularity.
 
     :param measures: (n, 3) the distances from singularities at the samples of the path.
     """
@@ -182,7 +195,7 @@ def near_singularity_refusal(
 
 
 def _format_below(value: float, bound: float) -> str:
-    """Return a value in few digits that still read as less than its bound."""
+    """Return a value in three digits, or in as many as show that it is below its bound."""
     text = f'{round(value, 6):.3g}'  # smaller digits are rounding errors
     return text if float(text) < bound else format_distinct(value, bound)[0]
 
@@ -191,8 +204,8 @@ def _is_leaving(joint_path: JointPath, rows: Indices, measures: Floats) -> Flags
     """
     Return whether each sample of a segment is allowed to be near each singularity (n, 3).
 
-    The goal does not choose where the robot starts. So any distance from a singularity is allowed
-    close to a start at rest, and after that while the distance only grows.
+    A goal does not determine where the robot starts. So any distance from a singularity is allowed
+    close to a start at rest, and afterwards as long as the distance only grows.
     """
     number, pieces = int(joint_path.piece[rows[0]]), joint_path.pieces
     excused = np.zeros((len(rows), len(SINGULARITY_MEASURES)), dtype=np.bool_)
@@ -225,12 +238,13 @@ def tightest_margins(
     """
     Return the tightest margin of each segment.
 
-    :param measures: (n, 3) the distances from singularities, inf where they do not matter.
+    :param measures: (n, 3) the distances from singularities; infinite where a singularity does not
+        matter.
     :param segments: (n,) not decreasing.
     """
 
     def margins(rows: Indices | slice) -> Floats:
-        """Return distances from singularities and joint limits, in the order of _QUANTITIES."""
+        """Return all margins as fractions of their scales, in the order of _QUANTITIES."""
         of_joints = joint_limit_distances(arm, q[rows])
         return np.concatenate([measures[rows] / _SCALES, of_joints], axis=1)
 
