@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The bounds on blend radii (both blends of a segment must fit into it), and the law of blends.
+The bounds on blend radii (both blends of a segment must fit into it), and the accuracy of blends.
 
 Negative radii are refused by :mod:`~.field_rules`, radii in splines by :mod:`~.spline_rules`.
 """
@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.goal.goal_columns import GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import is_spline, is_timed, segment_field
 
-#: The laws that together determine path and time of a blend.
+#: The fields of MotionLaws that together determine path and time of the robot's blends.
 BLEND_LAWS = ('blend_begin', 'blend_shape', 'blend_speed_ratio')
 
 
@@ -25,7 +25,7 @@ def check_blends(goal: GoalTable, options: PlanningOptions) -> None:
         return
     radii = goal.segments.blend_radii
     if is_timed(goal) and goal.waypoints.times[0] == 0.0 and len(radii):
-        radii = np.append(0.0, radii[1:])  # the arm is at the first point already
+        radii = np.append(0.0, radii[1:])  # the arm starts at the first point, without a blend
     if not radii.any():
         return
     after = np.append(radii[1:-1], 0.0)  # the last point is never blended
@@ -36,8 +36,9 @@ def check_blends(goal: GoalTable, options: PlanningOptions) -> None:
 
 def check_blends_fit(index: int, length: float, before: float, after: float) -> None:
     """
-    Refuse blends that overlap within a segment: the controller would skip a point (its C171).
+    Refuse blends that overlap within a segment, because the controller would skip a point (C171).
 
+    :param index: the number of the second point; 0 = the segment begins where the arm is.
     :param length: distance between the two points of the segment [m].
     :param before: blend radius at the first point [m].
     :param after: blend radius at the second point [m].
@@ -75,7 +76,7 @@ def check_blend_parameters(index: int, u_join: float, u_leave: float) -> None:
 
 
 def blends_are_measured(options: PlanningOptions) -> bool:
-    """Return whether the law of blends was measured in all of its parts."""
+    """Return whether plans follow a twin in which all :data:`BLEND_LAWS` were measured."""
     twin = options.used_twin
     if twin is None or options.laws.blend_shape == 'unknown':
         return False
@@ -83,14 +84,14 @@ def blends_are_measured(options: PlanningOptions) -> bool:
 
 
 def blend_law(options: PlanningOptions) -> str:
-    """Return the origin of the law of blends, to follow ``as`` in a text."""
+    """Return a phrase for the origin of the laws of blends, to follow "as"."""
     if blends_are_measured(options):
         return measured_on(options)
     return 'assumed for motion version 1'
 
 
 def measured_on(options: PlanningOptions) -> str:
-    """Return the arm and the date of the measurement of the twin's laws, as a phrase."""
+    """Return a phrase for the arm and the date on which the laws of the twin were measured."""
     twin = options.used_twin
     assert twin is not None
     return f'measured on {"another" if options.twin_problem else "this"} arm, {twin.date}'
@@ -100,7 +101,8 @@ def blend_time_uncertainty(options: PlanningOptions) -> float:
     """
     Return the relative uncertainty of the time in blends that follow measured laws.
 
-    The time is proportional to ``blend_begin``, and falls with the speed in the blend.
+    The time is proportional to ``blend_begin``, and inversely proportional to
+    ``blend_speed_ratio``, so their relative uncertainties add up.
     """
     twin, laws = options.used_twin, options.laws
     assert twin is not None
@@ -112,10 +114,11 @@ def blend_time_uncertainty(options: PlanningOptions) -> float:
 
 def blend_uncertainty(options: PlanningOptions) -> float:
     """
-    Return the deviation of the robot's blends from the model, as a fraction of the assumed one.
+    Return the possible deviation of the robot's blends from the planned ones.
 
-    If the law was measured, only the uncertainty of ``blend_begin`` remains: the size of a blend
-    is proportional to it, and the assumed deviation is half the height of the parabola.
+    It is a fraction of the deviation that is assumed if the laws were not measured: half the
+    height of the parabola. If they were, only the uncertainty of ``blend_begin`` remains, to which
+    this height is proportional.
     """
     if not blends_are_measured(options) or (twin := options.used_twin) is None:
         return 1.0

@@ -4,9 +4,9 @@
 Goals that control a frame other than the robot's active TCP.
 
 If the tool turns while one of its points moves on a straight line, other points move on curves. So
-the robot's TCP is set to the controlled frame during the goal (temporary TCP), and from here on
-planning assumes that TCP. If the TCP must not be changed, the goal is converted to the active TCP;
-this conversion is exact if the tool does not turn.
+the robot's TCP is set to the controlled frame during the goal (temporary TCP), and the goal is
+planned for this TCP. If the TCP must not be changed, the goal is converted to the active TCP; this
+conversion is exact if the tool does not turn.
 """
 
 from __future__ import annotations
@@ -37,24 +37,24 @@ from ur_cartesian_driver.planning.request.goal_fields import (
 #: frame at a distance r from the TCP leaves its line by r angle^2 / 8 (5 um for r = 0.4 m).
 MAX_FIXED_ANGLE = 0.01
 
-#: A controlled frame within this distance [m] and angle [rad] of the TCP counts as the TCP. The
-#: bound is a few steps of the wire, so that the reported TCP shows which of two TCPs is set.
+#: A controlled frame within this distance [m] and angle [rad] of the TCP counts as the TCP. Two
+#: TCPs that differ by more are sent as different numbers, so the reported TCP shows which is set.
 _SAME_TCP = 5e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RetargetedGoal:
     """
-    A goal and the state of its robot, both expressed for the TCP of the motion.
+    A goal and the state of its robot, both for the TCP with which the goal is executed.
 
-    If the frame of the goal moves, both are expressed in that frame.
+    If the frame of the goal is on a held part, the state is given in this frame, like the goal.
     """
 
     goal: GoalTable
     state: RobotState
     #: The temporary TCP; None = the active TCP stays.
     T_flange_tcp: Pose | None = None
-    #: The controlled frame in the TCP of the motion: IDENTITY unless the TCP must not change.
+    #: The controlled frame in this TCP; IDENTITY unless the goal was converted to the active TCP.
     T_tcp_controlled: Pose = IDENTITY
     remarks: tuple[str, ...] = ()
 
@@ -65,7 +65,7 @@ def retarget_to_tcp(
     """
     Return a checked goal for the TCP with which it will be executed.
 
-    :raises InvalidGoal: the TCP must not change, but the tool turns.
+    :raises InvalidGoal: the TCP must not change (allow_tcp_change is false), but the tool turns.
     """
     if goal.moving_frame is not None:
         return RetargetedGoal(goal=goal, state=goal.moving_frame.seen(state))
@@ -153,7 +153,7 @@ def _check_no_rotation(goal: GoalTable, T_base_start: Pose) -> None:
 
 
 def _check_no_angular_rates(goal: GoalTable, index: int, remedy: str) -> None:
-    """Refuse a point of a spline at which the tool turns; a NaN counts as no turn."""
+    """Refuse a point of a spline with an angular velocity or acceleration; NaN counts as none."""
     point = goal.waypoints[index]
     for field, values in (('twist', point.twist), ('acceleration', point.acceleration)):
         if any(value != 0.0 and not isnan(value) for value in values[3:]):
@@ -166,7 +166,12 @@ def _check_no_angular_rates(goal: GoalTable, index: int, remedy: str) -> None:
 
 
 def _retarget_goal(goal: GoalTable, T_controlled_tcp: Pose) -> GoalTable:
-    """Return the same motion as a goal of the TCP; only the positions of vias matter."""
+    """
+    Return the same motion as a goal of the TCP.
+
+    Vias are shifted by the same vector as the ends of their segments, because the tool does not
+    turn on arcs.
+    """
     points, segments = goal.waypoints, goal.segments
     poses = points.poses.copy()
     poses[:, 3:] = normalized_rows(poses[:, 3:])

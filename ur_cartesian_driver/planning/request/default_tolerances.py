@@ -31,7 +31,7 @@ def named_tolerances(goal: Goal) -> tuple[tuple[str, Tolerance], tuple[str, Tole
 
 
 def apply_default_tolerances(goal: G, options: PlanningOptions) -> G:
-    """Return the goal with parameters in place of zeros; a tolerance that stays 0 is no limit."""
+    """Return the goal with parameters in place of zero tolerances; what stays 0 is not limited."""
     path, end = (
         _with_defaults(tolerance, name, options) for name, tolerance in named_tolerances(goal)
     )
@@ -47,7 +47,7 @@ def _with_defaults(tolerance: Tolerance, name: str, options: PlanningOptions) ->
         return tolerance
 
     def filled(values: Iterable[float], first: int) -> list[float]:
-        """Return values without zeros, three for each quantity from number ``first`` on."""
+        """Return values with defaults for zeros, three for each quantity from ``first`` on."""
         return [value or defaults[first + k // 3] for k, value in enumerate(values)]
 
     return Tolerance(

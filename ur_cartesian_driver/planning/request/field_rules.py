@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Rules about single fields: members of enumerations, ranges, finite numbers, unit quaternions.
+Rules about single fields: enumeration values, ranges, finite numbers, unit quaternions.
 
 The dataclasses in :mod:`~ur_cartesian_driver.motion.goal.goal` declare what each field accepts.
 """
@@ -38,7 +38,7 @@ def check_fields(goal: GoalTable, options: PlanningOptions) -> None:
     """Refuse values that a field never accepts, regardless of the other fields."""
     check_record('', goal, Goal)
     points, by_joints = goal.waypoints, gives_joints(goal)
-    if by_joints.any():  # their NaN is allowed
+    if by_joints.any():  # a pose of NaN alone is allowed: joint positions replace it
         poses = np.where(by_joints[:, None], IDENTITY.row(), points.poses)
         points = replace(points, poses=poses)
     _check_rows(points, point_field, nan_in_rates=is_spline(goal))
@@ -67,7 +67,7 @@ def check_record(
 
     :param where: name of the record in the refusal.
     :param kind: the class that declares the fields; None = the class of the record.
-    :param nan_in_rates: whether NaN is accepted as a rate; the driver then chooses the rate.
+    :param nan_in_rates: whether a rate may be NaN, so that the driver chooses the rate.
     :raises InvalidGoal: a value is not accepted; the text names field, value and bound.
     """
     for each in goal_fields(type(record) if kind is None else kind):
@@ -107,7 +107,7 @@ def _numbers(each: GoalField, field: str, value: Any) -> Iterator[tuple[str, flo
 def _check_rows(
     rows: GoalRows[Any], name: Callable[[int], str], nan_in_rates: bool = False
 ) -> None:
-    """Check all rows at once; pass only the suspect ones to :func:`check_record`."""
+    """Check all rows at once; :func:`check_record` decides about the suspect rows."""
     fine = np.ones(len(rows), dtype=np.bool_)
     for each in rows.columns():
         if rows.is_default(each):
@@ -149,7 +149,7 @@ def check_finite(field: str, values: Iterable[float]) -> None:
 
 
 def _are_units(quaternions: Floats) -> Flags:
-    """Return flags for quaternions (n, 4): True = certainly accepted by :func:`_check_unit`."""
+    """Return for each quaternion (n, 4) whether :func:`_check_unit` certainly accepts it."""
     squares = np.einsum('ij,ij->i', quaternions, quaternions)
     are_units: Flags = np.abs(squares - 1.0) <= 0.999 * QUATERNION_TOLERANCE
     return are_units

@@ -17,9 +17,9 @@ from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 
 def type_table(types: Collection[SegmentType]) -> Flags:
     """
-    Return an array by segment type, True for ``types``.
+    Return an array to be indexed with segment types: True for ``types``.
 
-    Indexing it is faster than np.isin, and faster than comparing an array with a member.
+    This is faster than np.isin, and faster than comparing an array with a member.
     """
     return np.array([kind in types for kind in SegmentType])
 
@@ -28,15 +28,16 @@ IS_LINEAR, IS_JOINT = type_table((SegmentType.LINEAR,)), type_table((SegmentType
 IS_ARC, IS_PROCESS = type_table((SegmentType.CIRCULAR,)), type_table((SegmentType.PROCESS,))
 IS_ARC_OR_PROCESS = IS_ARC | IS_PROCESS
 _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
-#: By segment type: whether it is a straight line in joint space; whether it moves the tool on a
-#: straight line; whether its speeds are fractions of the robot's limits; and whether it takes a
-#: speed of the tool.
+#: Segment types that are straight lines in joint space.
 IS_JOINT_MOVE = type_table((SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT))
+#: Segment types that move the tool on a straight line.
 IS_STRAIGHT = ~(IS_JOINT_MOVE | IS_ARC)
+#: Segment types whose speeds are fractions of the robot's limits.
 IS_OPTIMIZED = type_table(_OPTIMIZED)
+#: Segment types whose velocity is the speed of the tool.
 TAKES_TOOL_SPEED = ~type_table((SegmentType.JOINT, *_OPTIMIZED))
-#: By segment type: whether the blend after it follows the measured laws of blends. Blends of
-#: PROCESS are documented, blends of OPTIMIZED types have not been measured.
+#: Segment types after which a blend follows the measured laws of blends. The blends of PROCESS are
+#: documented, those of OPTIMIZED types have not been measured.
 FOLLOWS_BLEND_LAWS = type_table((SegmentType.LINEAR, SegmentType.JOINT, SegmentType.CIRCULAR))
 
 
@@ -53,7 +54,7 @@ def segment_field(index: int, field: str = '') -> str:
 def late_point_error(
     index: int, times: Floats | Sequence[float], remedy: str = 'increase it'
 ) -> InvalidGoal:
-    """Return the refusal of a point that is not later than the one before."""
+    """Return the refusal of a point whose time is negative, or not later than the point before."""
     than = 'less than the 0 s'
     if index > 0:
         than = f'not later than the {times[index - 1]:g} s of points[{index - 1}]'
@@ -82,7 +83,7 @@ def long_segment_error(index: int, duration: float, most: float) -> InvalidGoal:
 
 
 def check_plausible(field: str, values: Iterable[float], bound: float, units: str) -> None:
-    """Refuse numbers that no robot reaches: their units are wrong."""
+    """Refuse numbers beyond ``bound``, which no robot reaches; their units must be wrong."""
     if any(abs(value) > bound for value in values):
         raise InvalidGoal(
             field,
@@ -95,8 +96,9 @@ def resolve_execution_mode(goal: GoalTable) -> ExecutionMode:
     """
     Return the execution mode of a goal.
 
-    AUTO becomes SPLINE for a goal with rounded corners, or with times and with twists or
-    accelerations at inner points; else PRIMITIVES.
+    AUTO becomes SPLINE for a goal with rounded corners, and for a goal with times that has a twist
+    or an acceleration at any point but its end; otherwise PRIMITIVES. The last point of a goal
+    with keep_open is not its end.
     """
     if goal.execution != ExecutionMode.AUTO:
         return ExecutionMode(goal.execution)

@@ -4,8 +4,8 @@
 Rules about goals whose frame is on a part that the arm holds.
 
 Splines lead the part along any path. The controller's lines and arcs are paths of the TCP in base.
-If the part does not turn, all its points move alike, and the tool moves on the part in the
-opposite direction: then its path on the part is a line or an arc, too.
+They are lines and arcs of the tool on the part only if the part does not turn, because then all
+points of the part move alike, and the tool moves on the part in the opposite direction.
 """
 
 from __future__ import annotations
@@ -29,11 +29,12 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     segment_field,
 )
 
-#: Turns of the part up to this angle [rad] on a line or an arc are neglected: the tool leaves a
-#: line of a length L on the part by L angle / 4, which is 25 um for a metre.
+#: Turns of the part up to this angle [rad] on a line or an arc are neglected: on the part, the
+#: tool leaves a line of length L by L angle / 4, which is 25 um for a metre.
 MAX_TURN = 1e-4
-# Turns up to this angle [rad] are neglected in distance and speed of the TCP in base: 0.6 mm in
-# total if the tool touches the part 0.3 m from the TCP. The measured start is turned by less.
+# Turns of the part up to this angle [rad] are neglected by outputs that follow the motion of the
+# TCP in base: if the tool touches the part 0.3 m from the TCP, the motions of both differ by 0.6
+# mm in total. The measured orientation at the start deviates by less than this angle.
 _NEGLECTED_TURN = 2e-3
 _JOINT_ADVICE = re.compile(
     r'use (PRIMITIVES with )?a JOINT segment(, or set on_posture_change to movej)?'
@@ -79,7 +80,7 @@ def check_held_part(goal: GoalTable, options: PlanningOptions) -> None:
 
 
 def with_advice_for_part(refusal: GoalRefused, goal: GoalTable) -> GoalRefused:
-    """Return a refusal with advice for a held part, whose path has no JOINT segments."""
+    """Return a refusal with advice for held parts in place of advice to use JOINT segments."""
     advice = 'let the tool turn about an axis of its own (free_axis)'
     if (goal.segments.free_axes != FreeAxis.NONE).any():
         advice = 'move the part or the tool'
@@ -95,8 +96,8 @@ def check_part_keeps_orientation(
     """
     Refuse a goal of PRIMITIVES that turns the held part.
 
-    :param targets: the points in the frame on the part, rows (n, 7).
-    :param start: pose of the tool in that frame at the start.
+    :param targets: the poses of all points in the frame on the part (n, 7).
+    :param start: pose of the tool in this frame at the start.
     :param first: the first point to which a motion leads; the arm is already at the point before.
     :raises NotAvailable: a segment turns the part.
     """
@@ -121,9 +122,10 @@ def check_part_outputs(goal: GoalTable, poses: Floats) -> None:
     """
     Refuse outputs that depend on the distance or the speed of the tool on a part that turns.
 
-    The robot program measures both at the TCP in base, where they differ if the part turns.
+    The robot program measures distance and speed of the TCP in base. If the part turns, they
+    differ from the tool's distance and speed on the part.
 
-    :param poses: the path of the tool in the frame on the part, rows (n, 7).
+    :param poses: the path of the tool as poses in the frame on the part (n, 7).
     :raises NotAvailable: there are such outputs, and the part turns.
     """
     fields = [name for name in ('proportional_outputs', 'pulses') if getattr(goal, name)]

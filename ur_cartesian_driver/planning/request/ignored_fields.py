@@ -19,15 +19,17 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     type_table,
 )
 
-#: Types of segments that, if the goal has times, are sent with a time and ignore acceleration.
+#: Segment types that are sent with a time if the goal has times, so that acceleration is ignored.
 _IS_TIMED = type_table((SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT))
 
 
 def ignored_remarks(goal: GoalTable, first: int = 0, translates: Flags | None = None) -> list[str]:
     """
-    Return a remark for each field without effect; the first point has the number ``first``.
+    Return a remark for each field without effect.
 
-    :param translates: (n,) whether each segment moves the tool; None = not known.
+    :param first: the number of the first point.
+    :param translates: (n,) whether each segment moves the tool, and does not only turn it; None =
+        not known.
     """
     remarks: list[str] = []
     points, segments, motions = goal.waypoints, goal.segments, goal.motions

@@ -4,8 +4,9 @@
 Points that give joint positions in place of a pose: every number of their pose is NaN.
 
 Only the planner knows the calibrated arm and the tool, so it computes these poses, and all later
-stages see an ordinary goal. A joint move to such a point is sent as joint positions, because near
-a singularity, where robots rest more often than not, no pose selects joint positions reliably.
+stages see an ordinary goal. A joint move to such a point is sent as joint positions, not as a
+pose: robots often rest near a singularity, where a pose does not determine joint positions
+reliably.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from ur_cartesian_driver.planning.request.validate import check
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointPositions(Posture):
-    """The posture of all joints from which the pose of its point was computed."""
+    """A posture that names all joints, and from which the pose of its point was computed."""
 
     def joints(self, tf_prefix: str) -> Joints:
         """Return the joint positions [rad]."""
@@ -51,7 +52,7 @@ def named_joints(posture: Posture, tf_prefix: str) -> dict[int, float]:
 
 
 def full_posture(named: dict[int, float]) -> Joints | None:
-    """Return the configuration of a posture that names all joints, else None."""
+    """Return the configuration [rad] if a posture names all joints (by number), else None."""
     return vector6(named[k] for k in range(6)) if len(named) == 6 else None
 
 
@@ -84,7 +85,7 @@ def check_for_arm(goal: Goal, T_flange_tcp: Pose, arm: Arm, options: PlanningOpt
 
 
 def _check_calibration(goal: GoalTable, by_joints: Flags, options: PlanningOptions) -> None:
-    """Refuse joint points whose pose is needed, if the calibration is unknown."""
+    """Refuse points that give joints, but are sent as poses, if the calibration is unknown."""
     is_sent = IS_JOINT_MOVE[goal.motions.types]
     for i in rows_where(by_joints & ~is_sent)[:1]:
         if not options.calibration_known:

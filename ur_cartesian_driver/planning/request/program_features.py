@@ -185,7 +185,7 @@ def takes_times(options: PlanningOptions) -> bool:
 
 
 def time_remarks(goal: GoalTable, options: PlanningOptions) -> list[str]:
-    """Return a remark if the times of a goal are met by sending speeds."""
+    """Return a remark if speeds are sent instead of the times of a goal."""
     if takes_times(options) or not is_timed(goal) or is_spline(goal):
         return []
     return [
@@ -196,8 +196,9 @@ def time_remarks(goal: GoalTable, options: PlanningOptions) -> list[str]:
 
 def check_wait(time: float, options: PlanningOptions) -> None:
     """
-    Refuse a wait at a first point where the robot already is.
+    Refuse to wait at the first point, where the robot already is, if no times are sent.
 
+    :param time: of the first point [s].
     :raises NotAvailable: times are not sent in the wire dialect.
     """
     if not takes_times(options):
@@ -213,9 +214,10 @@ def round_radii(
     radii: Floats, begin: int, options: PlanningOptions
 ) -> tuple[Floats, list[tuple[int, str]]]:
     """
-    Return the blend radii (n,) [m] on the wire, and a row and a remark for each one rounded down.
+    Return blend radii (n,) [m] rounded down as on the wire, and a remark for each that shrinks.
 
     :param begin: the number of the first point.
+    :returns: the radii, and rows with remarks.
     """
     rounded = round_down(radii, options)
     return rounded, [
@@ -248,7 +250,8 @@ def adapt_primitive(
     """
     Return a primitive as the robot program accepts it, and the reason for a change ('' = none).
 
-    :param joints: the joint solution at the end of the primitive [rad].
+    :param point: the number of the point at the end of the primitive, for refusals.
+    :param joints: the joint solution there [rad].
     :raises NotAvailable: the program has no such motion, or only with joint positions, which an
         unknown calibration rules out.
     """

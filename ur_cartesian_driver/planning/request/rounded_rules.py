@@ -25,7 +25,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
 
 
 def corner_bounds(goal: GoalTable) -> Floats:
-    """Return the allowed deviations of the path at points (n, 2) [m], [rad]; 0 = the arm stops."""
+    """Return the deviations (n, 2) [m], [rad] that a goal allows at its points; 0 = it stops."""
     segments = goal.motions
     deviation = np.where(
         segments.corner_deviations > 0.0, segments.corner_deviations, goal.corner_deviation
@@ -71,7 +71,7 @@ def check_rounded(goal: GoalTable, options: PlanningOptions) -> None:
 
 
 def _check_angles(goal: GoalTable) -> None:
-    """Refuse a bound on the turn in corners that are not rounded."""
+    """Refuse a corner_angle where there is no corner_deviation."""
     segments = goal.segments
     without = (segments.corner_deviations == 0.0) & (goal.corner_deviation == 0.0)
     given = [

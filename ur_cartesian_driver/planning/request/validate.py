@@ -84,7 +84,9 @@ Rule: TypeAlias = Callable[[GoalTable, PlanningOptions], None]
 
 def check(goal: Goal, options: PlanningOptions) -> GoalTable:
     """
-    Refuse a goal that is wrong for every robot; otherwise return it as a table, without leads.
+    Refuse a goal that is wrong for every robot; otherwise return it as a table.
+
+    Output commands with named leads are replaced by commands that switch earlier.
 
     :raises GoalRefused: the goal is wrong; the text names point, field, value and bound.
     """
@@ -92,7 +94,7 @@ def check(goal: Goal, options: PlanningOptions) -> GoalTable:
         table = goal_table(goal)
     except WrongType as error:
         raise InvalidGoal(error.field, error.problem) from None
-    with np.errstate(over='ignore', invalid='ignore'):  # a goal may contain any numbers
+    with np.errstate(over='ignore', invalid='ignore'):  # numbers may still be huge or NaN
         for rule in FIELD_RULES:
             rule(table, options)
         if table.io_commands:
@@ -253,7 +255,7 @@ def _postures(goal: GoalTable, options: PlanningOptions) -> None:
 
 
 def _joint_points(goal: GoalTable, options: PlanningOptions) -> None:
-    """Refuse points without a pose whose posture does not determine one."""
+    """Refuse points that give joint positions in place of a pose, if a joint is missing."""
     for i in rows_where(gives_joints(goal)):
         posture = goal.waypoints.postures.get(i, Posture())
         if len(posture.names) < len(JOINT_NAMES):
@@ -275,24 +277,26 @@ def _joint_points(goal: GoalTable, options: PlanningOptions) -> None:
 def _motions(goal: GoalTable, options: PlanningOptions) -> None:
     points, segments = goal.waypoints, goal.motions
     if len(points) < 2 or is_spline(goal):
-        return  # a spline can wait at a point
+        return  # in a spline, consecutive points may be equal: the arm waits
     lengths = np.linalg.norm(np.diff(points.poses[:, :3], axis=0), axis=1)
     suspect = IS_STRAIGHT[segments.types[1:]] & (lengths < 2.0 * SAME_POSITION)
     starts, ends = points.poses[:-1].copy(), points.poses[1:].copy()
     _, _, faults = goal_arcs(segments[1:], IDENTITY, starts, ends)
     suspect[[*faults]] = True
-    suspect &= ~np.isnan(lengths)  # checked again when the joint positions have a pose
+    suspect &= ~np.isnan(lengths)  # NaN: checked again when the pose has been computed
     for i in rows_where(np.append(False, suspect)):
         if i - 1 in faults:
             raise arc_error(i, faults[i - 1])
         if is_same_pose(points.pose(i - 1), points.pose(i)) and not is_rounded(goal):
-            # With a posture, the segment may become a joint move: the planner decides.
+            # A point with a posture may differ in the joints, so that its segment becomes a joint
+            # move. The planner decides this.
             if not (i in points.postures and options.on_posture_change == 'movej'):
                 raise duplicate_point_error(goal, i)
 
 
-#: All rules in order: later rules rely on the checks of earlier ones. Leads are applied after the
-#: first rules, which compare each field alone with its range.
+#: The rules in the order in which :func:`check` calls them; later rules rely on earlier ones.
+#: Between both lists, the leads of output commands are applied. This needs fields within their
+#: ranges, which FIELD_RULES ensure.
 FIELD_RULES: tuple[Rule, ...] = (_number_of_points, check_fields)
 RULES: tuple[Rule, ...] = (
     _joint_points,
@@ -324,7 +328,7 @@ RULES: tuple[Rule, ...] = (
 
 def check_stamp(age: float | None, options: PlanningOptions) -> None:
     """
-    Check the time at which a goal was sent.
+    Refuse a goal whose stamp is too old, or too far in the future.
 
     :param age: age of the goal's stamp on receipt [s]; None = no stamp.
     """
@@ -414,7 +418,7 @@ def arc_error(index: int, fault: str) -> InvalidGoal:
 
 
 def duplicate_point_error(goal: GoalTable, index: int) -> InvalidGoal:
-    """Return the refusal of a segment without a motion."""
+    """Return the refusal of point ``index``, which is the same as the point before."""
     times = goal.waypoints.times
     dwell = float(times[index] - times[index - 1])
     remedy = (
@@ -464,7 +468,7 @@ def _via(index: int, segment: Segment) -> None:
                 'give a pose between the ends of the arc',
             )
         return
-    # An unset pose of a ROS message is the identity.
+    # A ROS message cannot leave a pose out; the identity stands for an unset pose.
     for field, given in (
         ('via', segment.via not in (None, IDENTITY)),
         ('via_posture', bool(segment.via_posture)),
