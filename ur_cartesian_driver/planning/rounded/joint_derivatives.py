@@ -3,10 +3,10 @@
 """
 Derivatives of the joints along a rounded path, if a joint may come near one of its limits.
 
-Away from singularities, the tool's limits keep the joints far below their own limits. A few
-configurations along the path usually prove this: there, the inverse of the Jacobian turns bounds
-on the rates of the tool into bounds on the joint rates. If they do not prove it, the joints are
-found at all places.
+Away from singularities, the tool's limits keep the joints far below their limits of speed and
+acceleration. A few configurations along the path usually prove this: there, the inverse of the
+Jacobian turns bounds on the rates of the tool into bounds on the joint rates. If they do not prove
+it, the joints are solved at all places of the path.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.spline.spline_limits import may_near_limits
 
-#: Distance in s between the few configurations [m].
+#: Distance between the few configurations along the path, in s [m].
 _STEP = 0.004
 #: Greatest speed and turn rate, then accelerations, of the tool along a path.
 Peaks: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
@@ -31,7 +31,7 @@ Peaks: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointDerivatives:
-    """Derivatives of k joints with respect to s at m places."""
+    """Derivatives of k joints with respect to s, the place on the path, at m places."""
 
     #: (m, k) the first derivative; k = 0 if no joint comes near a limit, or if the arm cannot
     #: follow the whole path, which a later check of the plan refuses.
@@ -40,7 +40,7 @@ class JointDerivatives:
     q2: Floats
     #: Joint positions at the last place [rad]; None = the arm cannot follow the path.
     end: Joints | None
-    #: (m,) distance of the TCP in base [m] per unit of s; None = the tool's, or no limit is near.
+    #: (m,) travel of the TCP in base per unit of s; None = the same as the tool's, or k = 0.
     carrier: Floats | None = None
 
 
@@ -56,10 +56,12 @@ def joint_derivatives(
     """
     Return the derivatives of the joints with respect to s along a path.
 
-    :param s: (m,) the places.
+    :param q_start: the configuration before the first place [rad].
+    :param s: (m,) the places, increasing.
     :param poses: (m, 7) the poses of the tool there.
     :param derivatives: (m, 6) first and second derivatives of the tool with respect to s.
-    :param peaks: see :func:`~ur_cartesian_driver.planning.spline.spline_limits.may_near_limits`.
+    :param peaks: the greatest rates of the tool along the path, for
+        :func:`~ur_cartesian_driver.planning.spline.spline_limits.may_near_limits`.
     """
     arm = kinematics.arm
     few = np.unique(np.append(np.searchsorted(s, np.arange(s[0], s[-1], _STEP)), len(s) - 1))

@@ -33,7 +33,8 @@ from ur_cartesian_driver.planning.geometry.samples import (
 from ur_cartesian_driver.planning.request.validate import arc_error
 from ur_cartesian_driver.planning.rounded.rounded_path import Polyline
 
-#: A turn of the tool adds its angle times this radius [m] to the place ``s`` on the path.
+#: The place ``s`` on a path grows by the hypotenuse of the tool's travel and of its turn times
+#: this radius [m].
 TURN_RADIUS = 0.05
 #: Allowed deviations of the set-points from lines, arcs and turns between corners [m], [rad].
 CURVE_BOUNDS = 1e-5, 2e-4
@@ -93,7 +94,8 @@ def programmed_sections(
     curves, faults = curves_of(goal.motions, goal.T_base_frame, starts, targets.copy())
     for row, fault in faults.items():
         raise arc_error(row, fault)
-    # The largest spacing gives the least number of samples: an impossible path is refused here.
+    # A path that needs too many samples even at the largest spacing is refused before any are
+    # made.
     fewest = np.maximum(curves.length / STEP_LENGTH, curves.angle / STEP_ANGLE)
     check_sample_count(fewest, np.arange(n), CHECK_SPEEDS)
     count = curves.chord_counts(_CHORD_ERROR, _CHORD_TURN)
@@ -103,7 +105,7 @@ def programmed_sections(
     rows = np.concatenate([curves.start[:1], curves.rows(segment, number / count[segment])])
     keep_hemisphere(rows)
     if np.abs(rows[:, 3:] - rows[0, 3:]).max() < _NO_TURN:
-        rows[:, 3:] = rows[0, 3:]  # rounding errors would count as a tool that turns
+        rows[:, 3:] = rows[0, 3:]  # otherwise rounding errors would count as turns
     bounds = np.empty((len(rows), 2))
     bounds[:] = CURVE_BOUNDS
     bounds[last] = corners
@@ -121,7 +123,7 @@ def programmed_sections(
         own = slice(begin, int(last[end]) + 1)
         s = np.concatenate([[0.0], np.cumsum(steps[begin : own.stop - 1])])
         kept = np.append(True, steps[begin : own.stop - 1] > 0.0)
-        # A point that is given twice has the tighter bound of the two.
+        # Of vertices at the same place, one is kept, with the tightest of their bounds.
         kept_bounds = np.minimum.reduceat(bounds[own], np.flatnonzero(kept))
         sections.append(
             ProgrammedSection(

@@ -3,10 +3,10 @@
 """
 A polyline of poses with rounded corners, in closed form.
 
-The polyline x(s) is in R^7: positions and unit quaternions. It turns the tool so little per chord
-that the chord between two quaternions replaces their arc. A value of s is a *place*. At the vertex
-j, the derivative of x(s) jumps by d_j. Averaging with the kernel
-k(u) = 15/16 (1 - u^2)^2 over a width w_j on both sides turns a single corner into
+The polyline x(s) is in R^7: positions and unit quaternions. The tool turns so little on a chord
+that quaternions are interpolated linearly, too. A value of s is a *place*. At the vertex j, the
+derivative of x(s) jumps by d_j. Averaging with the kernel k(u) = 15/16 (1 - u^2)^2 over a width
+w_j on both sides turns a single corner into
 
     x(s) + d_j w_j E((s - s_j) / w_j),    E(u) = G(u) - max(u, 0),    G'' = k.
 
@@ -33,22 +33,23 @@ from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
 
 #: E(0): deviation of a single corner from the polyline, as a fraction of jump times width.
 PEAK = 5.0 / 32.0
-#: Corners are grouped by width for the spacing of samples: this width [m] begins a group.
+#: Corners are grouped by width for the spacing of samples: one group begins at this width [m].
 MIN_WIDTH = 2e-6
-#: Ratio of the widths at the two ends of such a group.
+#: In such a group, the greatest width is less than this many times the smallest.
 _RATIO = 1.5
 #: Fraction of a bound to which widths are fitted, so that few deviations exceed the bound.
 _AIM = 0.95
-#: Greatest number of rounds of this fit; it ends when no width changes by more than this fraction.
+#: Greatest number of rounds in which widths are fitted. The fit ends earlier if no width changes
+#: by more than the fraction _SAME.
 _ROUNDS, _SAME = 10, 0.006
-#: Smallest and greatest factor on a width in a round.
+#: Smallest and greatest factor by which a width changes in a round.
 _STEPS = 0.5, 1.3
-#: If more than ``_MANY`` corners lie within a corner's width, samples are farther apart by the
-#: factor ``_SMOOTHER``.
+#: If more than ``_MANY`` corners lie within a corner's width, the path is smoother there, and
+#: samples are farther apart by the factor ``_SMOOTHER``.
 _MANY, _SMOOTHER = 5, 2.4
-#: Largest change of the width per unit of s.
+#: The widths of two corners differ by at most this fraction of the distance between them.
 _MAX_SLOPE = 0.5
-#: Factor on widths each time that they are shortened because a bound is exceeded.
+#: Factor by which widths are multiplied in each round if a bound is exceeded within them.
 _SHORTENING = 0.85
 #: Jumps smaller than this are rounding errors.
 _NO_JUMP = 1e-9
@@ -87,7 +88,7 @@ class RoundedPath:
     """
     A polyline whose corners are rounded within their bounds. Immutable.
 
-    :param max_width: greatest width of a corner.
+    :param max_width: greatest width on each side of a corner, in s [m].
     """
 
     def __init__(self, polyline: Polyline, max_width: float) -> None:
@@ -111,7 +112,7 @@ class RoundedPath:
     # ---- the curve ----------------------------------------------------------------------------
 
     def rows(self, s: Floats) -> PathRows:
-        """Return the curve at places (m,), which must be in ascending order."""
+        """Return the curve and its derivatives at places (m,), which must not decrease."""
         x, d1 = self._on_polyline(s)
         d2, d3 = np.zeros_like(x), np.zeros_like(x)
         for corner, sample in self._pairs(s, self._places, self.widths):
@@ -136,7 +137,7 @@ class RoundedPath:
         """
         Return the spacing of samples (m - 1,) between consecutive places (m,).
 
-        :param part: the spacing as a fraction of the smallest width that reaches the interval.
+        :param part: the spacing as a fraction of the smallest width that reaches an interval.
         :param longest: the spacing where nothing is rounded.
         """
         found = np.full(len(places) - 1, longest)
@@ -182,14 +183,18 @@ class RoundedPath:
         return widths
 
     def _evened(self, widths: Floats) -> Floats:
-        """Return widths, lowered so that neighbours differ little and their deviations cancel."""
+        """
+        Return widths, lowered so that neighbours differ little (see :data:`_MAX_SLOPE`).
+
+        Then the deviations of neighbouring corners in a chain cancel each other.
+        """
         rise = _MAX_SLOPE * self._places
         before = np.minimum.accumulate(widths - rise) + rise
         after = np.minimum.accumulate((widths + rise)[::-1])[::-1] - rise
         return np.minimum(before, after)
 
     def _excess(self, at: Floats, widths: Floats, bounds: Floats) -> Floats:
-        """Return the deviation at each place (m,) as a fraction of its bounds (m, 2)."""
+        """Return the greater ratio of a deviation to its bound (m, 2) at each place (m,)."""
         deviation = np.zeros((len(at), 7))
         for corner, sample in self._pairs(at, self._places, widths):
             w = widths[corner]
@@ -199,7 +204,7 @@ class RoundedPath:
         return largest
 
     def _shorten(self) -> None:
-        """Shorten widths until each place keeps the largest bound of the corners that reach it."""
+        """Shorten widths until each place keeps the largest bound of all corners that reach it."""
         s = self.polyline.s
         places = at = np.sort(np.concatenate([s[1:-1], 0.5 * (s[1:] + s[:-1])]))
         while True:
@@ -210,7 +215,7 @@ class RoundedPath:
             if not len(bad):
                 if at is places:
                     return
-                at = places  # corners whose deviations cancelled may no longer do so
+                at = places  # check all again: deviations that cancelled may no longer do so
                 continue
             reach = np.searchsorted(bad, self._places + self.widths) > np.searchsorted(
                 bad, self._places - self.widths
@@ -241,7 +246,11 @@ class RoundedPath:
 
 
 def _kernel_sums(u: Floats, w: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return the terms that a corner with a jump of 1 adds to the curve and its derivatives."""
+    """
+    Return the terms that a corner with a jump of 1 adds to the curve and its derivatives.
+
+    :param u: distance from the corner, as a fraction of its width; ``w``: the width.
+    """
     u2 = u * u
     rest = 1.0 - u2
     step = 0.5 + 0.9375 * u * (1.0 - u2 * (2.0 / 3.0 - u2 / 5.0))

@@ -57,50 +57,54 @@ from ur_cartesian_driver.planning.spline.spline_path import (
     SplinePath,
 )
 
-#: Greatest deviation that the pieces may add to the path's own [m].
+#: Greatest deviation of the pieces from the rounded path [m].
 PIECE_TOLERANCE = 1e-5
-#: Greatest such deviation as a fraction of the smallest bound of a corner.
+#: This deviation is also at most this fraction of the smallest corner_deviation of the goal.
 _PIECE_PART = 0.2
-#: Fraction of this deviation for the tool spline; the joints get the remainder. They need little
-#: of it, because pieces are short compared with the arm.
+#: Fraction of this deviation that the tool spline may use; the joint polynomials get the
+#: remainder. They need less, because pieces are short compared with the arm.
 _TOOL_PART = 0.6
-#: Fraction of the jerk limit at which the law aims, because the pieces have a little more jerk.
+#: Fraction of the jerk limit at which the time law aims, because the pieces have a little more
+#: jerk.
 _JERK_PART = 0.97
 #: The width of a corner is at most the distance that the tool travels in this time [s].
 _WIDTH_TIME = 0.25
 #: Widths up to this [m] are allowed even if the tool is slower.
 _SLOW_WIDTH = 0.001
-#: A tool that travels less [m] turns on the spot, if it turns farther than this [rad].
+#: A segment is a turn on the spot if the tool travels less than _NO_TRAVEL [m] on it and turns
+#: farther than _NO_TURN [rad].
 _NO_TRAVEL, _NO_TURN = 1e-6, 1e-6
-#: Number of samples inside each piece that measure its deviation and its accelerations: near the
-#: quarters, a quintic that starts and ends like the law is farthest from it.
+#: Number of samples inside each piece at which its deviation and its accelerations are measured.
+#: Three are enough, because a quintic that agrees with the law at its ends is farthest from it
+#: near the quarters.
 _SAMPLES_INSIDE = 3
-#: Accelerations inside a piece are measured if they may exceed the tool spline's by more than the
-#: first fraction of their limit, or if a joint exceeds the second fraction of a limit.
+#: Accelerations inside a piece are measured if they may exceed those of the tool spline by more
+#: than the fraction _MORE_ACCELERATION of their limit, and inside all pieces if a joint exceeds
+#: the fraction _FAST of its limit anywhere.
 _MORE_ACCELERATION, _FAST = 0.002, 0.5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RoundedMotion:
-    """The motion along a rounded path, after all checks."""
+    """The motion along a rounded path, as joint polynomials."""
 
     laws: Sequence[SectionLaw]
     limits: ToolLimits
     kinematics: TcpKinematics
-    #: (k,) when each section begins [s].
+    #: (k,) times at which the sections begin [s].
     begins: Floats
     places: Places
     #: The tool spline with the samples at which the arm is checked.
     path: SplinePath
-    #: (m,) the number of samples between its knots that describe the path.
+    #: (m,) the number of samples that :attr:`reference` has on each piece of the tool spline.
     sample_count: Indices
     polynomials: JointPolynomials
-    #: (n,) when each point of the goal is passed [s].
+    #: (n,) times at which the points of the goal are passed [s].
     point_times: Floats
 
     @cached_property
     def reference(self) -> ReferencePath:
-        """The path of the tool, whose rows name the segments of the goal."""
+        """The path of the tool; each row has the number of its segment in the goal."""
         path = self.path
         pieces = spline_pieces(path.spline, self.sample_count, 0, self.places)
         piece, t = sample_parameters(pieces)
@@ -137,7 +141,8 @@ def plan_rounded_path(
     :param start: pose of the tool in this frame at the beginning, where the arm is at rest.
     :param q_start: joint positions at the beginning [rad].
     :param stops: points at which the arm stops in addition to those without corner_deviation.
-    :raises GoalRefused: the arm cannot follow the path, or the joints not closely enough.
+    :raises GoalRefused: the arm does not move at all, cannot follow the path, cannot follow it
+        closely enough by pieces, or misses a posture.
     """
     bounds = corner_bounds(goal)
     given = bounds[bounds[:, 0] > 0.0, 0]
@@ -308,7 +313,7 @@ class Places:
 
 
 def _coarse_times(motion: RoundedMotion, tolerance: float, options: PlanningOptions) -> Floats:
-    """Return the ends (k, 2) [s] of the pieces that do not follow the law closely enough."""
+    """Return both ends (k, 2) [s] of each piece that deviates too far or exceeds a limit."""
     pieces = motion.polynomials
     bounds = (1.0 - _TOOL_PART) * tolerance * np.array([1.0, 1.0 / ANGLE_TOLERANCE_RADIUS])
     coarse = np.any(pieces.deviations > bounds, axis=1)
@@ -321,9 +326,10 @@ def _may_exceed(motion: RoundedMotion, options: PlanningOptions) -> Flags:
     """
     Return whether the accelerations inside each piece (n,) have to be measured.
 
-    The tool spline keeps its limits. A piece has the states of the spline at its ends, so its
-    deviation is about 64 d t^3 (1 - t)^3, with d in the middle. The second derivative of this is
-    at most 24 d.
+    The tool spline keeps its limits. A piece agrees with the spline at both ends in position,
+    speed and acceleration. So its deviation at the fraction t of its time is about
+    64 d t^3 (1 - t)^3, where d is the deviation in the middle. The second derivative of this is at
+    most 24 d.
     """
     pieces, limits = motion.polynomials, motion.limits
     durations = np.diff(pieces.times)
@@ -338,7 +344,12 @@ def _may_exceed(motion: RoundedMotion, options: PlanningOptions) -> Flags:
 
 
 def _limit_excess(motion: RoundedMotion, options: PlanningOptions, rows: Indices) -> Floats:
-    """Return the greatest ratio, inside some pieces (k,), of a quantity to its limit."""
+    """
+    Return the greatest ratio, inside some pieces (k,), of a quantity to its limit.
+
+    The quantities are the accelerations of the tool, and the speeds and accelerations of the
+    joints.
+    """
     pieces, kinematics = motion.polynomials, motion.kinematics
     model = kinematics.arm.model
     if not len(rows):

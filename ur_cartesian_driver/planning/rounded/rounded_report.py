@@ -30,8 +30,8 @@ class RoundedReport:
     """
     The report of a plan with rounded corners.
 
-    It keeps only a few numbers for each place of the path, because a plan is kept until its motion
-    ends; texts are made when they are read.
+    A plan is kept until its motion ends. So the report keeps only a few numbers for each place on
+    the path, and texts are made when they are read.
     """
 
     def __init__(self, motion: RoundedMotion) -> None:
@@ -39,7 +39,7 @@ class RoundedReport:
         self._sections = [_SectionSpeeds.of(law) for law in motion.laws]
         self._point_times = motion.point_times
         self._piece_ends = motion.polynomials.times[1:]
-        #: (n,) the distance [m] by which the tool misses each point; -1 = it stops.
+        #: (n,) the distance [m] at which the tool passes each point; -1 = it stops there.
         self.corner_deviations = np.full(len(motion.point_times), -1.0)
         for law in motion.laws:
             section = law.section
@@ -106,7 +106,7 @@ class RoundedReport:
 
 
 def planned_rows(motion: RoundedMotion, report: RoundedReport) -> PlannedRows:
-    """Return the pieces, each with the first point that is passed at its end or later."""
+    """Return the pieces as rows, each with the first point that is passed at its end or later."""
     polynomials = motion.polynomials
     waypoints = np.minimum(
         np.searchsorted(motion.point_times, polynomials.times[1:] - 1e-6),
@@ -126,7 +126,8 @@ class _SectionSpeeds:
     asked: Singles
     #: (m, 3) derivative of the position with respect to s.
     directions: Singles
-    #: (m,) the greatest ds/dt that limits allow, and the number of this limit among ``names``.
+    #: (m,) the greatest ds/dt that all limits allow, and the index in ``names`` of the lowest
+    #: limit.
     cap: Singles
     limit: Bytes
     names: tuple[str, ...]
@@ -154,7 +155,12 @@ class _SectionSpeeds:
         )
 
     def slow_stretches(self, slower_by: float, *, begins: bool, ends: bool) -> list[SlowStretch]:
-        """Return the slow stretches; ``begins``, ``ends``: the section is the first, the last."""
+        """
+        Return the slow stretches of the section.
+
+        :param begins: whether the motion begins with this section.
+        :param ends: whether the motion ends with this section.
+        """
         speed, asked = self.speed, self.asked
         moves = np.abs(self.directions).max(axis=1) > 1e-3
         slow = (speed < (1.0 - slower_by) * asked) & moves
@@ -163,7 +169,7 @@ class _SectionSpeeds:
         found = []
         for begin, stop in edges.reshape(-1, 2).tolist():
             slowest = begin + int(np.argmin(speed[begin:stop] / asked[begin:stop]))
-            # The corner of a place is at the nearer end of its segment.
+            # The corner that slows the tool is at the nearer end of the segment.
             point = max(int(segments[slowest]) - bool(fractions[slowest] < 0.5), 0)
             cause, reason = self._cause(begin, stop, point, begins=begins, ends=ends)
             found.append(

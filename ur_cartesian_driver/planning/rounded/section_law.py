@@ -3,11 +3,13 @@
 """
 The time law of a section of a rounded path, within the limits of tool and joints.
 
+The law is the fastest law, averaged over a window of time to bound its jerk (:mod:`~.time_law`).
 Limits are evaluated at places that are a fraction of a corner's width apart. A first law gives the
-time of each place, and so the places within the averaging window around it. The next law is found
-with each speed limit lowered to the least limit in the window. Averaging mixes accelerations of
-neighbouring places, so the averaged law is measured. Limits are tightened around places where a
-limit is exceeded, until all limits are kept or the greatest number of rounds is reached.
+time of each place, and so the places within the averaging window around it. For the next law, each
+speed limit is lowered to the least limit in the window. Averaging mixes accelerations of
+neighbouring places, so accelerations may still exceed their limits. They are measured, and limits
+are tightened around places where one is exceeded, until all limits are kept or the greatest number
+of rounds is reached.
 """
 
 from __future__ import annotations
@@ -45,29 +47,29 @@ _DENSITY = 1.0 / 4.0
 _SPACING = 0.002
 #: Shortest averaging window [s]: long enough for the acceleration to be continuous on the wire.
 _MIN_WINDOW = 0.02
-#: The square of the acceleration along the path, as a part of speed times jerk.
+#: The acceleration along the path is at most sqrt(_RAMP_PART * speed limit * jerk limit).
 _RAMP_PART = 0.35
 #: Fraction of the acceleration limits at which the law aims, because averaging adds a little.
 _AIM = 0.975
-#: Greatest number of rounds in which limits are tightened: by the excess to the power ``_MORE``
-#: and an extra factor. Above ``_FAR``, the power is ``_LESS``, because jerk grows with a higher
-#: power of the speed.
+#: Greatest number of rounds in which limits are tightened.
 _ROUNDS = 8
+#: In a round, a limit that is exceeded by the factor e is divided by _EXTRA e^_MORE; by _EXTRA
+#: e^_LESS if e is above _FAR, because a jerk grows with a higher power of the speed.
 _FAR, _LESS, _MORE, _EXTRA = 2.0, 0.6, 1.5, 1.01
 #: Factor by which speeds may exceed their limits between places.
 _SPEED_MARGIN = 1.005
 #: Number of samples while the averaging window passes a place at which limits change.
 _AROUND = 13
-#: Time between anchors [s].
+#: Time between two :attr:`SectionLaw.anchors` [s].
 _ANCHOR_TIME = 2.0
-#: Factor by which limits of acceleration are tightened where the law has to be slower.
+#: Factor by which limits of acceleration are divided where the law has to be slower.
 _SLOWER = 1.5
-#: Times before and after a sample between which its jerk is measured [s].
+#: The jerk at a time is measured from this long before to this long after it [s].
 _JERK_STEP = 0.002
 #: Number of times that are measured at once, so that the intermediate arrays stay in the cache.
 _BLOCK = 8192
-#: Names of the limits of a held part: its speed in base; and, after the name of a joint, the
-#: acceleration that the joint needs along the path even at a constant speed.
+#: Names of two limits for paths on a held part: max_tool_speed for the TCP in base; and, after the
+#: name of a joint, max_joint_acceleration of this joint at a constant speed along the path.
 HELD_PART, BENDS = 'held part', ' bends'
 _TINY = 1e-12
 _NEARLY = 1e-10
@@ -75,7 +77,7 @@ _NEARLY = 1e-10
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ToolLimits:
-    """The limits of the tool in rows (k,), for segments or places; jerk [m/s^3] has one limit."""
+    """The limits of the tool (k,), for k segments or places, in SI units; one limit of jerk."""
 
     speeds: Floats
     turn_rates: Floats
@@ -84,7 +86,11 @@ class ToolLimits:
     jerk: float
 
     def at(self, *rows: Indices) -> ToolLimits:
-        """Return limits in m rows: the least limits of several ``rows``, each an array (m,)."""
+        """
+        Return the limits at m places, each the least of several limits.
+
+        :param rows: arrays (m,) with the indices of these limits.
+        """
         return replace(
             self,
             **{
@@ -117,7 +123,7 @@ class CurveSamples:
 
 
 def tool_rows(rows: PathRows) -> tuple[Floats, Floats, Floats]:
-    """Return poses (m, 7), turns per unit of s (m, 3) and the derivatives of these (m, 3)."""
+    """Return poses (m, 7), turns per unit of s (m, 3) and derivatives of the turns (m, 3)."""
     quaternions = rows.x[:, 3:]
     if not rows.d1[:, 3:].any() and not rows.d2[:, 3:].any():
         none = np.zeros((len(quaternions), 3))
@@ -136,6 +142,7 @@ class SectionLaw:
     """
     The rounded path of a section over time.
 
+    :param tool: the limits of the tool, a row for each segment of the section.
     :param q_start: the configuration at the beginning of the section [rad].
     """
 
@@ -158,18 +165,20 @@ class SectionLaw:
         row = self._rows(s)
         #: (m - 1,) the rows of the tool's limits between places.
         self._rows_between = row[1:]
-        # Between two segments the lower limits apply, because the next step is in the second one.
+        # At the end of a segment, the lower limits of this and the next segment apply, because the
+        # step after this place is in the next segment.
         after = np.minimum(row + np.isin(s, section.ends), len(section.ends) - 1)
         self._limits_at = tool.at(row, after)
         self._tool, self._options, self._model = tool, options, kinematics.arm.model
         # More acceleration along the path needs a longer window for its jerk. A ramp to the speed
-        # v takes v / a + 2 a / j, which is least at a^2 = v j / 2; corners have shorter ramps.
+        # v takes v / a + 2 a / j, which is least at a^2 = v j / 2. Ramps at corners are shorter
+        # and favour a smaller a, hence the smaller part.
         self._ramp = min(
             float(tool.accelerations.max()),
             sqrt(_RAMP_PART * float(tool.speeds.max()) * tool.jerk),
         )
         self.window = max(_MIN_WINDOW, 2.0 * self._ramp / tool.jerk)
-        #: By name of a limit: the greatest ds/dt that it allows at each place (m,).
+        #: For each limit by its name: the greatest ds/dt (m,) that it allows at the places.
         self.caps = self._tool_caps()
         derivatives = np.concatenate([x1, w1], axis=1), np.concatenate([x2, w2], axis=1)
         self._joints = joint_derivatives(
@@ -180,12 +189,13 @@ class SectionLaw:
         self.caps |= self._joint_caps()
         self._speed = np.minimum.reduce(list(self.caps.values()))
         self._fastest = FastestLaw(s, self._limits())
-        #: Factor by which limits are tightened at each place if the averaged law exceeds them.
+        #: (m,) divisor of the limits of acceleration at each place, above 1 where they had to be
+        #: tightened.
         self._tightened = np.ones(len(s))
-        #: The squares (m,) of the last law, and its :meth:`excess` (m,).
+        #: The squares (m,) of ds/dt of the last law, and its :meth:`excess` (m,).
         self._measured = np.full(len(s), np.nan), np.zeros(len(s))
         self.law = self._fitted()
-        #: Places, about :data:`_ANCHOR_TIME` apart, at which a grid of pieces begins anew.
+        #: Places, about :data:`_ANCHOR_TIME` apart, that are knots (see :mod:`~.tool_knots`).
         last = self.duration - 0.5 * _ANCHOR_TIME
         self.anchors = self.law.at(np.arange(_ANCHOR_TIME, last, _ANCHOR_TIME)).s
 
@@ -298,7 +308,8 @@ class SectionLaw:
             slowed = self._speed / np.sqrt(self._tightened)
             before, y = y, squares(lowered_over(slowed, first.times, 0.5 * window))
             found = TimeLaw(s, y, window)
-            # Elsewhere the law is the same, only later.
+            # The law is measured again only near places where it has changed. Elsewhere it is the
+            # same, only shifted in time.
             changed = np.where(y == before, 0.0, 1.0)
             again = _largest_around(changed, found.times, 2.0 * window) > 0.0
             excess[again] = self.excess(found, again)[again]
@@ -311,7 +322,7 @@ class SectionLaw:
         return found
 
     def _measured_times(self, law: TimeLaw, at: Flags) -> Floats:
-        """Return times near which the law passes places, denser where limits change."""
+        """Return times near which the law passes flagged places, denser where limits change."""
         tool = self._tool
         changes = np.flatnonzero(
             (np.diff(tool.accelerations) != 0.0) | (np.diff(tool.turn_accelerations) != 0.0)
@@ -327,7 +338,8 @@ class SectionLaw:
         """
         Return the greatest ratio, at each place (m,), of a measured quantity to its limit.
 
-        :param at: (m,) the places at which it is measured, with both neighbours of each.
+        :param at: (m,) flags of the places at which the law is measured; their neighbours are
+            included.
         """
         s, excess = self.samples.s, np.zeros(len(self.samples.s))
         times = self._measured_times(law, at)
@@ -401,7 +413,7 @@ def places(path: RoundedPath, ends: Floats) -> Floats:
     found = np.interp(np.linspace(0.0, density[-1], count + 1), density, marks)
     # The middles of corners are included, because curvature is greatest there.
     every = np.unique(np.concatenate([found, ends, path.sharp_corners()]))
-    # Steps between places that nearly coincide would consist of rounding errors.
+    # Of places that nearly coincide, one is kept: steps between them would be rounding errors.
     apart = np.append(True, np.diff(every) > _NEARLY)
     apart |= np.isin(every, ends)
     kept: Floats = every[apart]

@@ -11,8 +11,8 @@ new approach to time-optimal path parameterization based on reachability analysi
 
 This law jumps from one acceleration to another. :class:`TimeLaw` is its moving average over a
 window of time, which bounds the jerk along the path. An average never exceeds the greatest value
-in its window, so speed limits are kept if each is first lowered to the least one that the window
-reaches (:func:`lowered_over`).
+in its window. So the averaged law keeps the speed limits if each limit is first lowered to the
+least limit that the window reaches (:func:`lowered_over`).
 """
 
 from __future__ import annotations
@@ -33,12 +33,14 @@ from ur_cartesian_driver.motion.geometry.pose_rows import length_rows
 _HALVINGS = 30
 _TINY = 1e-12
 _JUST_BELOW = 1.0 - 1e-9
-# Margin by which rounding errors may put a time out of reach [s].
+# Times that are out of reach by less than this are in reach, because of rounding errors [s].
 _NO_TIME = 1e-9
-# Newton's method finds times of places, unless the law nearly rests there [1/s].
+# Number of steps of Newton's method that find the time at a place; no step is made where ds/dt is
+# less than _NO_SPEED [m/s].
 _NEWTON_STEPS = 4
 _NO_SPEED = 1e-9
-# Places passed within this time are sampled without a time in between [s]: windows are longer.
+# Between two places that are passed within this time, no further time is sampled, because the
+# averaging window is longer [s].
 _APART = 0.004
 
 
@@ -59,7 +61,7 @@ class LawLimits:
 
 
 class _Bounds:
-    """Bounds of u for a given y: +-c - d y of joints, +-sqrt(r^2 - (n y)^2) - m y of vectors."""
+    """Bounds of u for a given y: +-c - d y by joints, +-sqrt(r^2 - (n y)^2) - m y by vectors."""
 
     def __init__(self, limits: LawLimits) -> None:
         self.c: list[Floats] = []
@@ -117,7 +119,11 @@ class _Bounds:
         return low, high
 
     def largest_before(self, step: Floats, after: Floats) -> Floats:
-        """Return the largest y (m,) from which a step leads to at most ``after``."""
+        """
+        Return the largest y (m,) from which a step leads to at most ``after``.
+
+        :param step: (m,) twice the distance to the next place; ``after``: (m,) the y there.
+        """
         largest = np.full(len(after), inf)
         with np.errstate(divide='ignore', invalid='ignore'):
             for c, d in zip(self.c, self.d, strict=True):
@@ -138,7 +144,7 @@ class FastestLaw:
     The fastest law along a path, for limits that may be tightened.
 
     :param s: the places (m,), increasing.
-    :param limits: the limits before tightening; limits that no law can reach are left out.
+    :param limits: the limits before tightening; joints that cannot reach theirs are left out.
     """
 
     def __init__(self, s: Floats, limits: LawLimits) -> None:
@@ -157,7 +163,7 @@ class FastestLaw:
         y[0] = y[-1] = 0.0
         y = _lowered(y, lambda row, after: bounds.take(row).largest_before(step[row], after))
         back, step_back = bounds.take(slice(None, None, -1)), step[::-1]
-        # A step in the other direction begins in the later row.
+        # Backwards, a step begins in the row that is later on the path.
         after_step = back.take(slice(1, None))
         return _lowered(
             y[::-1],
@@ -213,7 +219,7 @@ def _lowered(y: Floats, reachable: Callable[[Indices | slice, Floats], Floats]) 
 
 
 class PathTimes(NamedTuple):
-    """The place s on the path, ds/dt and d2s/dt2, at m times."""
+    """The place s on the path, v = ds/dt and a = d2s/dt2, at m times."""
 
     s: Floats
     v: Floats
@@ -234,7 +240,7 @@ class TimeLaw:
         v, ds = np.sqrt(y), np.diff(s)
         dt = 2.0 * ds / np.maximum(v[1:] + v[:-1], _TINY)
         self.window = window
-        #: (m,) time at which the law passes each place before averaging [s].
+        #: (m,) time at which the law passes each place, before it is averaged [s].
         self.times = np.concatenate([[0.0], np.cumsum(dt)])
         self.duration = float(self.times[-1]) + window
         self._s, self._v = s, v
@@ -267,9 +273,12 @@ class TimeLaw:
 
     def sampled_times(self, at: Flags | None = None) -> Floats:
         """
-        Return times (k,) near which the averaged law passes places, and between distant ones [s].
+        Return times (k,) near which the averaged law passes places [s].
 
-        :param at: (m,) the places; each comes with its two neighbours. None = all.
+        If it takes longer than :data:`_APART` from one place to the next, a time in between is
+        added.
+
+        :param at: (m,) flags of the places; their neighbours are included. None = all places.
         """
         passed = self.times + 0.5 * self.window
         between, apart = 0.5 * (passed[1:] + passed[:-1]), np.diff(passed) > _APART
@@ -286,7 +295,7 @@ class TimeLaw:
         return times, self.at(times)
 
     def times_of(self, s: Floats) -> Floats:
-        """Return the times (m,) [s] at which the averaged law passes places."""
+        """Return the times (k,) [s] at which the averaged law passes places s (k,)."""
         low = np.interp(s, self._s, self.times)
         high = low + self.window
         times, known = self.table
@@ -309,7 +318,7 @@ def lowered_over(values: Floats, times: Floats, reach: float) -> Floats:
     reach += _NO_TIME
     low = np.searchsorted(times, times - reach, side='left')
     high = np.searchsorted(times, times + reach, side='right')
-    # Two ranges of 2^k values cover each range, so the lesser of their least values is its own.
+    # Two ranges of 2^k values cover each range, so its least value is the lesser one of theirs.
     result = np.empty_like(values)
     level = np.floor(np.log2(high - low)).astype(np.intp)
     table, size = values, 1

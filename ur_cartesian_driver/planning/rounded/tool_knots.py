@@ -3,9 +3,9 @@
 """
 The knots between which quintics follow the tool along a section of a rounded path.
 
-Knots lie on a grid whose steps are no shorter than the shortest piece. The grid begins anew at
-the anchors of the section, which are places on the path. So if the law is slowed somewhere, only
-pieces near there change; the others are only shifted in time.
+Knots lie on a grid of times whose steps are no shorter than the shortest piece. The grid begins
+anew at the anchors of the section, which are places on the path. So if the time law is slowed
+somewhere, only the pieces between the nearest anchors change; others are only shifted in time.
 """
 
 from __future__ import annotations
@@ -26,21 +26,24 @@ from ur_cartesian_driver.planning.spline.spline_path import sample_density
 
 #: Shortest time of a piece [s] that robot program and sockets sustain over any number of pieces.
 MIN_PIECE_TIME = 0.02
-#: Greatest ratios to their limits: of accelerations inside the shortest pieces, of accelerations
-#: inside pieces that can be split, and of the jerk inside the latter.
+#: Greatest accepted ratio to its limit: of an acceleration inside a piece of one grid step, of an
+#: acceleration inside a longer piece, and of the jerk inside a longer piece. A longer piece is
+#: split if it exceeds one of its ratios.
 CLOSE_ENOUGH, _SPLIT_EXCESS, _SPLIT_JERK = 1.017, 1.012, 1.01
 #: Greatest number of times that the law is slowed around pieces that are too coarse.
 TRIES = 6
-#: Number of shortest pieces that are joined into one at first; the result is split as necessary.
+#: Number of grid steps in a piece at first; pieces are then split as necessary.
 _JOINED = 8
-#: Fractions of a shortest piece at which its accelerations are measured; and of a piece that can
-#: be split, in addition to the half steps: its acceleration may be greatest close to its ends.
+#: Fractions of its time at which the accelerations of a piece are measured: of a piece of one grid
+#: step, and of a longer piece. The latter is also measured at all half steps, but its acceleration
+#: may be greatest closer to its ends.
 _QUARTERS, _MEASURED = (0.25, 0.5, 0.75), (0.08, 0.16, 0.3, 0.42, 0.58, 0.7, 0.84, 0.92)
-#: Greatest error of the acceleration, as a fraction of its limit, on pieces that can be split.
+#: Greatest error of the acceleration, as a fraction of its limit, on pieces of several grid steps.
 _ACCELERATION_PART = 0.15
-#: Greatest distance [m] of a chord between two samples from the path, the same as of the pieces.
+#: Greatest distance [m] between the path and the chord from one sample to the next, the same as
+#: between path and pieces.
 _CHORD_ERROR = 1e-5
-#: Greatest error [m] along the path of a place between two samples, by its time.
+#: Greatest error along the path [m] if a place is interpolated in time between two samples.
 _TIME_ERROR = 5e-5
 #: A tool slower than this [m/s] rests.
 _REST = 1e-9
@@ -51,18 +54,19 @@ class ToolKnots(NamedTuple):
 
     #: The tool at the n + 1 knots; times are since the beginning of the section.
     points: ToolPoints
-    #: (n,) the number of samples between them that describe the path.
+    #: (n,) the number of samples between two knots that describe the path.
     sample_count: Indices
-    #: (n,) the number of samples between them at which the arm is checked, as on lines.
+    #: (n,) the number of samples between two knots at which the arm is checked, the same as if the
+    #: path were straight.
     check_count: Indices
 
 
 def tool_knots(law: SectionLaw, tolerance: float) -> ToolKnots:
     """
-    Return the knots, as few as possible, and slow the law where pieces are too coarse.
+    Return as few knots as possible; slow the law where even the shortest pieces are too coarse.
 
-    :param tolerance: bound on deviations of the quintics from the law: of the position [m]; for
-        turns, of the arc at ANGLE_TOLERANCE_RADIUS.
+    :param tolerance: bound on deviations of the quintics from the law: of the position [m]; of the
+        orientation, as the angle times ANGLE_TOLERANCE_RADIUS [m].
     """
     for attempt in range(TRIES + 1):
         steps = _HalfSteps(law)
@@ -76,7 +80,7 @@ def tool_knots(law: SectionLaw, tolerance: float) -> ToolKnots:
 
 
 class _Pieces(NamedTuple):
-    """Quintics between rows of the grid, ``begin`` and ``end`` (r,), numbered on a spline."""
+    """Pieces of a spline, ``number`` (r,), between rows ``begin`` and ``end`` (r,) of the grid."""
 
     spline: ToolSpline
     number: Indices
@@ -115,8 +119,8 @@ class _HalfSteps:
         """
         Return the two numbers of samples in :class:`ToolKnots` for pieces between grid rows (n,).
 
-        Samples are at most 2 mm and one degree apart. Those that describe the path also follow its
-        curve, and its course over time.
+        Samples are at most 2 mm and one degree apart. Those that describe the path are denser
+        where the path is curved, and where the tool accelerates.
         """
         twists, accelerations = self._points.twists, self._points.accelerations[:, :3]
         speed = length_rows(twists[:, :3])
@@ -139,7 +143,7 @@ class _HalfSteps:
     def fits(self, begin: Indices, end: Indices, tolerance: float) -> Flags:
         """Return whether quintics between grid times (r,) follow the law closely enough."""
         pieces, fits = self._pieces(begin, end), np.ones(len(begin), dtype=np.bool_)
-        # Pieces that do not fit are mostly off at a quarter: long ones are compared there first.
+        # Most pieces that do not fit fail near a quarter, so long ones are compared there first.
         long = np.flatnonzero(end - begin > 2)
         if len(long):
             fits[long] = self._follows(pieces.take(long), tolerance, at_quarters=True)
@@ -182,13 +186,13 @@ class _HalfSteps:
         return follows
 
     def excess(self, begin: Indices) -> Floats:
-        """Return the greatest ratio of an acceleration to its limit on shortest pieces (r,)."""
+        """Return the greatest ratio of an acceleration to its limit on pieces of one step (r,)."""
         if not len(begin):
             return np.empty(0)
         return self._excess(self._pieces(begin, begin + 1), _QUARTERS)
 
     def _excess(self, pieces: _Pieces, parts: tuple[float, ...]) -> Floats:
-        """Return the greatest ratio (r,) of :meth:`excess` at some parts of each piece's time."""
+        """Return the ratios of :meth:`excess` (r,), measured at fractions of each piece's time."""
         begin, end = pieces.begin[:, None], pieces.end[:, None]
         t = ((self.grid[end] - self.grid[begin]) * parts).ravel()
         _, accelerations = pieces.spline.rates(np.repeat(pieces.number, len(parts)), t)
@@ -242,7 +246,8 @@ def _piece_ends(steps: _HalfSteps, tolerance: float) -> Indices:
         ends = np.insert(ends, split + 1, (ends[split] + ends[split + 1]) // 2)
         moved = split + np.arange(len(split))
         open_rows = np.sort(np.concatenate([moved, moved + 1]))
-    # Halves of neighbours may make one piece: first the odd neighbours, then the even ones.
+    # Neighbours that are halves of different pieces may make one piece. First the pairs that begin
+    # with an odd piece are tried, then the other pairs.
     for first in (1, 2):
         left = np.arange(first, len(ends) - 2, 2)
         left = left[ends[left + 2] - ends[left] <= _JOINED]
@@ -254,7 +259,7 @@ def _piece_ends(steps: _HalfSteps, tolerance: float) -> Indices:
 
 
 def _names(begin: Indices, end: Indices) -> Indices:
-    """Return a number for each piece between rows of the grid (r,)."""
+    """Return a number that identifies each piece between rows of the grid (r,)."""
     return 2 * _JOINED * begin + end - begin
 
 
