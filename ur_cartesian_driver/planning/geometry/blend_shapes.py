@@ -3,10 +3,11 @@
 """
 The shapes of blends: the transitions from one curve into the next that round waypoints.
 
-UR publishes the radius within which a blend stays, but its shape only for ``movep`` (a circular
-fillet). The other blends are modelled as a crossfade of the two motions: the first slows down
-evenly while the second speeds up evenly; between straight lines this makes a parabola. Between two
-joint moves the crossfade is in joint space, else in Cartesian space.
+UR publishes the radius within which a blend stays. It publishes the shape only of blends of
+``movep``: an arc that touches both segments (a fillet). Other blends are modelled as a crossfade
+of two motions: the first slows down evenly while the second speeds up evenly. Between straight
+lines this makes a parabola. Between two joint moves the crossfade is in joint space, otherwise in
+Cartesian space.
 """
 
 from __future__ import annotations
@@ -37,12 +38,22 @@ _MIN_RADIUS = 1e-9
 
 
 def crossfade(leave: N, join: N, s: N) -> tuple[N, N]:
-    """Return the ``u`` of the first and of the second curve at the parameters ``s`` of blends."""
+    """
+    Return the ``u`` on the first and on the second curve at the parameters ``s`` of blends.
+
+    :param leave: ``u`` at which the blend leaves the first curve.
+    :param join: ``u`` at which the blend joins the second curve.
+    :param s: parameter of the blend, from 0 to 1.
+    """
     return leave + (1.0 - leave) * s * (2.0 - s), join * s * s
 
 
 def crossfade_rows(first: Floats, waypoint: Floats, second: Floats) -> Floats:
-    """Return the poses (n, 7) in blends, from the poses on both curves and at the waypoint."""
+    """
+    Return the poses (n, 7) in blends.
+
+    :param first: (n, 7) the poses on the curves before the waypoints; ``second``: after them.
+    """
     rows = first + second - waypoint
     rows[:, 3:] = waypoint[:, 3:]
     turns = np.flatnonzero(
@@ -59,6 +70,8 @@ class BlendShapes:
 
     :param start: (n, 7) the poses where the blends begin; ``middle``: the waypoints; ``end``: the
         poses where the blends end.
+    :param radius: (n,) the blend radii [m].
+    :param fillet: (n,) whether each blend is a fillet.
     """
 
     def __init__(
@@ -78,7 +91,7 @@ class BlendShapes:
         self.opening = opening_rows(self.start, self.middle, self.end)
 
     def lengths(self) -> Floats:
-        """Return the lengths of blends between lines [m]: of arcs (``fillet``) or parabolas."""
+        """Return the lengths [m] of the fillets or parabolas, as if all segments were lines."""
         arc = self._circle_radii() * (np.pi - self.opening)
         there_and_back = length_rows(self.start - self.middle) + length_rows(
             self.end - self.middle
@@ -100,7 +113,7 @@ class BlendShapes:
 
     def samples(self) -> Indices:
         """Return the number of chords that follow each blend closely enough."""
-        # At its ends the blend turns at twice its mean rate.
+        # At its ends, a blend turns the tool at twice the mean rate.
         turns = np.ceil(2.0 * self.turns / MAX_TURN_PER_SAMPLE)
         radius = np.maximum(fillet_radius(self.radius, self.opening), 1e-3)
         on_circle = (np.pi - self.opening) / np.sqrt(8.0 * ARC_CHORD_ERROR / radius)
@@ -111,7 +124,7 @@ class BlendShapes:
         return np.maximum(2.0, np.maximum(turns, curve)).astype(np.intp)
 
     def tolerances(self) -> Floats:
-        """Return the blend tolerances (n, 2) [m], [rad]."""
+        """Return how far the robot's own blends may be from these blends (n, 2) [m], [rad]."""
         height = length_rows(self.middle - 0.5 * (self.start + self.end))
         return 0.5 * np.stack((height, np.maximum(self.before, self.after)), axis=1)
 
@@ -119,19 +132,23 @@ class BlendShapes:
 def opening_rows(start: Floats, waypoint: Floats, end: Floats) -> Floats:
     """Return the angles between the two segments at the waypoints [rad], pi = straight on."""
     a, b = _units(start - waypoint), _units(end - waypoint)
-    # More accurate than the arc cosine if the segments are in line.
+    # For segments in line, this is more accurate than the arc cosine.
     opening: Floats = 2.0 * np.arctan2(length_rows(a - b), length_rows(a + b))
     return opening
 
 
 def fillet_radius(radius: Floats, opening: Floats) -> Floats:
-    """Return the radii of the circles that touch both segments at the blend radius [m]."""
+    """Return the radii of the circles that touch both segments at ``radius`` from the waypoint."""
     result: Floats = radius * np.tan(np.minimum(0.5 * opening, 0.5 * np.pi - 1e-9))
     return result
 
 
 def fillet_rows(start: Floats, waypoint: Floats, end: Floats, radius: Floats, s: Floats) -> Floats:
-    """Return positions (n, 3) on circles that touch both segments; ``s`` is even along the arc."""
+    """
+    Return positions (n, 3) on circles that touch both segments.
+
+    :param s: (n,) the fraction of the arc, from 0 to 1.
+    """
     opening = opening_rows(start, waypoint, end)
     rho = fillet_radius(radius, opening)
     inwards = _units(_units(start - waypoint) + _units(end - waypoint))
@@ -140,9 +157,9 @@ def fillet_rows(start: Floats, waypoint: Floats, end: Floats, radius: Floats, s:
     # The center lies rho / sin(opening / 2) from the waypoint.
     depth = rho / np.maximum(np.sin(0.5 * opening), 1e-12) - rho * np.cos(phi)
     circle = waypoint + depth[:, None] * inwards + (rho * np.sin(phi))[:, None] * across
-    # Without a circle the blend is its chord. If the segments go straight on, the chord leads
-    # through the waypoint. If they go straight back, the chord is the point at which the first
-    # segment is left, to which the circle shrinks as the opening goes to zero.
+    # Segments in line have no circle, so their blend is its chord. If the path goes straight on,
+    # the chord leads through the waypoint. If it goes straight back, the chord is only the point
+    # at which the first segment is left. The circle, too, shrinks to it as the opening goes to 0.
     chord = start + s[:, None] * (end - start)
     has_circle = (opening > _STRAIGHT) & (opening < np.pi - _STRAIGHT)
     return np.where(has_circle[:, None], circle, chord)
@@ -153,8 +170,9 @@ def _parabola_lengths(start: Floats, waypoint: Floats, end: Floats) -> Floats:
     Return the lengths of parabolas with the control points a, p and b [m].
 
     The speed is 2 |u + s w| with u = p - a, w = a - 2 p + b: the square root of a quadratic in s.
-    Its integral is elementary, but has special cases. Gauss-Legendre quadrature has none: with
-    eight points its error is a millionth (a thousandth for blends that lead nearly straight back).
+    Its integral is elementary, but has special cases. Gauss-Legendre quadrature has none. With
+    eight points, its relative error is a millionth (for blends that lead nearly straight back, a
+    thousandth).
     """
     u, w = waypoint - start, start - 2.0 * waypoint + end
     s = 0.5 * (_NODES + 1.0)

@@ -3,8 +3,8 @@
 """
 The path of a goal in columns: the curve of each segment, and the blends between them.
 
-Goals have up to 100,000 segments, and nearly all of them are lines and arcs. So these, and the
-blends, are stored as rows; joint lines are objects.
+Goals have up to 100,000 segments, and nearly all of them are lines and arcs. So lines, arcs and
+blends are stored as rows of arrays; joint lines are objects.
 """
 
 from __future__ import annotations
@@ -49,10 +49,10 @@ class CurveSequence(Protocol):
     """
     Consecutive curves, for the checks along a path.
 
-    The curve of segment k has the number 2k, the blend after it 2k + 1.
+    The curve of segment k has the number 2k, and the blend after it has the number 2k + 1.
     """
 
-    #: Whether the arm rests at the points without a blend.
+    #: Whether the arm stops at points without a blend.
     rests_at_points: ClassVar[bool]
 
     def rows(self, number: Indices, t: Floats) -> Floats:
@@ -64,10 +64,14 @@ class CurveSequence(Protocol):
         """
 
     def extent(self, number: int) -> tuple[float, float]:
-        """Return length [m] and turn [rad] of a curve (on a joint line, the leading joint's)."""
+        """Return the length [m] of a curve, and the turn [rad] of tool or leading joint."""
 
     def locate(self, number: Indices, t: Floats) -> tuple[Indices, Floats]:
-        """Return the segment (n,) of each place, and the fraction (n,) of the segment up to it."""
+        """
+        Return the segment (n,) of each place, and the fraction (n,) of the segment before it.
+
+        For the parameters see :meth:`rows`.
+        """
 
 
 class CurveRows:
@@ -78,7 +82,7 @@ class CurveRows:
     """
 
     def __init__(self, start: Floats, end: Floats) -> None:
-        """Begin with lines."""
+        """Create lines; they can be replaced by other curves."""
         self.start, self.end = start, end
         #: (n,) lengths [m].
         self.length = distance_rows(start, end)
@@ -88,7 +92,7 @@ class CurveRows:
         self.joint_travel = np.zeros(len(start))
         self.is_line = np.ones(len(start), dtype=np.bool_)
         self.is_joint_line = ~self.is_line
-        #: The arcs; other rows are meaningless. Empty if there are no arcs.
+        #: The arcs, in the rows in which ``is_arc`` is true; empty if there are no arcs.
         self.arcs = NO_ARCS
         #: The joint lines, by row.
         self.joint_lines: dict[int, JointLineCurve] = {}
@@ -138,7 +142,7 @@ class CurveRows:
         Return the number of chords (n,) that follow each curve closely enough.
 
         :param error: greatest distance of a chord from its arc [m]; ``turn``: greatest turn of the
-            tool along a chord [rad]. Joint lines have their own bounds.
+            tool along a chord [rad]. The number for a joint line does not depend on them.
         """
         counts = np.maximum(1, np.ceil(self.angle / turn)).astype(np.intp)
         at = np.flatnonzero(self.is_arc)
@@ -150,7 +154,7 @@ class CurveRows:
         return counts
 
     def rows(self, row: Indices, u: Floats) -> Floats:
-        """Return poses (n, 7) on many curves; ``row`` must not decrease."""
+        """Return poses (n, 7) at ``u`` (n,) on curves; ``row`` (n,) must not decrease."""
         rows = interpolate_rows(self.start[row], self.end[row], u)
         if self.is_line[row].all():
             return rows
@@ -162,7 +166,7 @@ class CurveRows:
         return rows
 
     def trim(self, row: Indices, radius: Floats, *, at_end: bool = False) -> Floats:
-        """Return the ``u`` (n,) at a distance [m] from the starts, or the ends, of curves."""
+        """Return the ``u`` (n,) at distances (n,) [m] from the starts, or the ends, of curves."""
         length = self.length[row]
         u: Floats = np.minimum(1.0, radius / np.maximum(length, 1e-300)) * (length > 0.0)
         on_arc = np.flatnonzero(self.is_arc[row])
@@ -178,9 +182,10 @@ def curves_of(
     segments: SegmentRows, T_base_frame: Pose, start: Floats, end: Floats
 ) -> tuple[CurveRows, dict[int, str]]:
     """
-    Return the lines and arcs of segments, and the faults of arcs, which remain lines.
+    Return the lines and arcs of segments, and the faults of arcs by row.
 
-    For the parameters see :func:`~.curves.goal_arcs`.
+    Rows with faults, and joint moves, remain lines. For the parameters see
+    :func:`~.curves.goal_arcs`.
     """
     rows, arcs, faults = goal_arcs(segments, T_base_frame, start, end)
     curves = CurveRows(start, end)
@@ -198,27 +203,28 @@ class BlendedPath:
     rests_at_points: ClassVar[bool] = True
 
     def __init__(self, curves: CurveRows) -> None:
-        """Begin without blends."""
+        """Create a path without blends."""
         n = len(curves)
         self.curves = curves
-        #: The ``u`` at which the previous blend joins each curve; the ``u`` at which the next
-        #: blend leaves it.
+        #: The ``u`` at which the blend before each curve joins it, and the ``u`` at which the
+        #: blend after it leaves it.
         self.u_join, self.u_leave = np.zeros(n), np.ones(n)
-        #: The radius of the blend after each curve [m], 0 = no blend; whether this blend is a
-        #: circular arc between lines (``movep``).
+        #: The blend radius after each curve [m], 0 = no blend; and whether this blend is a fillet,
+        #: a circular arc between lines (``movep``).
         self.radius, self.fillet = np.zeros(n), np.zeros(n, dtype=np.bool_)
-        #: The distance from the waypoint at which the blend begins and ends [m]: the radius, or
-        #: less by a measured law.
+        #: The distance from the waypoint at which the blend begins and ends [m]: the blend radius,
+        #: or less, if the blends of the robot were measured.
         self.reach = np.zeros(n)
-        #: Radius of the blend after each curve [m]; inf if the blend is no arc.
+        #: Radius of the circle of the fillet after each curve [m]; inf for other blends.
         self.arc_radius = np.full(n, np.inf)
         #: Length of the blend after each curve [m]; turn of the tool in the blend [rad].
         self.blend_length, self.blend_angle = np.zeros((2, n))
         #: Number of chords that follow the blend after each curve closely enough.
         self.blend_samples = np.zeros(n, dtype=np.intp)
         #: Largest distance of the robot's own blend from the modelled one (n, 2) [m], [rad]. The
-        #: robot's blend may come arbitrarily close to the waypoint, or cut straight across; the
-        #: modelled one lies half-way between. The robot may also turn the tool earlier or later.
+        #: robot's blend may come arbitrarily close to the waypoint, or cut the corner on a
+        #: straight line; the modelled blend is half-way between. The robot may also turn the tool
+        #: earlier or later.
         self.blend_tolerance = np.zeros((n, 2))
 
     @property
@@ -232,16 +238,26 @@ class BlendedPath:
         return np.append(False, self.has_blend_after[:-1])
 
     def remove_blends(self, first: int, stop: int) -> None:
-        """Remove the blends after the curves of some rows; the curves then end at waypoints."""
+        """Remove the blends after the curves of rows ``first`` to ``stop`` (excluded)."""
         self.radius[first:stop], self.u_leave[first:stop] = 0.0, 1.0
         self.u_join[first + 1 : stop + 1] = 0.0
 
     def leave(self, row: Indices, radius: Floats) -> None:
-        """End curves where blends will begin, while the next curves are not known yet."""
+        """
+        End curves where the blends after them will begin; the next curves need not be known.
+
+        :param radius: (n,) the distances from the waypoints [m].
+        """
         self.u_leave[row] = self.curves.trim(row, radius, at_end=True)
 
     def make_blends(self, row: Indices, radius: Floats, reach: Floats, fillet: Flags) -> None:
-        """Make the blends after the curves of some rows."""
+        """
+        Make the blends after the curves of some rows (n,).
+
+        :param radius: (n,) blend radii [m].
+        :param reach: (n,) distances from the waypoints at which the blends begin and end [m].
+        :param fillet: (n,) whether each blend is a fillet.
+        """
         if not len(row):
             return
         curves, after = self.curves, row + 1
@@ -306,7 +322,7 @@ class BlendedPath:
         return rows
 
     def blend_rows(self, row: Indices, s: Floats) -> Floats:
-        """Return poses (n, 7) in the blends after curves; ``row`` must not decrease."""
+        """Return poses (n, 7) at ``s`` (n,) in blends after curves; ``row`` must not decrease."""
         curves = self.curves
         in_joint_space = curves.is_joint_line[row] & curves.is_joint_line[row + 1]
         if not in_joint_space.any():

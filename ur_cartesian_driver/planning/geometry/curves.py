@@ -32,29 +32,30 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
 from ur_cartesian_driver.motion.goal.goal_columns import rows_where, SegmentRows
 
-#: If a line turns the tool by half a turn, to within this angle [rad], rounding on the wire and
-#: the arm's actual pose decide the direction of the turn.
+#: If a line turns the tool by half a turn, give or take this angle [rad], the direction of the
+#: turn depends on rounding on the wire and on the arm's actual pose.
 HALF_TURN = 1e-3
 
 #: Poses that differ by less than the resolution of the wire [m], [rad] are the same.
 SAME_POSITION = 1e-6
 SAME_ANGLE = 1e-6
-#: Minimum height of the via above the chord [m] at which three points make a circle.
+#: Three points make a circle only if each distance between two of them, and the height of their
+#: triangle above its longest side, is at least this [m].
 MIN_ARC_HEIGHT = 1e-5
-#: Displacement of three points relative to each other by rounding to micrometres on the wire [m].
+#: Rounding to micrometres on the wire displaces three points relative to each other by this [m].
 _ROUNDING = 1.5e-6
-#: Largest turn that rounding on the wire may add at the end of an arc whose tangent the tool
-#: follows [rad].
+#: Largest turn that this rounding may add at the end of a FIXED arc [rad].
 MAX_ARC_TURN_ERROR = 0.005
 #: Arcs through points that are farther apart than this [m] are refused: no arm reaches that far.
 MAX_ARC_SIZE = 1000.0
-#: Chord error of sampled arcs and of sampled joint lines [m].
+#: Largest distance of chords between samples from an arc [m].
 ARC_CHORD_ERROR = 5e-6
+#: The same for joint lines and for blends that are no arcs [m].
 CURVE_CHORD_ERROR = 20e-6
 #: Largest turn between two samples [rad].
 MAX_TURN_PER_SAMPLE = pi / 18.0
-#: To find where a joint line leaves a ball, ever shorter intervals of the line are divided into
-#: these numbers of parts.
+#: To find where the tool leaves a ball on a joint line, ever shorter intervals of the line are
+#: divided into these numbers of parts.
 _TRIM_DIVISIONS = (32,) * 6
 
 
@@ -69,7 +70,7 @@ class ArcRows(NamedTuple):
 
     #: (n, 3) [m]
     center: Floats
-    #: (n, 3) from the center to the start, and to the place a quarter turn later [m]
+    #: (n, 3) vectors from the center to the start, and to the place a quarter turn later [m]
     spoke: Floats
     across: Floats
     #: (n, 3) unit vectors
@@ -116,9 +117,10 @@ class ArcRows(NamedTuple):
 
     def turn_ends(self, row: Indices, start: Floats, end: Floats) -> None:
         """
-        Turn the ends of FIXED arcs as the arcs arrive, and the starts of the curves after them.
+        Set the orientations at the ends of FIXED arcs, and at the starts after them, in place.
 
-        :param row: (n,) the rows of the arcs in ``start`` and ``end``, poses (m, 7).
+        :param row: (n,) the rows of the arcs among the curves.
+        :param start: (m, 7) the poses at which the curves start; ``end``: at which they end.
         """
         turns = self.turn(np.ones(len(row)))
         for k in rows_where(self.is_fixed):  # in order, because each arc turns the next start
@@ -171,7 +173,7 @@ class JointLineCurve:
     start: Pose
     end: Pose
     length: float
-    #: Number of chords that follow the curve of the tool closely enough.
+    #: Number of chords that follow the path of the tool closely enough.
     samples: int
     #: Ratio of the tool's peak speed to its mean speed.
     unevenness: float
@@ -181,8 +183,8 @@ class JointLineCurve:
         cls, arm: Arm, T_flange_tcp: Pose, q_start: Joints, q_end: Joints
     ) -> JointLineCurve:
         """Return the joint line from one configuration to another."""
-        # If the joints together turn by delta, a point within `reach` of all axes of rotation
-        # deviates from its chord by at most reach delta^2 / 8.
+        # If the turns of all joints add up to delta, a point within `max_reach` of all axes
+        # deviates from its chord by at most max_reach delta^2 / 8.
         max_reach = arm.model.max_reach + hypot(*T_flange_tcp.position)
         step = sqrt(8.0 * CURVE_CHORD_ERROR / max_reach)
         samples = max(1, ceil(sum(abs(b - a) for a, b in zip(q_start, q_end, strict=True)) / step))
@@ -222,7 +224,7 @@ class JointLineCurve:
         return tcp_rows(self.arm, self.T_flange_tcp, self.joint_rows(u))
 
     def trim(self, radius: float, *, at_end: bool) -> float:
-        """Return the ``u`` nearest to the start, or end, that is at least ``radius`` [m] away."""
+        """Return the ``u`` nearest to the start (or end) that is at least ``radius`` [m] away."""
         center = np.array([(self.end if at_end else self.start).row()])
         low, high = 0.0, 1.0
         for n in (max(16, self.samples), *_TRIM_DIVISIONS):
@@ -249,9 +251,10 @@ def goal_arcs(
     """
     Return the rows of CIRCULAR segments that make arcs, their arcs, and the faults of the others.
 
+    :param T_base_frame: the frame of the vias, in the frame of the path.
     :param start: (n, 7) the pose in the frame of the path at which each segment begins; ``end``:
-        the target. Ends of FIXED arcs, and the starts after them, are turned as the arcs arrive,
-        in place.
+        at which it ends. Both are changed in place: ends of FIXED arcs, and starts after them, get
+        the orientations in which the arcs arrive.
     """
     rows = np.flatnonzero(segments.types == int(SegmentType.CIRCULAR))
     if not len(rows):
@@ -269,11 +272,11 @@ def goal_arcs(
 
 def arc_faults(start: Floats, via: Floats, end: Floats, is_fixed: Flags) -> dict[int, str]:
     """
-    Return the faults of positions (n, 3 or more) [m] that make no arc, by row: clauses.
+    Return, by row, a clause for each start, via and end (n, 3 or more) [m] that make no arc.
 
     The rounding of three points on the wire tilts their circle by rounding / height of the
     triangle. At the end of a FIXED arc this tilt turns the tool by 2 sin(sweep / 2) times as much.
-    The law of sines expresses this error by the distances between start, via and end.
+    With the law of sines, this error follows from the distances between start, via and end.
     """
     pairs = (('start', 'end'), ('start', 'via'), ('via', 'end'))
     with np.errstate(over='ignore', divide='ignore', invalid='ignore'):

@@ -3,9 +3,9 @@
 """
 Samples along the path of a goal: on parts of curves, and on the blends between them.
 
-Samples are at most 2 mm and one degree apart, and a piece has at least eight. Only a piece up to
-11.2 mm and 5.6 degrees has fewer, which are at most 1.6 mm and 0.8 degrees apart: a piece of 5 mm
-has four. Where the joints turn fast,
+A piece is a part of a curve, or a blend. Samples are at most 2 mm and one degree apart, and a
+piece has at least eight. Only a piece of up to 11.2 mm and 5.6 degrees has fewer, at most 1.6 mm
+and 0.8 degrees apart; for example, a piece of 5 mm has four. Where the joints turn fast,
 :mod:`~ur_cartesian_driver.planning.preflight.joint_path_solver` adds samples.
 """
 
@@ -89,6 +89,7 @@ def check_sample_count(
     Refuse a goal that needs too many samples.
 
     :param count: (n,) the number of samples of each part; ``points``: (n,) the point at its end.
+    :param remedy: the first advice of the refusal.
     :param before: the number of samples on the path before these parts.
     """
     if (total := before + count.sum()) > most:
@@ -107,7 +108,7 @@ class CurvePieces:
     path: CurveSequence
     #: Index of the waypoint at the end of the path's first segment.
     first: int
-    #: Number of each piece's curve.
+    #: Number of each piece's curve, as in :class:`~.blended_path.CurveSequence`.
     number: Indices
     #: The parameter at which each piece begins: ``u`` of a segment's curve, ``s`` of a blend.
     begin: Floats
@@ -125,7 +126,7 @@ class CurvePieces:
         part, is_blend = end - begin, number % 2 == 1
         steps = np.maximum(length * part / STEP_LENGTH, turn * part / STEP_ANGLE)
         count = np.maximum(
-            np.maximum(1.0 + is_blend, np.ceil(steps)),  # on a blend: one on each half
+            np.maximum(1.0 + is_blend, np.ceil(steps)),  # a blend has one on each half
             np.minimum(MIN_SAMPLES, np.ceil(_MIN_REFINEMENT * steps)),
         )
         return cls(
@@ -156,11 +157,11 @@ class CurvePieces:
         return self.path.extent(int(self.number[k]))
 
     def pose(self, k: int, t: float) -> Pose:
-        """Return a pose on the curve of a piece."""
+        """Return the pose at the parameter ``t`` of a piece's curve."""
         return pose_from_row(self.rows(np.array([k]), np.array([t]))[0])
 
     def rows(self, piece: Indices, t: Floats) -> Floats:
-        """Return poses (n, 7) on pieces, whose numbers (n,) must not decrease."""
+        """Return poses (n, 7) at ``t`` (n,) on pieces, whose indices (n,) must not decrease."""
         return self.path.rows(self.number[piece], t)
 
     def locate(self, piece: Indices, t: Floats) -> tuple[Int32s, Floats]:
@@ -178,7 +179,7 @@ def sample_parameters(pieces: CurvePieces) -> tuple[Indices, Floats]:
     """
     Return the piece (n,) and the parameter (n,) of each sample.
 
-    The start of a piece is a sample of the previous one.
+    The start of a piece is no sample, because the piece before it ends with this sample.
     """
     n = pieces.sample_count
     piece, k = counted(n)

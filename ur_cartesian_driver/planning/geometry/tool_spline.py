@@ -4,9 +4,9 @@
 The tool spline: the pose of the tool over time in a SPLINE or SERVO goal.
 
 A piece of the spline leads from one point to the next. On each piece, the position of the tool and
-the rotation vector since the start of the piece (:mod:`~.rotation_rows`) are polynomials in time:
+its rotation vector since the start of the piece (:mod:`~.rotation_rows`) are polynomials in time:
 cubic if only twists are given, quintic if accelerations are given, too. At each point the spline
-has exactly the given values.
+has exactly the given pose and rates.
 """
 
 from __future__ import annotations
@@ -105,7 +105,8 @@ class ToolSpline:
         if len(turning):
             to, since = orientations[end][turning], orientations[begin][turning]
             turn = log_rows(multiply_rows(to, conjugate_rows(since)))
-            # At the start of a piece the vector is 0, so its derivatives are the angular rates.
+            # At the start of a piece the rotation vector is 0, so its derivatives are the angular
+            # rates.
             turns[turning] = between(
                 durations[turning],
                 MotionRows(np.zeros_like(turn), v[begin, 3:][turning], a[begin, 3:][turning]),
@@ -152,7 +153,7 @@ class ToolSpline:
         return np.concatenate([position, orientations], axis=1)
 
     def _turning(self, piece: Indices) -> Indices:
-        """Return the rows of pieces (m,) on which the tool turns: often none."""
+        """Return the rows of pieces (m,) on which the tool turns; often there are none."""
         return np.flatnonzero(self.is_turning[piece])
 
     def vectors(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
@@ -185,7 +186,8 @@ class ToolSplinePath:
     spline: ToolSpline
     #: (n,) the number of samples that measure the extent of each piece.
     sample_count: Indices
-    #: Returns segments (m,) and their fractions (m,) at times (m,); None = a piece is a segment.
+    #: Returns the segment at each time (m,) [s] and the fraction of the segment before it; None =
+    #: each piece is a segment.
     places: Callable[[Floats], tuple[Indices, Floats]] | None = None
 
     def rows(self, number: Indices, t: Floats) -> Floats:

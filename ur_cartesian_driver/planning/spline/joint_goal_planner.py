@@ -54,19 +54,19 @@ from ur_cartesian_driver.planning.spline.spline_path import coarse_samples, samp
 from ur_cartesian_driver.planning.spline.spline_planner import stretch_times
 from ur_cartesian_driver.planning.stop_prediction import at_set_point
 
-# A joint overshoots if its speed at a point exceeds its mean speed on an adjacent piece by this
-# factor.
+# A joint does not overshoot on a piece if its speeds at both ends are at most this many times its
+# mean speed on the piece.
 _MAX_MONOTONE = 3.0
-# Rounding of a joint position [rad].
+# Rounding error of a joint position [rad].
 _ROUNDING = 1e-9
-# A joint may leave its range between samples if it comes closer than this at samples [rad]; its
-# positions on such a piece are computed at this many steps.
+# A joint may leave its range between samples if a sample is closer than _NEAR [rad] to the end of
+# the range. Then its positions on the piece are computed at _DENSE steps.
 _NEAR, _DENSE = 0.02, 256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Trajectory(JointKnots):
-    """The joints at the ends of n pieces; the first piece begins where the arm rests."""
+    """The joints at the ends of n pieces; the arm is at rest at the start of the first piece."""
 
     #: The number of the point at the end of the first piece.
     first: int
@@ -171,7 +171,7 @@ def _cartesian_goal(
 
 def _until_contact(table: GoalTable, options: PlanningOptions) -> GoalTable:
     """
-    Return a goal that ends where the tool touches.
+    Return the goal, changed so that it ends where the tool touches something.
 
     :raises NotAvailable: the robot program does not watch for contact along splines.
     """
@@ -196,7 +196,12 @@ def _until_contact(table: GoalTable, options: PlanningOptions) -> GoalTable:
 def _trajectory(
     checked: CheckedJointGoal, state: RobotState, options: PlanningOptions
 ) -> _Trajectory:
-    """Return the goal's trajectory from the arm's position, with NaN velocities replaced."""
+    """
+    Return the trajectory from the arm's position through the points of the goal.
+
+    The driver chooses velocities that are NaN. Accelerations are ignored unless all points have
+    them.
+    """
     times, joints, remarks, first = checked.times, checked.joints, [], 0
     if times[0] == 0.0:
         _check_start(checked, state, options)
@@ -293,7 +298,7 @@ def _sampled(trajectory: _Trajectory, state: RobotState, arm: Arm) -> _Samples:
 
 def _check_ranges(trajectory: _Trajectory, samples: _Samples, arm: Arm) -> None:
     low, high = np.array(arm.model.position_limits).T
-    # A joint that turns back between two samples gets a little beyond both.
+    # A joint that turns back between two samples turns a little beyond the positions at both.
     q = samples.q
     close = ((q < low + _NEAR) | (q > high - _NEAR)).any(axis=1)
     if not close.any():

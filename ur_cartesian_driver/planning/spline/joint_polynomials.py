@@ -4,9 +4,9 @@
 Fit joint polynomials that keep the tool on a tool spline.
 
 At both ends of a piece, the joints have the positions and velocities (in quintics, also the
-accelerations) that follow from the tool spline; between the ends, the tool deviates from that
-spline. Forward kinematics gives the deviation, and pieces that deviate more than allowed are
-halved until none does.
+accelerations) that follow from the tool spline. Between the ends, the tool deviates from the
+spline. Forward kinematics gives the deviation, and pieces are halved until none deviates more than
+allowed.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ def fit_joint_polynomials(
 
 
 class _PieceRefinement:
-    """The pieces so far, in order of time, with flags for pieces of unknown deviation."""
+    """The joint pieces so far, in order of time; ``pending`` flags pieces of unknown deviation."""
 
     def __init__(
         self,
@@ -186,7 +186,11 @@ class _PieceRefinement:
             self._halve(rows)
 
     def refine_within(self, bounds: Floats) -> JointPolynomials:
-        """Halve pieces until the tool keeps within bounds (distance [m], angle [rad])."""
+        """
+        Halve pieces until the tool deviates by no more than the bounds, distance [m], angle [rad].
+
+        Pieces that would become shorter than ``min_time`` are not halved.
+        """
         while True:
             rows = np.flatnonzero(self.pending)
             self.deviation[rows] = self._deviations(rows)
@@ -205,7 +209,12 @@ class _PieceRefinement:
         )
 
     def _joints(self, piece: Indices, t: Floats, times: Floats) -> MotionRows:
-        """Return the joints at times ``t`` [s] from the beginnings of tool spline pieces."""
+        """
+        Return the joints on pieces of the tool spline.
+
+        :param t: times since the beginnings of the pieces [s]; ``times``: the same times since the
+            start of the spline.
+        """
         near = self.path.q[
             np.clip(np.searchsorted(self._sample_times, times), 0, len(self._sample_times) - 1)
         ]
@@ -213,7 +222,7 @@ class _PieceRefinement:
         return self._rates(piece, t, nearest_rows(self.kinematics.arm, flange, near))
 
     def _rates(self, piece: Indices, t: Floats, q: Floats) -> MotionRows:
-        """Return joint positions with the rates that the tool has at these times."""
+        """Return the joint positions ``q`` with the joint rates that follow from the tool's."""
         qd, qdd = self.kinematics.joint_rates(q, *self.path.spline.rates(piece, t))
         # The rates are rounded, so that they are exactly 0 at rest.
         return MotionRows(q, np.round(qd, _DIGITS) + 0.0, np.round(qdd, _DIGITS) + 0.0)
@@ -232,7 +241,7 @@ class _PieceRefinement:
         return np.concatenate([self._deviations_at(parts, block) for block in blocks])
 
     def _deviations_at(self, parts: Floats, rows: Indices) -> Floats:
-        """Return the maximum deviations (n, 2) at some parts of the pieces' times."""
+        """Return the maximum deviations (n, 2) at the fractions ``parts`` of the pieces' times."""
         begin, end = self.times[rows], self.times[rows + 1]
         t = parts[:, None] * (end - begin)
         q = values(self._coefficients(rows), t).reshape(-1, 6)
@@ -271,6 +280,6 @@ class _PieceRefinement:
 
 
 def to_ticks(times: Floats) -> Floats:
-    """Return times rounded to whole ticks."""
+    """Return times [s] rounded to whole multiples of :data:`TICK`."""
     rounded: Floats = np.round(times / TICK) * TICK
     return rounded

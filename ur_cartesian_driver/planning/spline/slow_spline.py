@@ -3,9 +3,9 @@
 """
 Find the stretches on which a spline is slower than requested.
 
-At each end of a segment, the requested speed is the segment's mean speed by the goal's times or,
-if lower, the speed of the twist of the point there; within the segment it is interpolated. The
-actual speeds are computed from the joint polynomials.
+The requested speed at each end of a segment is the lower of two speeds: the mean speed that the
+goal's times give the segment, and the speed of the twist of the point there. Within the segment,
+the requested speed is interpolated. The planned speeds are computed from the joint polynomials.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _REST = 1e-9
 #: The path reverses on a slow stretch if the dot product of its unit directions at the two ends
 #: of the stretch is below this.
 _REVERSAL = -0.5
-#: Number of places per sample of the path at which speeds are compared.
+#: Speeds are compared at this many places from each sample of the path to the next.
 _PER_SAMPLE = 4
 
 
@@ -47,9 +47,9 @@ def slow_spline_stretches(
     """
     Return the slow stretches of a spline from rest to rest.
 
-    :param twists: (n, 6) the twists of the goal's points; NaN and 0 = none.
+    :param twists: (n, 6) the twists of the goal's points; NaN and 0 request no speed.
     :param stretch: the factor by which the times of the goal were stretched because of ``limit``.
-    :param limit: the limit that would be exceeded otherwise; None = none.
+    :param limit: the limit that would be exceeded otherwise; None = times were not stretched.
     :param slower_by: a speed is too low if it is more than this fraction below the requested one.
     """
     piece, u, times = _places(path)
@@ -112,7 +112,7 @@ def _asked_speeds(
     ends = np.searchsorted(path.piece, np.arange(n), side='right') - 1
     lengths = np.diff(path.length[ends], prepend=0.0)
     mean = np.where(lengths > _MIN_LENGTH, stretch * lengths / np.diff(path.spline.times), 0.0)
-    with np.errstate(over='ignore'):  # a goal may have any twist
+    with np.errstate(over='ignore'):  # the length of a huge twist may be infinite
         given = length_rows(twists[:, :3])
     given = np.where(np.isfinite(given) & (given > 0.0), given, np.inf)
     before, after = np.append(np.inf, given[:-1]), given

@@ -29,15 +29,15 @@ from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 
 _ROUNDING = 1e-6
-#: A joint is near a limit if the bound of its rate exceeds this part of the limit: the inverse of
-#: the Jacobian differs a little from place to place.
+#: A joint may come near a limit if the bound of its rate exceeds this part of the limit. The part
+#: is well below 1, because the inverse of the Jacobian is computed at some places only.
 _NEAR = 0.5
-#: The inverse of the Jacobian is computed at one of this many samples.
+#: Along a spline path, these places are every _FEW-th sample.
 _FEW = 3
 # Fractions of a short piece at which its rates are computed, in addition to its samples.
 _QUARTERS = (0.25, 0.5, 0.75)
-# The rates of a piece are computed at this many steps if a quantity may exceed the known greatest
-# excess by this factor between samples.
+# If a quantity may exceed its limit between samples by more than _HIGHER times the greatest excess
+# at samples, the rates of its piece are computed at _DENSE steps.
 _DENSE, _HIGHER = 64, 1.001
 # Pieces or rows that are computed at a time, so that they stay in the cache.
 _BLOCK = 1024
@@ -53,17 +53,19 @@ _Quantity: TypeAlias = tuple[str, Floats, float, int, str, str, SlowCause]
 class LimitExcess:
     """The quantity that exceeds its limit most."""
 
+    #: The tool or the joint to which the quantity belongs, as a phrase.
     what: str
     limit: float
     unit: str
+    #: The name of the limit.
     name: str
     #: The factor by which all times must be multiplied to keep the limit.
     factor: float
-    #: The point at the end of the segment with the greatest value.
+    #: The point at the end of the segment with the greatest value of the quantity.
     point: int
     #: The time of this value, as a fraction of the segment's time.
     fraction: float
-    #: The greatest value.
+    #: The greatest value of the quantity.
     needed: float
     #: The cause of a slow tool if the times are stretched to keep the limit.
     cause: SlowCause
@@ -90,15 +92,15 @@ class LimitExcess:
 
     @property
     def speed_limit(self) -> SpeedLimit:
-        """The limit, and the place where it is exceeded."""
+        """The limit as a cause of a slow tool, and the segment on which it is exceeded most."""
         text = f'{self.limit_text} ({self.what}, on the segment to point {self.point})'
         return SpeedLimit(self.cause, text)
 
     def check_slowed(self, times: Floats, first: int, options: PlanningOptions) -> None:
         """
-        Check times (n,) that have been stretched by the factor.
+        Refuse times (n,) that became too long when they were stretched by ``factor``.
 
-        :param first: the point to which the first piece leads.
+        :param first: the number of the point to which the first piece leads.
         :raises InvalidGoal: a piece takes too long.
         """
         durations = np.diff(times)
@@ -170,8 +172,8 @@ def may_near_limits(
     Return whether a joint may come near a limit in one of the configurations (n, 6) [rad].
 
     The inverse of the Jacobian turns bounds on the rates of the tool into bounds on the joint
-    rates. The result is True if the frame of the path moves: then the speed of the TCP in base has
-    to be known, too.
+    rates. If the frame of the path moves, the result is always True, because the speed of the TCP
+    in base is limited, too, and follows from the joint rates.
 
     :param rates: greatest speed and turn rate of the tool [m/s], [rad/s].
     :param accelerations: likewise [m/s^2], [rad/s^2].
@@ -204,7 +206,8 @@ def worst_excess_between(
     """
     count = np.bincount(piece)
     short = np.flatnonzero(count < MIN_SAMPLES)
-    # Accelerations jump between cubic pieces, and peak near the quarters of quintic pieces.
+    # Accelerations jump between cubic pieces, so the start of each piece is added; on quintic
+    # pieces they peak near the quarters, which are added to short pieces.
     later, inner = np.arange(1, len(count)), np.array(_QUARTERS)
     piece = np.concatenate([piece, later, np.repeat(short, len(inner))])
     u = np.concatenate([u, np.zeros(len(later)), np.tile(inner, len(short))])
@@ -231,8 +234,8 @@ def _possible_peaks(values: Floats, piece: Indices) -> Floats:
     """
     Return upper bounds (n,) of a quantity around each sample of pieces (n,).
 
-    A parabola through three samples is higher than the samples by up to an eighth of their second
-    difference; twice as much is allowed for.
+    A parabola through three samples exceeds them by at most an eighth of their second difference;
+    a quarter is used as a safe bound.
     """
     bend = np.zeros(len(values))
     bend[1:-1] = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
@@ -245,7 +248,12 @@ def _possible_peaks(values: Floats, piece: Indices) -> Floats:
 def _worst_excess_at(
     rates: Rates, points: Indices, u: Floats, model: RobotModel, options: PlanningOptions
 ) -> LimitExcess | None:
-    """Return the worst excess at places on the pieces to points (m,), at fractions (m,)."""
+    """
+    Return the quantity that exceeds its limit most at m places; None if none does.
+
+    :param points: (m,) the number of the point at the end of each place's piece.
+    :param u: (m,) the fraction of the piece's time.
+    """
     worst: LimitExcess | None = None
     for what, values, limit, power, unit, name, cause in _quantities(rates, model, options):
         row = int(np.argmax(values))

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Solve the arm along a tool spline: the result is a spline path, sampled in time, or a refusal.
+Find the joints along a tool spline: a path sampled in time, or a refusal.
 
-On each piece, the samples are evenly spaced in time. They are so dense that even where the tool is
-fastest, it moves at most 2 mm and turns at most one degree from sample to sample, and that chords
+On each piece, the samples are evenly spaced in time. They are dense enough where the tool is
+fastest: it moves at most 2 mm and turns at most one degree from sample to sample, and chords
 between samples stay within some micrometres of the curve.
 """
 
@@ -100,7 +100,7 @@ class SplinePath:
 
     @property
     def reference(self) -> ReferencePath:
-        """The path of the tool."""
+        """The path of the tool, as a plan keeps it."""
         poses = self.poses.copy()
         keep_hemisphere(poses)
         return ReferencePath(
@@ -127,12 +127,14 @@ def solve_spline_path(
     """
     Return the path of the arm along a spline.
 
-    :param postures: the postures at the ends of pieces, by the number of the piece.
+    :param postures: the postures at the ends of pieces, by the index of the piece.
+    :param q_start: the joint positions at the start [rad].
     :param first: the number of the point at the end of the first segment.
     :param rests: whether the arm is at rest at the start.
     :param places: the segments over time, see :class:`ToolSplinePath`.
-    :param count: (n,) the number of samples of each piece, if the sizes of the pieces are known to
-        be right; None = both are measured.
+    :param count: (n,) the number of samples of each piece; None = it is computed, after lengths
+        and turns of the pieces have been checked.
+    :raises GoalRefused: the arm cannot follow the spline, or misses a posture.
     """
     if count is None:
         count = _measured_count(kinematics, spline, first)
@@ -179,7 +181,7 @@ def spline_pieces(
 
 
 def _measured_count(kinematics: TcpKinematics, spline: ToolSpline, first: int) -> Indices:
-    """Return the number of samples of each piece, after a check of the sizes of the pieces."""
+    """Check lengths and turns of the pieces; return the number of samples of each piece."""
     coarse = coarse_samples(spline.times)
     _check_sizes(kinematics, spline, coarse, first)
     twists, accelerations = spline.rates(*coarse)
@@ -194,7 +196,12 @@ def _check_path(
     postures: Mapping[int, Posture],
     options: PlanningOptions,
 ) -> None:
-    """Raise the first refusal along the path, if any."""
+    """
+    Raise the first refusal along the path, if any.
+
+    :param measures: (n, 3) the distances from singularities, infinite where the arm is allowed to
+        be near one.
+    """
     refusal, index = first_refusal(joint_path, measures, options)
     for k, posture in postures.items():
         point = int(joint_path.pieces.index[k])
@@ -214,7 +221,7 @@ def _check_path(
 
 
 def _with_spline_advice(refusal: GoalRefused) -> GoalRefused:
-    """Return a refusal with advice for splines, which have no JOINT segments."""
+    """Return a refusal that advises PRIMITIVES for a JOINT segment, because splines have none."""
     if isinstance(refusal, NearSingularity | JointLimitExceeded):
         return refusal.reworded(
             str(refusal).replace('use a JOINT segment', 'use PRIMITIVES with a JOINT segment')
@@ -223,7 +230,11 @@ def _with_spline_advice(refusal: GoalRefused) -> GoalRefused:
 
 
 def coarse_samples(times: Floats) -> tuple[Indices, Floats]:
-    """Return samples on all pieces between times (n + 1,): piece, and time on the piece."""
+    """
+    Return a few samples on each piece of a spline: the piece, and the time since it began [s].
+
+    :param times: (n + 1,) the times of the ends of the pieces [s].
+    """
     h = np.diff(times)
     piece = np.repeat(np.arange(len(h)), _COARSE_SAMPLES)
     return piece, np.tile(np.linspace(0.0, 1.0, _COARSE_SAMPLES), len(h)) * h[piece]
@@ -235,7 +246,11 @@ def _check_sizes(
     coarse: tuple[Indices, Floats],
     first: int,
 ) -> None:
-    """Refuse pieces with an ambiguous turn, or whose rates at the ends imply a detour or turn."""
+    """
+    Refuse pieces with half a turn of the tool, and pieces with huge detours or turns in between.
+
+    The direction of half a turn is ambiguous; wrong rates at the ends of a piece cause detours.
+    """
     n = len(spline.positions)
     x, turn = spline.vectors(*coarse)
     x = x.reshape(n, _COARSE_SAMPLES, 3)

@@ -4,7 +4,7 @@
 Plan the joint spline pieces of SPLINE and SERVO goals.
 
 The steps: points with times, twists and accelerations -> the tool over time
-(:mod:`~ur_cartesian_driver.planning.geometry.tool_spline`) -> the arm along that motion
+(:mod:`~ur_cartesian_driver.planning.geometry.tool_spline`) -> the arm along this motion
 (:mod:`~.spline_path`) -> limits -> joint polynomials (:mod:`~.joint_polynomials`). A motion can be
 planned in parts: :func:`plan_spline` starts from any :class:`SplineState`, even of a moving arm,
 and :func:`plan_stop` brings a moving arm to rest.
@@ -59,7 +59,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SplineState:
-    """State of the joints at a time from which a spline can be continued."""
+    """The joints at a time from which a spline can be continued."""
 
     #: Time since the start of the motion [s].
     time: float = 0.0
@@ -101,10 +101,11 @@ class SplinePieces:
     #: The path; row 0 is the start, and times are since the start of the motion.
     reference: ReferencePath
     remarks: tuple[str, ...]
+    #: Returns the stretches on which the tool is slower than requested; computed when called.
     find_slow_stretches: Callable[[], Sequence[SlowStretch]]
     #: State at the last point.
     end: SplineState
-    #: Factor by which all times were stretched.
+    #: Factor by which all times were stretched to keep a limit; 1 = none.
     stretch: float = 1.0
 
 
@@ -123,9 +124,10 @@ def plan_spline(
     :param goal: the goal, whose waypoints come after the state and have times since the start of
         the motion. With ``keep_open``, the arm may still be moving at the last point; the stop by
         :func:`plan_stop` is then checked as well.
-    :param kinematics: of the arm with the TCP of the motion.
+    :param kinematics: the kinematics of the arm with the TCP of the motion.
     :param first: the index of the first of these waypoints in the whole goal.
-    :param tool_tips: the tool tips to check for collisions; empty = only this TCP.
+    :param tool_tips: the tool tips to check for collisions; empty = only the TCP of
+        ``kinematics``.
     :raises GoalRefused: the spline cannot be executed; the text names point, quantity, value and
         bound.
     """
@@ -196,8 +198,9 @@ def _max_piece_time(goal: GoalTable) -> float:
     """
     Return the longest duration of a piece [s].
 
-    Pieces are sent whole, so the pieces of a replaceable tail must be short: a third of
-    ``replace_horizon``. Goals that are sent as set-points have no such limit.
+    A piece can only be replaced as a whole. So the pieces of a goal whose points can be replaced
+    take at most ``replace_horizon`` / PIECES_PER_HORIZON. Goals that are sent as set-points have
+    no such limit.
     """
     if not goal.replace_horizon or resolve_execution_mode(goal).traits.streams_setpoints:
         return inf
@@ -221,11 +224,12 @@ def plan_stop(state: SplineState, arm: Arm, options: PlanningOptions, point: int
     Return the piece that brings a moving arm to rest, each joint in its direction of motion.
 
     The joint velocities are cubics of time that end at 0 with acceleration 0. From the speed v
-    and the acceleration a, a stop in the time T decelerates by at most 1.5 v / T + a / 3. The
-    fastest joint brakes with ``keep_open_deceleration``. The arm brakes harder, with up to
-    ``max_joint_acceleration``, if a joint would otherwise leave its range or, while still
-    accelerating, exceed its speed limit.
+    and the acceleration a, a stop in the time T decelerates by at most 1.5 v / T + a / 3. T is
+    such that 1.5 v / T of the fastest joint is ``keep_open_deceleration``. The arm brakes harder,
+    with up to ``max_joint_acceleration``, in two cases: a joint would otherwise leave its range;
+    or a joint that still accelerates would exceed its speed limit.
 
+    :param state: the moving arm.
     :param point: index of the point with this state, for refusals.
     :raises JointLimitExceeded: a joint is too close to the end of its range.
     :raises TooFast: a joint that still accelerates is too close to its speed limit.
@@ -282,7 +286,7 @@ def _stop_fault(
 
 @lru_cache(maxsize=8)
 def rows_along(piece: Spline, state: SplineState, samples: int) -> tuple[Floats, Floats, Floats]:
-    """Return joints and their rates at evenly spaced times of a piece that begins in a state."""
+    """Return q, qd and qdd (samples, 6) at evenly spaced times of a piece from ``state`` on."""
     spline = JointSpline.of(state.q, [piece], velocities=state.qd, accelerations=state.qdd)
     return spline.rows(np.linspace(0.0, piece.duration, samples))
 
@@ -294,7 +298,12 @@ def _fit_to_limits(
     goal: GoalTable,
     options: PlanningOptions,
 ) -> tuple[SplinePath, float, SpeedLimit | None]:
-    """Return the path, slowed if necessary, the factor on times, and the limit, if any."""
+    """
+    Return the path, slowed if it exceeds a limit, the factor on its times, and this limit.
+
+    :raises GoalRefused: a limit is exceeded, and the path must not be slowed, or would take too
+        long.
+    """
     found = worst_excess(kinematics, path, options)
     if found is None:
         return path, 1.0, None
@@ -354,7 +363,7 @@ def _clearance_remarks(
     options: PlanningOptions,
     part_changes: Sequence[PartChange],
 ) -> list[str]:
-    """Return the remarks on clearance, including the stop after a moving end."""
+    """Return the remarks on clearance; a path that ends moving is checked with its stop."""
     samples = path.samples
     if end.is_moving:
         stop = plan_stop(end, arm, options, path.first + len(path.spline.positions) - 1)

@@ -4,8 +4,8 @@
 The tool points of a SPLINE or SERVO goal, with NaN replaced by chosen values.
 
 The tool stops at a point whose twist is 0. In place of a NaN velocity, the driver chooses the
-velocity of the parabola through the point and its neighbours; in place of a NaN acceleration, the
-mean acceleration at the point of the cubics before and after it.
+velocity of the parabola through the point and its neighbours. In place of a NaN acceleration, it
+chooses the mean of the two accelerations that the cubics before and after the point have there.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from ur_cartesian_driver.motion.goal.goal_columns import GoalTable
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints
 from ur_cartesian_driver.planning.request.ignored_fields import add_remark
 
-# If the step between two points is shorter than this [m], [rad], a chosen twist is 0 at both.
+# If two consecutive points are closer than this [m], the linear part of chosen twists is 0 at
+# both; if they are turned by less than this [rad], the angular part.
 _MIN_DISTANCE = 1e-9
 
 
@@ -35,12 +36,15 @@ def tool_points(goal: GoalTable, start: ToolPoints) -> ToolPoints:
     """
     Return the start, followed by the points of a checked goal, in the frame of the path.
 
+    NaN is replaced by chosen values.
+
     :param goal: the goal, whose waypoints come after the start.
     :param start: the tool in the frame of the path at the start, one row.
     """
     given, start = goal.waypoints, _in_frame(start, goal.T_base_frame.inverse())
     if goal.replace_horizon and not given.accelerations.any():
-        # A new tail can begin anywhere on the path, so the accelerations must not jump at points.
+        # The rest of this path can be replaced from any place on, so the accelerations must not
+        # jump at points: the driver chooses them.
         given = replace(given, accelerations=np.full_like(given.accelerations, np.nan))
     poses = np.concatenate([start.poses, given.poses])
     poses[:, 3:] = normalized_rows(poses[:, 3:])
@@ -108,9 +112,10 @@ def _chosen_twists(points: ToolPoints, ends_moving: bool) -> Floats:
     """
     Return the velocities of parabolas through each point and its neighbours.
 
-    They are 0 at the start; at the end, 0 or (``ends_moving``) the mean velocity of the last step.
-    Angular velocities come from the rotation vectors from the point to its neighbours, as the
-    derivative of these vectors at the point is the angular velocity.
+    They are 0 at the start. At the end they are 0 or, with ``ends_moving``, the mean velocity
+    since the point before. Angular velocities are computed from the rotation vectors from the
+    point to its neighbours, because the derivative of such a vector at the point is the angular
+    velocity.
     """
     h = np.diff(points.times)[:, None]
     displacement = np.concatenate(
