@@ -335,6 +335,8 @@ class SimulatedRobot:
         """
         Call a function with the controller between two cycles, and return or raise its result.
 
+        While the robot does not run, the function is called at once.
+
         :raises TimeoutError: the robot's thread did not call the function within 10 s.
         :raises RuntimeError: the robot's thread was ended by an error.
         """

@@ -70,7 +70,11 @@ class RemoteProcedures(RemoteObject):
         self._calls = 0
 
     def call(self, method: str, arguments: Sequence[Value]) -> Generator[None, None, Value]:
-        """Call a procedure and wait for its answer."""
+        """
+        Call a procedure and wait for its answer.
+
+        `closeXMLRPCClientConnection` does nothing, because each call closes its connection.
+        """
         if method == 'closeXMLRPCClientConnection':
             return None
         parameters = tuple(_to_wire(argument) for argument in arguments)

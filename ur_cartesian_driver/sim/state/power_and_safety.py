@@ -3,8 +3,8 @@
 """
 Power and safety of the simulated arm, as two state machines.
 
-Power goes up step by step, POWER_OFF -> POWER_ON -> IDLE -> RUNNING, and each step takes time; a
-command only sets the target mode. Power goes off at once.
+Power goes up step by step, POWER_OFF -> POWER_ON -> IDLE -> RUNNING. The last two steps take time,
+so a command only sets the mode to reach. Power goes off at once.
 
 The controller carries out the demands of the safety system: a protective stop brakes the arm on
 its path and pauses the program, an emergency stop does the same and then cuts the power (a

@@ -22,9 +22,9 @@ from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import (
 )
 from ur_cartesian_driver.sim.motion.paths.move_paths import JointMovePath, MovePath, Setpoint
 
-# The rest of a path, from the present pose to the end, is solved in at least this many steps.
+# The line from the present pose to the end of a path is solved in at least this many steps.
 _WALK_STEPS = 8
-# If even a step of this fraction of the rest fails, the joints would have to jump.
+# If even a step of this fraction of the line fails, the joints would have to jump.
 _MIN_WALK_STEP = 1e-4
 # Steps are shortened until no step turns a joint by more than this angle [rad].
 _MAX_JOINT_STEP = 0.3
@@ -64,7 +64,11 @@ class IkBranchTracker:
         return self._joints_after_steps(step, self.q, 0.0, h, ceil(log2(max(travel / _FINE, 1.0))))
 
     def joints_at_end_of(self, move_path: MovePath) -> Vector6 | None:
-        """Return the joints at the end of a path; None = the joints would have to jump."""
+        """
+        Return the joints at the end of a path; None = the joints would have to jump.
+
+        A tool path is replaced by the straight line from the present pose to its end.
+        """
         if isinstance(move_path, JointMovePath):
             return move_path.end
         here, there = self.T_base_tcp, move_path.pose(move_path.length)
