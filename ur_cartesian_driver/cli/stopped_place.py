@@ -4,8 +4,8 @@
 Remembers where a goal was stopped, for ``ur-cartesian send --resume``.
 
 The note for ``seam.yaml`` is the file ``seam.yaml.stopped`` in the same folder. It holds the place
-and a hash of ``seam.yaml``. If the goal is an example of the package, or its folder is read-only,
-the note is in the working directory instead.
+on the path and a hash of ``seam.yaml``. If the goal is an example of the package, or its folder is
+read-only, the note is in the working directory instead.
 """
 
 from __future__ import annotations

@@ -26,18 +26,18 @@ _MIN_DISTANCE = 0.005
 
 
 class _FrameLesson(ABC):
-    """A lesson whose touches make a frame."""
+    """A lesson whose touches determine a frame."""
 
     @abstractmethod
     def report(self) -> list[str]:
         """
         Return the frame as a row of ``static_frames``, and the residuals.
 
-        :raises InvalidGoal: there are too few touches, or they make no frame.
+        :raises InvalidGoal: there are too few touches, or they determine no frame.
         """
 
     def missing(self) -> str:
-        """Return a sentence on the reason why the touches make no frame yet; '' = they do."""
+        """Return why the touches determine no frame yet, as a sentence; '' = they do."""
         try:
             self.report()
         except InvalidGoal as error:
@@ -47,7 +47,7 @@ class _FrameLesson(ABC):
 
 class FixedToolLesson(_FrameLesson):
     """
-    A tool that stands in the cell, touched with the TCP.
+    The lesson on a tool that stands in the cell, and is touched with the TCP.
 
     Its tip is touched in several postures, so that a wrong TCP shows; its axis z leads from a
     point of the tool behind the tip to the tip, and its axis x towards a third point.
@@ -65,7 +65,7 @@ class FixedToolLesson(_FrameLesson):
         self._touches: list[tuple[str, Vector3]] = []
 
     def press(self, key: str, state: RobotState) -> str:
-        """Carry out a key at the TCP's present place, and return a text about the result."""
+        """Carry out a key, which can note the TCP's position as a touch; return a message."""
         if key == 'u':
             return _undone(self._touches)
         if key not in ('', 'z', 'x'):
@@ -109,10 +109,10 @@ class FixedToolLesson(_FrameLesson):
 
 class HeldPartLesson(_FrameLesson):
     """
-    A part in the hand, whose known points touch the tip of a fixed tool one after the other.
+    The lesson on a held part, whose known points touch a fixed tool's tip one after the other.
 
     :param points: points on the part, in its frame [m].
-    :param tip: the place at which they touch, in base [m].
+    :param tip: the position of the fixed tool's tip, in base [m].
     """
 
     HELP: ClassVar[str] = (
@@ -137,7 +137,7 @@ class HeldPartLesson(_FrameLesson):
         self._touches: list[Vector3] = []
 
     def press(self, key: str, state: RobotState) -> str:
-        """Carry out a key at the flange's present pose, and return a text about the result."""
+        """Carry out a key, which can note a touch at the flange's pose; return a message."""
         if key == 'u':
             return _undone(self._touches)
         if key:

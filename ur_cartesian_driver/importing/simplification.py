@@ -132,7 +132,7 @@ class _Simplifier:
         self.may_be_line = self._first_test()
 
     def longest(self, start: int, stop: int) -> _Piece:
-        """Return the piece that replaces the most rows."""
+        """Return the longest piece that begins at row ``start`` and ends at most at ``stop``."""
         end = start + 1
         if end < stop and self.may_be_line[start]:
             end = farthest_row(start, start + 2, stop, self._is_line)

@@ -55,7 +55,7 @@ def _where(number: int) -> str:
 
 
 def _beginning(first: Path, by: AirTravel) -> Path:
-    """Return a path without points that begins at the arm's pose, with another path's speeds."""
+    """Return a path without points that begins at the arm's pose, with the first path's speeds."""
     goal = first._begin(by, _where(0)).goal
     start = Path(by.snapshot.tool(goal), frame=first.frame, tool=first.tool)
     return start._with_feed_of(first)

@@ -336,7 +336,7 @@ class Path(PathWithEvents):
 
     def travel_to(self, other: Path, by: AirTravel) -> Path:
         """
-        Return this path, a travel through the air, and another path.
+        Return this path, a travel through the air, and another path, as one path.
 
         The tool is retracted along its axis z, the arm moves without contact at the joint speed of
         :meth:`at`, and the tool approaches the start of the other path along its axis z. If this

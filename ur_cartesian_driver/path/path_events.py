@@ -342,7 +342,8 @@ class PathWithEvents(PathOfMotions):
 
         The durations of motions do not include this time: it delays everything that follows.
 
-        :raises InvalidGoal: there is no point, or the point has a blend or a twist of its own.
+        :raises InvalidGoal: there is no point, the point has a blend, twist or acceleration of its
+            own, or the time is out of its range.
         """
         where, point = self._as_stop('dwell')
         length = (

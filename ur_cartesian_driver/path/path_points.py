@@ -160,6 +160,8 @@ def seen_from(
     """
     Return a point as passed by another frame on the tool, whose pose is ``T_tool_new``.
 
+    :param before: the pose of the preceding point or start; None = not known.
+    :param after: the pose of the following point; None = there is none.
     :param quintic: whether the path gives accelerations; if not, they stay 0, which means none.
     :raises InvalidGoal: the tool turns on an arc; or it turns at a point of a spline in a way that
         the driver chooses, so that the other frame's speed is not known.

@@ -18,7 +18,8 @@ def draw(record: Path, drawing: Path, title: str) -> None:
     """
     Draw recorded feedback.
 
-    :param record: JSON lines with ``stamp`` [s], ``desired`` and ``actual`` [m], ``speed`` [m/s].
+    :param record: JSON lines with ``stamp`` [s], the positions ``desired`` and ``actual`` [m], and
+        ``speed`` [m/s].
     :param drawing: the picture; its suffix decides the format.
     :raises OSError: matplotlib is not installed, or the file cannot be written.
     """

@@ -1,13 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Extracts the program from a file, and marks the loops that would not end here.
+Extracts the program from a file, and marks the loops that would not end in an import.
 
 A file contains a program, as a controller accepts it; or functions and statements, as PolyScope
 inserts them into its own programs; or a program and a call of it; or only functions. A call of
-:data:`END_OF_ROUND` is added to each endless loop, and a call of :data:`WAIT` replaces a loop that
-waits for an input. The names of these functions begin with a blank, so that no program can define
-them.
+:data:`END_OF_ROUND` is added to each endless loop, a call of :data:`WAIT` replaces a loop that
+waits for an input, and a call of :data:`PAUSE` replaces a statement ``pause``. The names of these
+functions begin with a blank, so that no program can define them.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ def _call(node: Any, name: str = '', *arguments: Expression) -> CallStatement:
 
 
 def _without_waiting(node: SyntaxNode) -> Any:
-    """Return a statement with calls in place of waits, and END_OF_ROUND in endless loops."""
+    """Return a statement with the three calls that the module's docstring describes."""
     if isinstance(node, PauseStatement):
         return _call(node, PAUSE)
     if isinstance(node, WhileStatement):

@@ -28,10 +28,10 @@ _CERTAIN_COMMA = re.compile(r'^(?!\s*[-+]?[1-9]\d{0,2},\d{3}\s*$).*,.*$', re.MUL
 #: Matches a time of day with two colons; 01:30 could be minutes and seconds.
 _MOMENT = re.compile(r'\d:\d\d:\d')
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-#: The years 2000 to 2100 [s since 1970]. Clocks with another origin, such as the ns since a
-#: computer was switched on or the ticks of .NET, are outside of them in each of the units.
+#: The years 2000 to 2100 [s since 1970]. The times of clocks with another origin, such as the ns
+#: since a computer was switched on or the ticks of .NET, are outside these years in every unit.
 _CENTURY = (946_684_800.0, 4_102_444_800.0)
-#: Units to try for times without one that are later than these years.
+#: Units to try for times without a unit that would be after 2100 in seconds.
 _UNIX_UNITS = ((1e-9, 'ns'), (1e-6, 'us'), (1e-3, 'ms'))
 
 

@@ -36,7 +36,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import multiply_rows, normali
 from ur_cartesian_driver.motion.geometry.rotation_rows import exp_rows
 from ur_cartesian_driver.motion.goal.goal_columns import rows_where
 
-#: A larger angle [rad] must be meant in degrees.
+#: Largest angle [rad]; a larger one is refused, because it is probably in degrees.
 _MAX_TURN = 4.0 * np.pi
 
 

@@ -30,6 +30,7 @@ _FIRST_LINE_OF_EXCEL = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
 _TITLE = re.compile(r'"[^"]*"|[^\s"]+(?:\s+[\[(][^\])]*[\])])?')
 #: The number of lines among which the header is searched for.
 _MAX_PREAMBLE = 200
+#: Headers to suggest in refusals, by the number of columns.
 _SAMPLES = {
     3: 'x [mm],y [mm],z [mm]',
     6: 'x [mm],y [mm],z [mm],rx [rad],ry [rad],rz [rad]',
@@ -42,13 +43,14 @@ _SAMPLES = {
 class Table:
     """A table of text."""
 
-    #: The line of the header; 0 = there is no header.
+    #: The line number of the header; 0 = there is no header.
     line: int
     titles: list[str]
+    #: All lines of the file.
     lines: list[str]
     #: None = columns are separated by blanks.
     delimiter: str | None
-    #: Index of the line at which the rows begin.
+    #: Index in ``lines`` at which the rows begin.
     first: int
     #: The units in a second line of the header; empty = there is no such line.
     units: list[str] = field(default_factory=list)
@@ -149,9 +151,10 @@ def _without_header(
     lines: list[str], delimiters: tuple[str | None, ...], unit: str, remarks: ImportNotes
 ) -> Table:
     """
-    Return a table whose header is its first text, or x, y and z if their unit is known.
+    Return a table whose header is its first line, or x, y and z if that line has three numbers.
 
-    :raises BrokenFile: the file is empty, or has only numbers whose meaning is not known.
+    :raises BrokenFile: the file is empty, or begins with numbers whose meaning or unit is not
+        known.
     """
     number, line = next(
         (

@@ -51,7 +51,7 @@ def length_rows(vectors: Floats) -> Floats:
 
 
 def distance_rows(a: Floats, b: Floats) -> Floats:
-    """Return the distances of positions (n, 3 or more) [m]; huge distances do not overflow."""
+    """Return the distances between positions (n, 3 or more) [m]; huge ones do not overflow."""
     x, y, z = (b[:, :3] - a[:, :3]).T
     distances: Floats = np.hypot(np.hypot(x, y), z)
     return distances
@@ -105,7 +105,7 @@ def rotate_rows(orientations: Floats, vectors: Floats) -> Floats:
 
 
 def inverse_rows(T_a_b: Floats) -> Floats:
-    """Return ``T_b_a`` (n, 7)."""
+    """Return the inverses ``T_b_a`` (n, 7)."""
     turned_back = conjugate_rows(T_a_b[:, 3:])
     return np.concatenate([-rotate_rows(turned_back, T_a_b[:, :3]), turned_back], axis=1)
 
