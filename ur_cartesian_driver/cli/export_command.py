@@ -26,7 +26,12 @@ EXPORTERS: FileFormats[Exporter] = FileFormats(
 
 
 def export(arguments: argparse.Namespace) -> int:
-    """Write a recording in the format of the output's suffix; leave no incomplete file."""
+    """
+    Write a recording in the format of the output's suffix; leave no incomplete file.
+
+    :raises ValueError: no exporter has this suffix, or a package that it needs is missing or
+        broken.
+    """
     source = newest_recording(Path(arguments.file))
     target = Path(arguments.output or source.with_suffix('.mcap'))
     suffix = target.suffix.lower()

@@ -63,7 +63,8 @@ def teach_frame(arguments: argparse.Namespace) -> int:
     """
     Connect, let a person touch with the arm, and print the frame of a fixed tool or held part.
 
-    :raises InvalidGoal: options are missing or contradict each other, or touches make no frame.
+    :raises InvalidGoal: options are missing or contradict each other, or the touches determine no
+        frame.
     """
     lesson: FixedToolLesson | HeldPartLesson
     if arguments.fixed_tool:
@@ -162,7 +163,11 @@ class Taught(Protocol):
     HELP: ClassVar[str]
 
     def press(self, key: str, state: RobotState) -> str:
-        """Carry out a key, and return a text about the result; InvalidGoal = not taken."""
+        """
+        Carry out a key, and return a message.
+
+        :raises InvalidGoal: the key's point cannot be taken.
+        """
 
     def missing(self) -> str:
         """Return a sentence on the parts that the lesson lacks; '' = it may end."""
@@ -185,7 +190,7 @@ class Lesson:
 
     def press(self, key: str, state: RobotState) -> str:
         """
-        Carry out a key at the robot's present pose, and return a text about the result.
+        Carry out a key, which can take a point at the TCP's present pose; return a message.
 
         :raises InvalidGoal: the point cannot be added to the path.
         """

@@ -37,7 +37,11 @@ _MARKED_EVENTS = {'cancel': '#e08a00', 'safety': '#c8372d', 'robot': '#c8372d', 
 
 
 def plot(arguments: argparse.Namespace) -> int:
-    """Draw the named recording, or the newest one in the named directory."""
+    """
+    Draw the named recording, or the newest one in the named directory.
+
+    :raises ValueError: the recording has no packets.
+    """
     file = newest_recording(Path(arguments.file))
     picture = Path(arguments.output or file.with_suffix('.png'))
     recording = Recording.load(file, MAX_ROWS)

@@ -89,7 +89,7 @@ class ProgramTracker:
         return self.is_own
 
     def observe(self, robot: RobotState) -> None:
-        """Process a report; disconnect a program that has ended without closing its sockets."""
+        """Process a state; disconnect a program that has ended without closing its sockets."""
         sockets = self._sockets
         sockets.ended = ended = has_ended(robot)
         if not (sockets.connected and ended):

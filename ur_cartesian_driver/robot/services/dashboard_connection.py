@@ -4,8 +4,8 @@
 Requests to a robot's dashboard: one line is sent, one comes back, then the connection is closed.
 
 A new connection for each request costs a millisecond, and a late answer cannot be mistaken for
-the answer to the next request. Refusals are explained in our own words: the dashboard often says
-only that a command failed.
+the answer to the next request. Refusals are explained in our own words, because the dashboard
+often says only that a command failed.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
 #: Longest wait for the greeting, and for an answer [s].
 ANSWER_TIMEOUT = 5.0
-#: The same for reports, which a robot answers when they are written [s]: the bounds of Universal
-#: Robots' client library.
+#: Longest waits for answers that come when a report is written [s]; Universal Robots' client
+#: library has the same ones.
 REPORT_TIMEOUTS: Mapping[str, float] = {
     'generate flight report': 180.0,
     'generate support file': 600.0,
@@ -191,6 +191,7 @@ def explain_refusal(
     Return an explanation of a refusal.
 
     :param answer: the words of the dashboard or Robot API.
+    :param robot: the robot's newest state; None = there is no RTDE connection.
     :param remote_control: whether clients may control the robot; None = unknown.
     """
     return f'The robot refuses {command!r} and says: {answer.rstrip(".")}. ' + _reason(

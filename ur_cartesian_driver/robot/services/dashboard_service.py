@@ -103,7 +103,12 @@ class DashboardService:
         return RobotApiConnection(self._host, self._ports.robot_api, version)
 
     async def request(self, call: DashboardCall) -> ServiceAnswer:
-        """Send a command, and wait until the robot has carried it out."""
+        """
+        Send a command, and wait until the robot has carried it out.
+
+        :raises OSError: the dashboard or Robot API does not answer, or cannot load the program.
+        :raises ProtocolError: the request or the answer is invalid.
+        """
         version = self._link.version
         if version is not None and (reason := unavailable_reason(call.command, version)):
             return failed(reason)
@@ -125,7 +130,12 @@ class DashboardService:
         return succeeded(reply.value or reply.text)
 
     async def request_raw(self, call: DashboardLineCall) -> ServiceAnswer:
-        """Send any line and return the line that answers it."""
+        """
+        Send any line to the dashboard, and return the line that answers it.
+
+        :raises OSError: the dashboard does not answer.
+        :raises ProtocolError: the answer is invalid.
+        """
         version = self._link.version
         if version is not None and (reason := unavailable_reason('quit', version)):
             return failed(reason)

@@ -50,7 +50,7 @@ PROGRAM_SUFFIX = '.urpx'
 
 
 class RobotApiConnection:
-    """Sends dashboard commands to the Robot API, from one event loop; several requests at once."""
+    """Sends dashboard commands to the Robot API, from one event loop; requests may overlap."""
 
     def __init__(self, host: str, port: int, version: ControllerVersion) -> None:
         """

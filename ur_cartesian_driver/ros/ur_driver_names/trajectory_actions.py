@@ -304,7 +304,7 @@ class _TrajectoryForwarder(GoalForwarder):
 
 
 class _PassthroughForwarder(_TrajectoryForwarder):
-    """The pass-through controller: no tolerances of its own, and no goal while one runs."""
+    """The pass-through controller: goals get no tolerances, and are rejected while one runs."""
 
     preempts = False
     has_defaults = False
