@@ -180,7 +180,7 @@ class ToolSpline:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ToolSplinePath:
-    """A spline as a :class:`~.blended_path.CurveSequence`, in which each piece is a segment."""
+    """A spline as a :class:`~.blended_path.CurveSequence`, whose curves are the pieces."""
 
     rests_at_points: ClassVar[bool] = False
     spline: ToolSpline

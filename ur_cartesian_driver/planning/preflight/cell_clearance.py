@@ -282,9 +282,9 @@ class _Search:
         self, motion: _Motion, rows: Indices, lower: Floats, offset: int
     ) -> None:
         """
-        Measure the pair that is probably closest of all, in the row where it is closest.
+        Measure the distance of the pair and row with the smallest lower bound.
 
-        Most other pairs then need no measurement, because they are certainly farther apart.
+        Most other pairs then need no measurement, because their lower bounds are larger.
         """
         if not (self._seeks_closest and lower.size):
             return

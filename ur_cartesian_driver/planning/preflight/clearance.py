@@ -97,9 +97,9 @@ class ClearanceResult:
     violation: Violation | None
     #: The violation of which the report only warns.
     warning: Violation | None
-    #: The smallest distance from the arm itself and from the planes [m]: negative if cylinders
-    #: overlap or a plane is crossed, infinite if neither is checked, a lower bound if measured
-    #: between cylinders.
+    #: The smallest distance of the arm from itself and from the planes [m], without the cell:
+    #: negative if cylinders overlap or a plane is crossed, infinite if neither is checked, a lower
+    #: bound if measured between cylinders.
     margin: float
     #: The pair with the distance ``margin``, and the shapes between which it was measured.
     description: str

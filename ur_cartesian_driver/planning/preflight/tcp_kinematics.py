@@ -236,7 +236,7 @@ class TcpKinematics:
         return min(distances, key=lambda name: distances[name])
 
     def describe_flips(self, q: Joints, q_other: Joints) -> str:
-        """Return a phrase for the flips between two configurations; '' if there are none."""
+        """Return a phrase for the joints (shoulder, elbow, wrist) that flip; '' if none does."""
         first, second = branch_measures(self.arm, np.array([q, q_other])).branch
         flipped = [
             f'a flip of the {name}'

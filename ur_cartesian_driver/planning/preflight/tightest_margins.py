@@ -223,8 +223,8 @@ def is_leaving_rows(measures: Floats, length: Floats, angle: Floats, *, rests: b
 
     :param length: (n,) the path length since the start [m].
     :param angle: (n,) the turn since the start [rad].
-    :param rests: whether the motion starts at rest. If not, nearness is allowed only while the
-        distance has grown since the start.
+    :param rests: whether the motion starts at rest. If not, nearness is allowed only as long as
+        the distance grows from the start on.
     """
     at_start = (rests & (length <= START_LENGTH) & (angle <= START_ANGLE))[:, None]
     grows = np.diff(measures, axis=0, prepend=0.0) >= -_ROUNDING

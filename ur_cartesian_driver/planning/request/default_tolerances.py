@@ -47,7 +47,7 @@ def _with_defaults(tolerance: Tolerance, name: str, options: PlanningOptions) ->
         return tolerance
 
     def filled(values: Iterable[float], first: int) -> list[float]:
-        """Return values with defaults for zeros, three for each quantity from ``first`` on."""
+        """Return values with defaults for zeros; each quantity, from ``first`` on, has three."""
         return [value or defaults[first + k // 3] for k, value in enumerate(values)]
 
     return Tolerance(

@@ -60,7 +60,7 @@ class SegmentEnds:
     ends: Floats
 
     def locate(self, s: Floats) -> tuple[Indices, Floats]:
-        """Return the segment of each place s (m,), and the fraction of the segment there (m,)."""
+        """Return the segment of each place s (m,), and the fraction (m,) of it that is passed."""
         row = np.minimum(np.searchsorted(self.ends, s, side='left'), len(self.ends) - 1)
         begin = np.where(row > 0, self.ends[row - 1], 0.0)
         length = np.maximum(self.ends[row] - begin, _NO_STEP)

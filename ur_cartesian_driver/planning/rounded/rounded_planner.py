@@ -291,7 +291,7 @@ class Places:
         self._laws, self._begins = laws, begins
 
     def __call__(self, times: Floats) -> tuple[Indices, Floats]:
-        """Return the segment at each time (m,) [s], and the fraction of the segment (m,)."""
+        """Return the segment at each time (m,) [s], and the fraction (m,) of it that is passed."""
         number = np.clip(
             np.searchsorted(self._begins, times, side='left') - 1, 0, len(self._laws) - 1
         )

@@ -88,7 +88,7 @@ class _Pieces(NamedTuple):
     end: Indices
 
     def take(self, rows: Indices) -> _Pieces:
-        """Return some of them."""
+        """Return some of the pieces."""
         return _Pieces(self.spline, self.number[rows], self.begin[rows], self.end[rows])
 
 
@@ -172,7 +172,7 @@ class _HalfSteps:
             ]
         )
         if not at_quarters:
-            # The jerk is measured over a whole step, from half step to half step.
+            # The jerk is measured from the half step before each row to the half step after it.
             accelerations = exact.accelerations[:, :3].copy()
             accelerations[rows] = made.accelerations[:, :3]
             jerk = length_rows(accelerations[rows + 1] - accelerations[rows - 1])

@@ -67,7 +67,7 @@ class SplineState:
     q: Joints
     #: Joint velocities [rad/s].
     qd: Vector6 = ZERO6
-    #: Joint accelerations [rad/s^2]; 0 after a cubic piece, which fixes none.
+    #: Joint accelerations [rad/s^2]; 0 after a cubic piece, which does not determine them.
     qdd: Vector6 = ZERO6
 
     @property
