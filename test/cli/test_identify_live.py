@@ -10,6 +10,7 @@ from random import Random
 import sys
 from threading import Thread
 
+import numpy as np
 import pytest
 from waiting import wait_for
 
@@ -20,7 +21,12 @@ from ur_cartesian_driver.identification.law_experiments import (
     LAW_EXPERIMENTS,
     MotionBounds,
 )
-from ur_cartesian_driver.identification.live_run import ready_state, record_experiment
+from ur_cartesian_driver.identification.live_run import (
+    LONGEST_PROGRAM,
+    ready_state,
+    record_experiment,
+)
+from ur_cartesian_driver.identification.recorded_calls import read_commands
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.motion.twin.twin import ArmIdentity, Estimate, Twin
@@ -501,3 +507,24 @@ def test_a_tool_beside_the_axis_of_the_wrist_moves_on_a_circle():
     wide = replace(tight, low=(0.4, 0.0, 0.2))
     assert fast.refusal(state, wide) == '0.06 m/s is faster than 0.05 m/s'
     assert fast.refusal(state, replace(wide, max_speed=0.07)) == ''
+
+
+def test_the_set_points_of_servoj_move_in_small_steps_and_return():
+    """A set-point that jumps to the target of a call is still near the arm."""
+    q = (0.1, -1.2, 1.4, -1.6, -1.5, 1.0)
+    state = RobotState(
+        timestamp=0.0, actual_q=q, target_q=q, actual_tcp_pose=Pose(), target_tcp_pose=Pose()
+    )
+    experiment = next(each for each in LAW_EXPERIMENTS if each.name == 'servoj')
+    (calls,) = experiment.calls(state)
+    (command,) = read_commands(calls, 'calls')
+    points = command.set_points
+    targets = np.array([q, *points.targets])
+    assert np.abs(np.diff(targets, axis=0)).max() <= 0.1 * 0.0405
+    assert points.is_stopped
+    assert sum(points.times) < LONGEST_PROGRAM
+    assert points.rest(q) == pytest.approx(0.4)
+    assert targets[-1] == pytest.approx(q)
+    # 10 degrees, towards the middle of the range.
+    assert targets[:, 5].min() == pytest.approx(1.0 - np.radians(10.0))
+    assert targets[:, 5].max() == 1.0
