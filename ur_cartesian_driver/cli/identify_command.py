@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""``ur-cartesian identify``: estimate the laws of motion of the arm that made recordings."""
+"""``ur-cartesian identify``: estimate, from recordings of an arm, the laws by which it moves."""
 
 from __future__ import annotations
 
@@ -22,7 +22,11 @@ from ur_cartesian_driver.motion.twin.twin_file import twin_text
 
 
 def identify(arguments: argparse.Namespace) -> int:
-    """Print each law with its interval, or why it was not identified; write the twin."""
+    """
+    Print each law with its 95 % interval, or why it was not identified.
+
+    With ``--output``, also write the twin file.
+    """
     if bool(arguments.recordings) == bool(arguments.robot_ip):
         raise ValueError('give either recordings, or the robot that shall move: --robot-ip')
     if arguments.robot_ip:
@@ -41,7 +45,7 @@ def identify(arguments: argparse.Namespace) -> int:
 
 
 def _identify_live(arguments: argparse.Namespace) -> int:
-    """Let the robot move, and identify what it showed; 1 if a surprise ended that."""
+    """Run the experiments and identify their recordings; return 1 if a surprise ended them early."""
     from ur_cartesian_driver.cli.identify_live import CALLS, record
 
     asked = _asked(arguments)
@@ -82,9 +86,9 @@ def _described(name: str, result: Result) -> str:
 
 def _arm(paths: list[Path], arguments: argparse.Namespace) -> ArmIdentity:
     """
-    Return the arm that our own recordings name, or else the options.
+    Return the arm that the options name, completed by the recordings of the driver.
 
-    :raises ValueError: the recordings, or an option, name different arms.
+    :raises ValueError: two recordings, or a recording and an option, name different arms.
     """
     arm = _asked(arguments)
     for path in paths:
@@ -112,7 +116,7 @@ def _asked(arguments: argparse.Namespace) -> ArmIdentity:
 
 def _merged(arm: ArmIdentity, own: ArmIdentity, source: str) -> ArmIdentity:
     """
-    Return what is known of an arm.
+    Return ``arm`` with its unknown fields filled from ``own``, the arm that the source names.
 
     :raises ValueError: the source names another arm.
     """
