@@ -45,7 +45,7 @@ def identify(arguments: argparse.Namespace) -> int:
 
 
 def _identify_live(arguments: argparse.Namespace) -> int:
-    """Run the experiments and identify their recordings; return 1 if a surprise ended them early."""
+    """Run the experiments and identify the laws; return 1 if a surprise ended them early."""
     from ur_cartesian_driver.cli.identify_live import CALLS, record
 
     asked = _asked(arguments)
