@@ -3,8 +3,9 @@
 """
 The command ``ur-cartesian``.
 
-Each command is a function from parsed arguments to the exit status. Only the commands that need
-ROS import it, so ``sim`` and ``where`` run without ROS.
+Each command is a function from parsed arguments to the exit status. A DriverError, OSError or
+ValueError that it raises is printed, and ends it with status 1. Only the commands that need ROS
+import it, so ``sim`` and ``where`` run without ROS.
 """
 
 from __future__ import annotations

@@ -1,6 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Read the arguments of commands: one function for each kind, for ``type=`` of argparse."""
+"""
+Read the arguments of commands: one function for each kind, for ``type=`` of argparse.
+
+Most refuse an argument by :exc:`argparse.ArgumentTypeError`, whose text argparse prints.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Validate user-supplied numbers, and refuse mistakes with a sentence that explains them."""
+"""
+Validate user-supplied numbers.
+
+Each function refuses a mistake by :exc:`InvalidGoal`, whose text explains it; ``where`` names the
+point or method at its beginning.
+"""
 
 from __future__ import annotations
 

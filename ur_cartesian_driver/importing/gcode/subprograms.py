@@ -78,7 +78,11 @@ class LineSequence:
             row = self._is_executed.find(False, row + 1)
 
     def check_program_number(self, line: int, number: int, *, is_first: bool) -> None:
-        """Accept an O number at the program's beginning; refuse to run into a later O number."""
+        """
+        Accept an O number at the program's beginning.
+
+        :raises BrokenFile: execution has run into a later O number.
+        """
         if self._calls:
             raise BrokenFile(
                 line, f'the subprogram O{self._calls[-1].number} reaches O{number} without M99'

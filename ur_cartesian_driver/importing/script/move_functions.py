@@ -3,7 +3,8 @@
 """
 The moves of programs: each method is a URScript function whose target becomes a point.
 
-Here each move reaches its target at once, and takes one controller cycle.
+Here each move reaches its target at once, and takes one controller cycle. A move that cannot
+become part of a goal raises :exc:`RuntimeException`.
 """
 
 from __future__ import annotations

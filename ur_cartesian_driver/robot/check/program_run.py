@@ -93,7 +93,11 @@ class ProgramRun:
         await self.probe.close()
 
     async def start(self, script: bytes) -> None:
-        """Send a program, and wait until the arm moves."""
+        """
+        Send a program, and wait until the arm moves.
+
+        :raises Surprise: the arm does not move, or as for :meth:`wait_for`.
+        """
         begin, said = self.recorder.newest['target_q'], len(self.probe.lines)
 
         def lines(mark: str) -> list[str]:
@@ -121,7 +125,11 @@ class ProgramRun:
         await self.ended()
 
     def send(self, request: bytes) -> None:
-        """Send a program or a command."""
+        """
+        Send a program or a command.
+
+        :raises Surprise: the primary interface is not connected.
+        """
         if not self.probe.send(request):
             raise Surprise('the primary interface was lost')
 
@@ -148,6 +156,8 @@ class ProgramRun:
 
         :param time: longest wait [s].
         :return: whether the condition was met in time.
+        :raises Surprise: a row shows a fault, or the primary interface was lost.
+        :raises OSError: the RTDE connection was lost.
         """
         wrong = ''
 
@@ -173,6 +183,7 @@ class ProgramRun:
         Check each row for faults until the newest one meets a condition.
 
         :param otherwise: clause for the error if the condition is not met within ``time`` [s].
+        :raises Surprise: the condition is not met in time, or as for :meth:`wait_for`.
         """
         if not await self.wait_for(is_reached, time):
             raise Surprise(f'{otherwise} within {time:g} s')

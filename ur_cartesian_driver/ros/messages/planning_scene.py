@@ -85,7 +85,7 @@ def updated_scene(scene: SceneBodies, message: Any, place: SceneArm) -> SceneBod
 
 
 class _Update:
-    """A scene that is being changed."""
+    """A scene that is being changed; a change that is impossible raises a ValueError."""
 
     def __init__(self, scene: SceneBodies, place: SceneArm) -> None:
         self.scene, self._place = scene, place
