@@ -21,12 +21,13 @@ class GoalRest:
     """
     The points of a resumed goal, as places on the path of the goal that was stopped.
 
-    A place on that path is a number ``k + u``: the fraction u of the segment to point k.
+    A place on that path is a number ``k + u``: the fraction u of the segment to point k. So point
+    k itself is at the place k + 1.
     """
 
     #: Place where the path is resumed.
     begin: float
-    #: Place where the arm was stopped, somewhat after ``begin``.
+    #: Place where the arm was stopped; the path is resumed a little before it.
     stopped: float
     #: Places of the points of the resumed goal.
     places: Sequence[float]
@@ -45,11 +46,11 @@ class GoalRest:
         return max(sum(place <= self.begin + NO_FRACTION for place in self.places) - 1, 0)
 
     def is_passed(self, waypoint: int) -> bool:
-        """Return whether the path is resumed at or after a waypoint."""
+        """Return whether the path is resumed at or after a waypoint of the stopped goal."""
         return waypoint + 1.0 <= self.begin + NO_FRACTION
 
     def index(self, waypoint: int) -> int:
-        """Return the number of a waypoint in the resumed goal."""
+        """Return the number that a waypoint of the stopped goal has in the resumed goal."""
         places = self.places
         return min(range(len(places)), key=lambda i: abs(places[i] - waypoint - 1.0))
 
@@ -62,7 +63,12 @@ class GoalRest:
         ]
 
     def with_last(self, events: Sequence[E]) -> list[E]:
-        """Return the last passed point's events, moved to the new start, and the events ahead."""
+        """
+        Return the events ahead, and before them the events at the last passed point with events.
+
+        The latter are moved to the start of the resumed goal; they are left out if it has no point
+        there.
+        """
         first, left = self.first, self.ahead(events)
         passed = [event for event in events if self.is_passed(*points_of(event).values())]
         if not passed or self.places[first] > self.begin + NO_FRACTION:  # no point there

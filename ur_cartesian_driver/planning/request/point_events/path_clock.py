@@ -84,7 +84,8 @@ class PathClock:
         speeds = np.array([self._speed(values, each) for each in times])
         # The robot program assumes a constant acceleration between two speeds. Where it is not
         # constant, the inner speeds are changed so that the piece has its length. The speeds at
-        # both ends stay exact: at the beginning the program measures the rate of the path's time.
+        # both ends stay exact, because the program compares the tool's speed at the beginning with
+        # the planned one to measure how much the motion is slowed.
         lengths = np.array([self._between(values, each) for each in times])
         lacking = -np.diff(lengths) * (pieces / span) - 0.5 * (speeds[1:] + speeds[:-1])
         speeds[1:-1] += 0.5 * (lacking[1:] + lacking[:-1])
@@ -97,7 +98,7 @@ class PathClock:
         own, after = slice(first, last + 1), slice(first + 1, last + 2)
         spans = self._times[after] - self._times[own]
         u, v = self._speeds[own], self._speeds[after]
-        # Both are positive where the tool moves; elsewhere the result is 0.
+        # Spans and u + v are positive where the tool moves; elsewhere the result is 0.
         means = (self._arc_lengths[after] - self._arc_lengths[own]) / np.maximum(spans, 1e-12)
         factors = 2.0 * means / np.maximum(u + v, 1e-300)
         parts = np.clip(
@@ -126,7 +127,7 @@ class PathClock:
         return float(self._times[k]) + span * t
 
     def _piece(self, time: float) -> tuple[int, float]:
-        """Return the sample before a time, and the part of the distance to the next one."""
+        """Return the sample before a time, and the passed part of the distance to the next one."""
         k = int(np.searchsorted(self._times, time, side='right')) - 1
         k = min(max(k, 0), len(self._steps) - 1)
         span = float(self._times[k + 1] - self._times[k])
@@ -135,7 +136,7 @@ class PathClock:
         return k, (2.0 * u + (v - u) * t) * t / (u + v) if u + v > 0.0 else t
 
     def _speed(self, values: Floats, time: float) -> float:
-        """Return the rate of change [1/s], at a time, of a quantity with ``values`` at samples."""
+        """Return the rate of change at a time [1/s] of a quantity with ``values`` at samples."""
         k, _ = self._piece(time)
         span = float(self._times[k + 1] - self._times[k])
         u, v = float(self._speeds[k]), float(self._speeds[k + 1])

@@ -164,7 +164,7 @@ class Presses(PointEvent[Press]):
 
 
 def _task_frames(goal: GoalTable, press: Press) -> tuple[Pose, Pose | None]:
-    """Return the frame of the goal, and the fixed tool if the arm holds the part."""
+    """Return ``T_base_frame`` and ``T_base_tool`` for :func:`press_records`."""
     held = goal.moving_frame
     if held is None:
         return goal.T_base_frame, None

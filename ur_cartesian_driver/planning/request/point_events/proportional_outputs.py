@@ -28,7 +28,7 @@ class ProportionalOutputs(OutputEvent[ProportionalOutput]):
     field = 'proportional_outputs'
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Refuse entries that drive one output at the same points."""
+        """Refuse keep_open, points out of order, and entries that drive one output together."""
         super().check(goal, options)
         if goal.proportional_outputs and goal.keep_open:
             raise NotAvailable(
@@ -120,6 +120,7 @@ def _ahead(
     Return a record placed some time before a point.
 
     :param at: the waypoint, the time before it [s], and the field that gives this time.
+    :raises InvalidGoal: no motion leads to the point, or none has ended by this time.
     """
     waypoint, lead, field = at
     point = path.point(waypoint)

@@ -40,7 +40,7 @@ class Pulses(OutputEvent[PulseTrain]):
     field = 'pulses'
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Refuse entries for one output on the same part, and presses there."""
+        """Refuse points out of order, pulses that overlap others or presses, too many outputs."""
         super().check(goal, options)
         if goal.pulses and goal.keep_open:
             _check_open(goal)
@@ -188,7 +188,7 @@ def _check_others(
 
 
 def _passed(path: TimedPath, field: str, waypoint: int) -> PassedPoint:
-    """Return the passage of the tool through a point."""
+    """Return the passage of the tool through a point; refuse a point to which no motion leads."""
     point = path.point(waypoint)
     if point is None:
         raise InvalidGoal(
@@ -200,7 +200,7 @@ def _passed(path: TimedPath, field: str, waypoint: int) -> PassedPoint:
 
 
 def _count(train: PulseTrain, field: str, length: float) -> int:
-    """Return the number of pulses on a part of the path with a length [m]."""
+    """Return the number of pulses of an entry whose part of the path has a ``length`` [m]."""
     most = floor((length - train.phase + _SAME_PLACE) / train.distance) + 1
     between = (
         f'but the path from point {train.first_waypoint} to point {train.last_waypoint} is '

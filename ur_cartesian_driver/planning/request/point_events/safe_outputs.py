@@ -36,11 +36,16 @@ def check_safe_outputs(goal: GoalTable) -> None:
 
 
 def add_safe_outputs(goal: GoalTable, options: PlanningOptions) -> GoalTable:
-    """Return the goal with the parameter's safe outputs, and one for each output with a law."""
+    """
+    Return the goal with further safe outputs, for outputs that have none yet.
+
+    These are the outputs in the parameter safe_outputs, and all outputs that follow the speed or
+    give pulses.
+    """
     outputs = {(output.output, output.pin): output for output in goal.safe_outputs}
     for output in parse_safe_outputs(options.safe_outputs):
         outputs.setdefault((output.output, output.pin), output)
-    # An output that follows the speed is idle in a pause; restored, it follows the speed again.
+    # An output that follows the speed is idle in a pause; afterwards it follows the speed again.
     for pin, following in {each.pin: each for each in goal.proportional_outputs}.items():
         outputs.setdefault(
             (OutputKind.STANDARD_ANALOG, pin),
@@ -52,7 +57,8 @@ def add_safe_outputs(goal: GoalTable, options: PlanningOptions) -> GoalTable:
                 restore=True,
             ),
         )
-    # The robot program ends the pulses, and it does not run in a pause.
+    # The robot program switches an output off at the end of a pulse. It does not run in a pause,
+    # so the output is switched off as a safe output.
     for train in goal.pulses:
         outputs.setdefault(
             (train.output, train.pin),

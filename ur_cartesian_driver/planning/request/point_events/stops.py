@@ -59,7 +59,7 @@ class Stops:
             self.moving_goal = replace(self._shifted(goal, -1.0, **rates), execution=mode)
 
     def delayed(self, times: Floats) -> Floats:
-        """Return the times (n,) [s] of points with stops, from their times without stops."""
+        """Return the times (n,) [s] of all points, delayed by the waits at the points before."""
         rests = np.zeros(len(times))
         for each in self._stops:
             if isinstance(each.stop, Wait) and each.waypoint + 1 < len(rests):
@@ -134,7 +134,7 @@ class Stops:
         )
 
     def _only_rests(self, goal: GoalTable) -> bool:
-        """Return whether set-points lead the arm, and it only rests at stops."""
+        """Return whether set-points lead the arm, and nothing but waits happens at points."""
         return resolve_execution_mode(goal).traits.streams_setpoints and not (
             any(kind.of(goal) for kind in OUTPUT_EVENTS)
             or any(not isinstance(each.stop, Wait) for each in self._stops)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Outputs that are switched when the tool passes a point, or some time after that."""
+"""Outputs that are switched when the tool passes a point, or some way or time before or after."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
     field = 'io_commands'
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Refuse commands whose point or output does not exist."""
+        """Refuse wrong commands, and commands that a goal with keep_open cannot carry out."""
         super().check(goal, options)
         mode = resolve_execution_mode(goal)
         if goal.io_commands and goal.keep_open and mode.traits.streams_setpoints:

@@ -44,7 +44,8 @@ ToTcp: TypeAlias = Callable[[Floats], Floats]
 
 #: Times that differ by at most this [s] are the same.
 SAME_TIME = 1e-6
-# The trigger direction is measured over twice this time [s]: initial and largest value.
+# The trigger direction is measured from this time before the trigger pose to this time after it
+# [s]. If the motion is too short, a longer time is tried, up to the second value.
 _DIRECTION_TIME, _MAX_DIRECTION_TIME = 0.002, 0.6
 # A motion shorter than this [m], [rad] has no direction.
 _MIN_MOTION = 1e-7
@@ -123,7 +124,8 @@ class TimedPath:
         """
         Compute when each motion ends, and when it returns.
 
-        :param reference: the path of the tool along the segments, on the clock of ``start_time``.
+        :param reference: the path of the tool along the segments; its times and ``start_time``
+            have the same zero.
         :param blend_halves: the time in the first half of the blend after each segment [s]; None =
             no blends.
         :param start_time: when the first segment begins [s].
@@ -322,7 +324,11 @@ class TimedPath:
         return 'while passing it' if self._passes(k) else 'after stopping there'
 
     def _at_end(self, k: int) -> float | None:
-        """Return the time [s] at which the tool is closest to a target; None if it stops there."""
+        """
+        Return the time [s] at which an output at the end of a motion is triggered.
+
+        This is when the tool is closest to the target; None if it stops there.
+        """
         if not self._passes(k):
             return None
         end, half = float(self.ends[k]), float(self._blend_halves[k])
