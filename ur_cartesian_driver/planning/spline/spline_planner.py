@@ -51,6 +51,8 @@ from ur_cartesian_driver.planning.spline.spline_points import point_remarks, too
 
 # Number of samples at which a stopping piece is checked.
 _SAMPLES = 17
+# Shortest time of the piece that stops the arm [s]: two cycles of the slowest controller (8 ms).
+_SHORTEST_STOP = 0.017
 # Factor on the time of a stopping piece for the next try.
 _SHORTENING = 0.8
 # Tolerance for rounding: absolute for joint positions [rad], relative for speeds.
@@ -236,7 +238,7 @@ def plan_stop(state: SplineState, arm: Arm, options: PlanningOptions, point: int
     """
     v, a = np.abs([state.qd, state.qdd])
     hardest = np.maximum(options.max_joint_acceleration, a)
-    shortest = max(1.5 * float((v / (hardest - a / 3.0)).max()), _SAMPLES * 1e-3)
+    shortest = max(1.5 * float((v / (hardest - a / 3.0)).max()), _SHORTEST_STOP)
     shortest = round(ceil(shortest / TICK) * TICK, 6)
     T = max(1.5 * float(v.max()) / options.keep_open_deceleration, shortest)
     while True:
