@@ -134,6 +134,16 @@ def test_a_blend_of_a_few_packets_is_too_short():
     )
 
 
+def test_a_slow_blend_before_a_fast_line_is_no_stop():
+    """At 125 Hz the arm gets faster in a packet than it was in the blend."""
+    chain, calls = corner(140.0, length=0.2, seconds=0.8)
+    chain = replace(chain, speeds=np.array([0.02, 0.2]), acceleration=4.0)
+    laws, noise = replace(LAWS, shape='arc'), replace(QUIET, cycle=0.008)
+    found = identify([recorded('corner', chain, laws, noise, Random(3))], calls)
+    assert len(found.moves) == 1
+    assert found.results['blend_shape'].value == 'unknown'
+
+
 def test_a_line_and_a_joint_move_are_not_evaluated():
     chain, calls = corner(90.0)
     calls[1] = replace(calls[1], name='movej')

@@ -146,10 +146,22 @@ def _split(time: Floats, speed: Floats, begin: int, last: int) -> list[tuple[int
         rise = (part[i + 3] - part[i + 1]) / elapsed[i + 2 : i + 4].sum()
         if min(fall, rise) <= 0.0:
             continue
-        if part[i] < 1.05 * max(fall, rise) * elapsed[i] and begin + i - bounds[-1] > 5:
+        if part[i] >= 1.05 * max(fall, rise) * elapsed[i] or begin + i - bounds[-1] <= 5:
+            continue
+        beside = (part[i - 1], fall), (part[i + 1], rise)
+        if not any(_is_flat(v, ramp * elapsed[i], part[i]) for v, ramp in beside):
             bounds.append(begin + i)
     bounds.append(last + 1)
     return list(pairwise(bounds))
+
+
+def _is_flat(speed: float, change: float, least: float) -> bool:
+    """
+    Return whether a speed beside the least one leads to no stop: it comes from a slow blend.
+
+    :param change: of the speed, from packet to packet.
+    """
+    return speed > 4.0 * change and speed < 2.0 * least
 
 
 def _piece(
