@@ -78,6 +78,7 @@ def test_a_rate_without_a_known_law_is_said_and_its_curve_is_found():
         low, high = results['blend_begin'].interval
         assert low - 1e-4 < laws.begin < high + 1e-4
         assert 'rate follows no law that is known' in results['blend_speed_ratio'].reason
+        assert results['blend_speed_ratio'].experiment.startswith('their law is not known')
 
 
 LAWS = BlendLaws(begin=0.8, ratio=1.2, start_time=0.16)
@@ -124,7 +125,7 @@ def test_blends_that_fill_a_move_leave_no_straight_stretch():
         exits=np.full(2, 2.5),
         acceleration=2.0,
     )
-    assert 'its 3 moves show 2 straight stretches' in reason(chain, chain.calls())
+    assert 'it has 3 calls, and straight stretches: 2;' in reason(chain, chain.calls())
 
 
 def test_a_blend_of_a_few_packets_is_too_short():

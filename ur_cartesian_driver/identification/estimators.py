@@ -420,7 +420,8 @@ def result_of(
     value = min(max(whole.value, law.low), law.high)
     if abs(value - whole.value) > 2.0 * whole.half_width:
         return Unknown(
-            reason=f'it came out as {whole.value:.3g} {law.unit}; it {law.problem(whole.value)}',
+            reason=f'it came out as {f"{whole.value:.3g} {law.unit}".rstrip()}; it '
+            f'{law.problem(whole.value)}',
             experiment=experiment,
         )
     # At a bound of the law the estimate itself may lie beyond it.

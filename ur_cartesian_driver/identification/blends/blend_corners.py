@@ -79,8 +79,8 @@ def corners_of(move: FoundMove) -> list[BlendCorner | str]:
     stretches = _stretches(places, tool, _WINDOW * min(radii))
     if len(stretches) != len(chain):
         return [
-            f'its {len(chain)} moves show {len(stretches)} straight stretches: blends fill a '
-            'move, a corner is too flat, or curves bend both ways'
+            f'it has {len(chain)} calls, and straight stretches: {len(stretches)}; blends fill a '
+            'move, a corner is too flat, or a curve bends both ways'
         ]
     table = _Rows(time[part], follows[part], places, tool)
     return [

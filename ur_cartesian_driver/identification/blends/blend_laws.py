@@ -22,7 +22,7 @@ _EXPERIMENT = (
     'record three movel, the first two with r, with corners of 60 to 150 degrees and lines longer '
     'than four r, and name the calls'
 )
-_NOT_FITTED = 'no law is known for their curve, so plans keep the assumed one with its tolerance'
+_NOT_FITTED = 'their law is not known, so plans keep the assumed one with its tolerance'
 
 
 def blend_laws(moves: Sequence[FoundMove]) -> dict[str, Result]:
@@ -56,7 +56,8 @@ def blend_laws(moves: Sequence[FoundMove]) -> dict[str, Result]:
         others = [part for part in parts if isinstance(part, OtherLaw)]
         measured = [] if others else [part for part in parts if isinstance(part, Measured)]
         why = _reason(others or [*(part for part in parts if isinstance(part, str)), *reasons])
-        results[name] = result_of(name, measured, evidence, why, _EXPERIMENT, left_over=left)
+        experiment = _NOT_FITTED if others else _EXPERIMENT
+        results[name] = result_of(name, measured, evidence, why, experiment, left_over=left)
     return results
 
 
@@ -74,7 +75,9 @@ def _unknown_shape(found: Sequence[FoundBlend], odd: Sequence[FoundBlend]) -> di
 def _reason(reasons: Sequence[str]) -> str:
     if not reasons:
         return 'no moves joined by a blend, with calls that are known'
-    return f'{plural(len(reasons), "blend")} could not be used, the first one because {reasons[0]}'
+    if len(reasons) == 1:
+        return f'1 blend could not be used: {reasons[0]}'
+    return f'{len(reasons)} blends could not be used, the first one: {reasons[0]}'
 
 
 def _evidence(found: Sequence[FoundBlend]) -> str:
