@@ -24,8 +24,6 @@ from ur_cartesian_driver.motion.twin.laws import ASSUMED_LAWS
 
 #: Tolerance of box and speed, for the robot's rounding [m, m/s].
 _OVER = 1e-3
-#: The call that ends a motion of servoj.
-_SERVO_STOP = 'stopj(2)'
 #: Places on the path that are compared with the box.
 _PLACES = 25
 
@@ -130,6 +128,11 @@ class LawExperiment:
         """Whether it is a move that nothing interrupts: one that may run without a question."""
         return self.interruption is Interruption.NONE
 
+    @property
+    def least_turn(self) -> float:
+        """The angle by which wrist 3 turns at least, if nothing ends the program [rad]."""
+        return self.wrist
+
     def calls(self, state: RobotState) -> tuple[str, ...]:
         """
         Return the calls behind each recorded move; the way back from a stop is not recorded.
@@ -209,31 +212,74 @@ class ServoExperiment(LawExperiment):
     rest_before: float = 0.4
 
     def calls(self, state: RobotState) -> tuple[str, ...]:
-        """Return the calls of the one motion, with the numbers of the place."""
+        """Return the calls of servoj, with the numbers of the place, and of the move behind."""
         numbers = [f'{each!r}' for each in state.target_q[:5]]
         lines = [
             self._line([*numbers, f'{state.target_q[5] + turned!r}'])
             for turned in self._turned(state)
         ]
-        return ('\n'.join([*lines, _SERVO_STOP]),)
+        end, *moves = self._behind
+        return ('\n'.join([*lines, end]), *moves)
 
     def script(self, state: RobotState) -> str:
         """Return the body of the program: the same calls, beginning where the arm is by then."""
         numbers = [f'back[{i}]' for i in range(5)]
         lines = [self._line([*numbers, f'back[5] + {turned!r}']) for turned in self._turned(state)]
-        return '\n'.join(['back = get_target_joint_positions()', *lines, _SERVO_STOP])
+        return '\n'.join(['back = get_target_joint_positions()', *lines, *self._behind])
+
+    @property
+    def _behind(self) -> tuple[str, ...]:
+        """What ends the calls of servoj, and the moves behind."""
+        return ('stopj(2)',)
 
     def _line(self, joints: Sequence[str]) -> str:
         return f'servoj([{", ".join(joints)}], t={self.call_time:g}, {self.there})'
 
     def _turned(self, state: RobotState) -> list[float]:
         """Return the angle of wrist 3 at the end of each call, from where it began [rad]."""
-        count = round(self.wrist / self.speed / self.call_time)
         angle, held = self._wrist_angle(state), round(self.rest / self.call_time)
-        there = [angle * i / count for i in range(1, count + 1)]
+        there = self._turned_there(angle)
         back = [angle - turned for turned in there]
-        before = [0.0] * round(self.rest_before / self.call_time)
-        return [*before, *there, *[angle] * held, *back, *[0.0] * held]
+        return [*self._at_rest, *there, *[angle] * held, *back, *[0.0] * held]
+
+    def _turned_there(self, angle: float) -> list[float]:
+        count = round(self.wrist / self.speed / self.call_time)
+        return [angle * i / count for i in range(1, count + 1)]
+
+    @property
+    def _at_rest(self) -> list[float]:
+        return [0.0] * round(self.rest_before / self.call_time)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeftServoExperiment(ServoExperiment):
+    """Wrist 3 turns by calls of ``servoj`` until none follows; ``movej`` turns it back."""
+
+    @property
+    def question(self) -> str:
+        """The sentence about what moves, how far and how fast."""
+        return (
+            f'Wrist 3 turns by up to {degrees(self.wrist):.0f} degrees, at '
+            f'{degrees(self.speed):.0f} degrees/s, until set-points of servoj stay away; how hard '
+            f'it brakes then is up to the robot. It turns back. It shows {self.shows}.'
+        )
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it may run without a question; not as long as its braking is not known."""
+        return False
+
+    @property
+    def least_turn(self) -> float:
+        """The angle by which wrist 3 turns at least [rad]; it lags behind its set-point."""
+        return 0.5 * self.wrist
+
+    @property
+    def _behind(self) -> tuple[str, ...]:
+        return (f'sleep({self.rest:g})', f'movej(back, {self.back})')
+
+    def _turned(self, state: RobotState) -> list[float]:
+        return [*self._at_rest, *self._turned_there(self._wrist_angle(state))]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -366,6 +412,15 @@ LAW_EXPERIMENTS = (
         speed=0.04,
         there='a=0.4, v=0.04',
         back='a=0.4, v=0.04',
+    ),
+    LeftServoExperiment(
+        name='servoj_left',
+        shows='how the arm brakes then',
+        wrist=radians(40.0),
+        speed=0.5,
+        there='lookahead_time=0.1, gain=300',
+        back='a=0.5, v=0.2',
+        rest=0.5,
     ),
     LawExperiment(
         name='pause',

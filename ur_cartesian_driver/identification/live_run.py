@@ -212,7 +212,7 @@ class _Run:
         if self._experiment.interruption is Interruption.STOP:
             return
         if self._experiment.wrist:
-            missing = self._experiment.wrist - float(joints[:, 5].max())
+            missing = self._experiment.least_turn - float(joints[:, 5].max())
         else:
             far = self._experiment.places(self._state)[-1]
             missing = float(np.linalg.norm(poses[:, :3] - np.array(far), axis=1).min())
