@@ -28,7 +28,12 @@ from ur_cartesian_driver.identification.live_run import (
 )
 from ur_cartesian_driver.identification.recorded_calls import read_commands
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import (
+    RobotMode,
+    RobotState,
+    RuntimeState,
+    SafetyMode,
+)
 from ur_cartesian_driver.motion.twin.twin import ArmIdentity, Estimate, Twin
 from ur_cartesian_driver.motion.twin.twin_file import read_twin
 from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, Verdict
@@ -113,6 +118,24 @@ def rests(ur_sim):
         return stopped and len(places) > 20 and len(set(places[-20:])) == 1
 
     wait_for(still, 20.0)
+
+
+@pytest.mark.slow
+@pytest.mark.ur_sim(twin=HIDDEN, polyscope='5.21.0', rate=4.0, q=HOME, power='off')
+@pytest.mark.parametrize('answer', ['y', 'n'])
+def test_an_arm_that_is_switched_off_is_powered_up_if_the_person_agrees(
+    identify, ur_sim, tmp_path, answer
+):
+    status, printed, outcomes = identify('--only', 'wrist_slow', answer=answer)
+    assert 'The arm is in mode POWER_OFF. Switch its power on and release the brakes' in printed
+    mode = ur_sim.state().robot_mode
+    if answer == 'n':
+        assert (status, mode) == (1, RobotMode.POWER_OFF)
+        assert outcomes['wrist_slow'].startswith('ended: the arm is in mode POWER_OFF; switch it')
+        return
+    assert (status, mode, outcomes) == (0, RobotMode.RUNNING, {'wrist_slow': 'done'}), printed
+    found = read_twin(tmp_path / 'twin.yaml').estimates['start_time']
+    assert found.value == pytest.approx(HIDDEN.estimates['start_time'].value, abs=1e-3)
 
 
 @pytest.mark.slow

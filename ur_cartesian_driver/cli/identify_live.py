@@ -18,14 +18,19 @@ from ur_cartesian_driver.identification.law_experiments import (
     LawExperiment,
     MotionBounds,
 )
-from ur_cartesian_driver.identification.live_run import ready_state, record_experiment
+from ur_cartesian_driver.identification.live_run import (
+    power_up,
+    ready_state,
+    record_experiment,
+)
 from ur_cartesian_driver.identification.moves import find_moves, join_commands
 from ur_cartesian_driver.identification.recorded_calls import MotionCommand, read_commands
 from ur_cartesian_driver.motion.errors import DriverError
-from ur_cartesian_driver.motion.state.rtde_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RobotState
 from ur_cartesian_driver.motion.twin.twin import ArmIdentity
 from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, Verdict
 from ur_cartesian_driver.robot.check.program_run import Surprise
+from ur_cartesian_driver.robot.rtde.probe import read_state
 
 #: The file that says how far the experiments came, and the one with the calls behind the moves.
 PROGRESS, CALLS = 'experiments.txt', 'calls.script'
@@ -33,6 +38,8 @@ WARNING = (
     'The arm will move. A hand on the emergency stop, nobody in reach. Any surprise ends the '
     'experiments; a protective stop is not unlocked.'
 )
+#: Modes from which the arm can be switched on.
+_SWITCHED_OFF = (RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE)
 #: Time for which the robot is observed before it moves [s].
 _OBSERVED = 1.0
 
@@ -104,14 +111,14 @@ def arm_of(findings: list[Finding], asked: ArmIdentity) -> ArmIdentity:
     return arm
 
 
-def _answers(yes: bool) -> Callable[[LawExperiment], bool]:
-    """Return the function that answers; --yes covers only plain moves."""
+def _answers(yes: bool) -> Callable[[str, bool], bool]:
+    """Return the function that answers a question; --yes answers the plain ones."""
 
-    def agrees(experiment: LawExperiment) -> bool:
-        if yes and experiment.is_plain:
-            print(f'\n{experiment.question}')
+    def agrees(question: str, is_plain: bool) -> bool:
+        if yes and is_plain:
+            print(f'\n{question}')
             return True
-        return sys.stdin.isatty() and ask(experiment.question)
+        return sys.stdin.isatty() and ask(question)
 
     return agrees
 
@@ -123,7 +130,8 @@ class _Series:
     address: RobotAddress
     bounds: MotionBounds
     folder: Path
-    agrees: Callable[[LawExperiment], bool]
+    #: Asks a question, and whether it is plain, so that ``--yes`` answers it.
+    agrees: Callable[[str, bool], bool]
     experiments: Sequence[LawExperiment]
     surprise: str = ''
     outcomes: dict[str, str] = field(default_factory=dict)
@@ -150,12 +158,24 @@ class _Series:
             if self.surprise:
                 return
 
+    def _power_up(self) -> None:
+        """Switch the arm on, if it is off and the person agrees."""
+        mode = asyncio.run(read_state(self.address.host, self.address.rtde_port)).robot_mode
+        if mode in _SWITCHED_OFF and self.agrees(
+            f'The arm is in mode {mode.name}. Switch its power on and release the brakes; it may '
+            'sag a little.',
+            True,
+        ):
+            asyncio.run(power_up(self.address))
+
     def _one(self, experiment: LawExperiment, start: RobotState | None) -> tuple[str, RobotState]:
+        if start is None:
+            self._power_up()
         state = asyncio.run(ready_state(self.address, start))
         first = start or state
         if refusal := experiment.refusal(state, self.bounds):
             return f'skipped: {refusal}', first
-        if not self.agrees(experiment):
+        if not self.agrees(experiment.question, experiment.is_plain):
             return 'skipped: not wanted', first
         state = asyncio.run(ready_state(self.address, first))  # again, after the answer
         self.states[experiment.name] = state

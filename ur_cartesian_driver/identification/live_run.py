@@ -25,6 +25,7 @@ from ur_cartesian_driver.identification.law_experiments import (
 )
 from ur_cartesian_driver.motion.state.rtde_state import (
     MOVABLE_SAFETY_MODES,
+    RobotMode,
     RobotState,
     RuntimeState,
 )
@@ -54,10 +55,32 @@ _IN_FILE = tuple(name for name in RECORDED if name != 'target_TCP_speed')
 LONGEST_PROGRAM = 10.0
 #: Time recorded at rest before and after the motion, and how long a program is paused [s].
 BEFORE, AFTER, PAUSED = 0.4, 1.0, 0.6
+#: Longest wait for the power and the brakes of the arm [s].
+POWER_UP_TIMEOUT = 60.0
 #: So many packets without motion are rest.
 MIN_REST = 20
 #: The tool is where it should be within this distance [m].
 NEAR = 1e-3
+
+
+async def power_up(address: RobotAddress) -> None:
+    """
+    Switch the power of the arm on, and release its brakes.
+
+    :raises OSError: the robot does not answer.
+    :raises Surprise: the robot is stopped, or does not power up in time.
+    """
+    run = ProgramRun(address, ('target_q', 'runtime_state', 'safety_mode', 'robot_mode'))
+    try:
+        await run.open()
+        run.send(encode_command(PrimaryCommand.RUN))
+        await run.until(
+            lambda row: row['robot_mode'] == RobotMode.RUNNING,
+            POWER_UP_TIMEOUT,
+            'the arm does not power up (is the robot in remote control?)',
+        )
+    finally:
+        await run.close()
 
 
 async def ready_state(address: RobotAddress, start: RobotState | None) -> RobotState:
