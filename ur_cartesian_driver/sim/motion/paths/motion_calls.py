@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Calls of path moves whose paths are not known yet, and checks of their arguments."""
+"""Calls of path moves, whose paths are computed when they begin; checks of the arguments."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from ur_cartesian_driver.sim.motion.paths.second_motion_version import SecondMot
 
 
 class PathStart(NamedTuple):
-    """The beginning of a path: joint positions [rad], and T_base_tcp."""
+    """The start of a path: joint positions [rad], and T_base_tcp."""
 
     q: Vector6
     pose: Pose
 
 
-#: Moves after which a blend follows the laws of blends; the arcs of movep do not.
+#: Moves after which a blend runs at ``MotionLaws.blend_speed_ratio``; after a movep it does not.
 BLENDS_BY_LAWS = ('movej', 'movel', 'movec')
 
 ParameterFunction: TypeAlias = Callable[[MovePath, PathStart], ProfileParameters]
 
 
 class MotionCall(NamedTuple):
-    """A call of a path move; ``move_path`` returns the path when the move begins."""
+    """A call of a path move; ``move_path`` computes the path when the move begins."""
 
     name: str
     move_path: Callable[[PathStart], MovePath]
     parameters: ProfileParameters | ParameterFunction
     radius: float
     move: Move
-    #: The law by which blend radii are reduced; None = motion version 1, which does not.
+    #: Reduces the blend radii; None = motion version 1, which does not reduce them.
     version: SecondMotionVersion | None = None
 
     def parameters_of(self, move_path: MovePath, start: PathStart) -> ProfileParameters:
@@ -47,13 +47,21 @@ class MotionCall(NamedTuple):
 
 
 def constant_speed_parameters(a: float, v: float, r: float) -> ProfileParameters:
-    """Return the parameters of movep; its deceleration b stops within the radius: v^2 <= 2 b r."""
+    """
+    Return the parameters of movep, which can brake from its speed within the blend radius.
+
+    The deceleration is the larger of a and v^2 / 2r; without a radius, it is a.
+    """
     braking = max(a, v * v / (2.0 * r)) if r > 0.0 else None
     return ProfileParameters(acceleration=a, speed=v, braking=braking)
 
 
 def check_profile_parameters(name: str, parameters: ProfileParameters) -> None:
-    """Refuse a time, acceleration or speed that is impossible."""
+    """
+    Refuse a negative or infinite time; without a time, check acceleration and speed.
+
+    :raises MotionError: a parameter is impossible.
+    """
     if not 0.0 <= parameters.time < inf:
         raise MotionError(f'{name}: the time is {parameters.time:g} s, it must be 0 or more.')
     if parameters.time > 0.0:
@@ -64,7 +72,7 @@ def check_profile_parameters(name: str, parameters: ProfileParameters) -> None:
 
 
 def check_fractions(name: str, a: float, v: float) -> None:
-    """Refuse optimove's acceleration and velocity outside (0, 1]."""
+    """Refuse fractions of an optimove (``a``: acceleration, ``v``: velocity) outside (0, 1]."""
     for word, value in (('acceleration', a), ('velocity', v)):
         if not 0.0 < value <= 1.0:
             raise MotionError(f'{name}: {word} is {value:g}, it must be a fraction in (0, 1].')

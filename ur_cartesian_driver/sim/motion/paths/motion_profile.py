@@ -4,8 +4,8 @@
 Path parameter over time: trapezoids, timed moves, ramps and S-curves.
 
 A profile is a chain of phases of constant jerk (zero except in the S-curve). The path parameter is
-in the unit of the path: metres, radians of the leading axis, or without unit. All profiles end at
-rest, except :func:`ramp` and :func:`two_ramps`.
+in the unit of the path: metres, radians of the joint with the longest travel, or none (blends).
+All profiles end at rest, except :func:`ramp` and :func:`two_ramps`.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class MotionProfile:
     phases: tuple[_Phase, ...]
 
     def at(self, time: float) -> float:
-        """Return the progress at a time; 0 before the beginning, ``length`` from the end on."""
+        """Return the progress at a time: 0 before time 0, ``length`` from ``duration`` on."""
         if time >= self.duration:
             return self.length
         phase = self._phase_at(max(time, 0.0))
@@ -77,7 +77,7 @@ class MotionProfile:
         return rows
 
     def speed(self, time: float) -> float:
-        """Return ds/dt at a time, which is limited to [0, duration]; never negative."""
+        """Return ds/dt, never negative, at a time that is first limited to [0, duration]."""
         time = min(max(time, 0.0), self.duration)
         phase = self._phase_at(time)
         return max(phase.speed_after(time - phase.time), 0.0)
@@ -111,7 +111,7 @@ class MotionProfile:
 def _chain(
     length: float, speed: float, phases: Iterable[tuple[float, float, float]]
 ) -> MotionProfile:
-    """Join phases given as (duration, acceleration at the beginning, jerk)."""
+    """Join phases (duration, initial acceleration, jerk); ``speed`` is the speed at the start."""
     time = position = 0.0
     chain: list[_Phase] = []
     for duration, acceleration, jerk in phases:
@@ -133,11 +133,12 @@ def trapezoid(
     """
     Return the profile that accelerates, cruises and brakes to rest.
 
-    From rest, T = d/v + v/a when d > v^2/a, else the triangle T = 2 sqrt(d/a). From a start speed
-    v0, the peak speed u follows from (u^2 - v0^2)/2a + u^2/2b = d. If v0 is too high to stop
-    within the length, the profile brakes as hard as necessary.
+    From rest and with b = a, the duration is d/v + v/a if d > v^2/a; otherwise the profile is a
+    triangle of duration 2 sqrt(d/a). From a start speed v0, the peak speed is v, or if the length
+    is too short for it, u from (u^2 - v0^2)/2a + u^2/2b = d. If v0 is above v, the profile first
+    brakes to v. If v0 is too high to stop within the length, it brakes harder than b.
 
-    :param braking: deceleration b; None = as the acceleration a.
+    :param braking: deceleration b; None = the acceleration a.
     """
     b = braking or acceleration
     if length <= 0.0:
@@ -164,7 +165,8 @@ def timed_ramp(length: float, acceleration: float, speed: float) -> float:
     """
     Return the fraction of a trapezoid's time that each of its two ramps takes.
 
-    From rest to rest T = d/v + v/a, so a ramp takes v/aT = 1 / (1 + d a/v^2); in a triangle, 1/2.
+    From rest to rest T = d/v + v/a, so the fraction is v / (a T) = 1 / (1 + d a/v^2); it is 1/2 in
+    a triangle. Without an acceleration or a speed it is TIMED_RAMP.
     """
     if min(acceleration, speed) <= 0.0:
         return TIMED_RAMP
@@ -180,11 +182,11 @@ def timed(
     From rest, this is the trapezoid for the speed and acceleration of the call, but stretched
     evenly in time to the duration, as in five recordings of a UR3 (software 3.5).
 
-    With ramps of x and y seconds and a cruising speed c, d = v0 x/2 + c (T - x/2 - y/2). y is
-    ``part`` times T; x is the same, or less if a fast start would otherwise use up the length.
+    The first ramp takes x seconds and the last one y, so the cruising speed c follows from
+    d = v0 x/2 + c (T - x/2 - y/2). y is ``part`` times T; x is the same, or d/v0 if that is less.
 
     :param part: fraction of the time that each ramp takes, see :func:`timed_ramp`. With a third,
-        and from rest, c = 1.5 d/T and a = 4.5 d/T^2.
+        and from rest, c = 1.5 d/T and the acceleration is 4.5 d/T^2.
     """
     if length <= 0.0:
         return MotionProfile(0.0, duration, (_Phase(0.0, 0.0, 0.0, 0.0, 0.0),))
@@ -207,17 +209,17 @@ def _timed_ramps(
 
 
 def ramp(length: float, start_speed: float, end_speed: float) -> MotionProfile:
-    """Return the profile that changes the speed evenly over the length: T = 2 d / (v0 + v1)."""
+    """Return the profile with a constant acceleration over the length: T = 2 d / (v0 + v1)."""
     duration = 2.0 * length / (start_speed + end_speed)
     return _chain(length, start_speed, [(duration, (end_speed - start_speed) / duration, 0.0)])
 
 
 def two_ramps(start_speed: float, end_speed: float, ratio: float) -> MotionProfile:
     """
-    Return a ramp over the length 1, bent half-way.
+    Return the profile over the length 1 with a ramp (see :func:`ramp`) for each half.
 
-    Half-way an even ramp has the speed sqrt((v0^2 + v1^2) / 2); here it is ``ratio`` times this,
-    and each half is an even ramp.
+    A single ramp would have the speed sqrt((v0^2 + v1^2) / 2) half-way; here the speed there is
+    ``ratio`` times as high.
     """
     middle = ratio * sqrt(0.5 * (start_speed**2 + end_speed**2))
     halves = [
@@ -233,9 +235,10 @@ def s_curve(
     """
     Return the profile that accelerates, cruises and brakes to rest with limited jerk.
 
-    A change of speed by w takes T = w/a + a/j when w >= a^2/j, else 2 sqrt(w/j), and covers the
+    A change of speed by w takes T = w/a + a/j if w >= a^2/j, else 2 sqrt(w/j), and covers the
     mean speed times T. The highest cruising speed for which the length suffices is found by
-    bisection.
+    bisection. If the start speed is too high to stop within the length in this way, the profile is
+    a :func:`trapezoid`, whose jerk is not limited.
     """
     if length <= 0.0:
         return trapezoid(length, acceleration, speed)
@@ -267,7 +270,7 @@ def s_curve(
 
 
 def _s_curve_times(change: float, acceleration: float, jerk: float) -> tuple[float, float]:
-    """Return the time of rising (or falling) acceleration, and of constant acceleration."""
+    """Return the times [s] for which the acceleration rises (or falls) and is constant."""
     if change >= acceleration * acceleration / jerk:
         rise = acceleration / jerk
         return rise, change / acceleration - rise

@@ -3,9 +3,9 @@
 """
 The geometry of motion: the set-point at a path parameter, without time.
 
-The parameter of a move path runs from 0 to its ``length``: for joint lines in radians of the
-leading axis, for lines and arcs of the tool in metres (or in scaled radians if the rotation takes
-longer).
+The parameter of a move path runs from 0 to its ``length``. It is in radians of the joint with the
+longest travel for joint lines, and in metres for lines and arcs of the tool; if the rotation takes
+longer there, it is in (scaled) radians, see :class:`LinearMovePath`.
 The parameter of a blend path runs from 0 to 1; such a path replaces the end of one move path and
 the beginning of the next. A set-point is six joint positions or a pose of the TCP in the base.
 Rows of set-points are (n, 6), or (n, 7) with x y z [m] and the unit quaternion x y z w.
@@ -54,16 +54,17 @@ Setpoint: TypeAlias = Vector6 | Pose
 
 # Shorter paths [m, rad] are treated as empty, because their ends differ only by rounding.
 _MIN_LENGTH = 1e-9
-# Three points have no circle if two of them are nearer than this [m]; or if the sine of the angle
-# between the lines to the second and the third point is less than this.
+# Three points define no circle if two of them are nearer to each other than this [m] ...
 _COINCIDENT = 1e-6
+# ... or if the lines from the first point to the others form an angle with a sine below this.
 _COLLINEAR = 1e-6
-# The point at which a path leaves a sphere is searched in this many samples; then in at most this
-# many refinements; until its distance to the sphere is below this [m].
+# The point at which a path leaves a sphere is first searched among this many samples,
 _SAMPLES = 24
+# then found in at most this many refinements,
 _REFINEMENTS = 50
+# which end when its distance from the sphere is below this [m].
 _ON_BORDER = 1e-12
-# Two lines that go straight on, or straight back, within this angle [rad] have no fillet.
+# Two lines have no fillet if their directions are the same or opposite within this angle [rad].
 _STRAIGHT = 1e-6
 
 
@@ -108,7 +109,7 @@ class JointMovePath:
     """
 
     def __init__(self, start: Vector6, end: Vector6, forward: Callable[[Vector6], Pose]) -> None:
-        """Find the leading axis: the one with the longest travel."""
+        """Set ``length`` to the longest travel of a joint [rad]."""
         self.start, self.end, self._forward = start, end, forward
         self._travel = subtract6(end, start)
         length = max(map(abs, self._travel))
@@ -135,13 +136,13 @@ class LinearMovePath:
     A straight line of the tool with the shortest rotation.
 
     Its length is the larger of two numbers: the distance [m], and the angle [rad] divided by the
-    turn ratio. (The robot has one speed for both.)
+    turn ratio, because one speed of the call applies to both.
 
-    :param turn_ratio: rotation [rad] that takes as long as a metre.
+    :param turn_ratio: rotation [rad] that takes as long as a translation by 1 m.
     """
 
     def __init__(self, start: Pose, end: Pose, turn_ratio: float = 1.0) -> None:
-        """Measure distance and length."""
+        """Compute distance and length."""
         self.start, self.end = start, end
         self.distance = start.distance_to(end)
         length = max(self.distance, start.angle_to(end) / turn_ratio)
@@ -163,11 +164,12 @@ class CircularMovePath:
     """
     A circular arc from a start pose through a point to an end pose.
 
-    An unconstrained orientation takes the shortest rotation from start to end, and a long rotation
-    determines the length, as on a line. A fixed orientation is constant relative to the tangent;
-    the orientation of the end pose is then ignored, and the length is the arc's.
+    An unconstrained orientation takes the shortest rotation from start to end; the length is the
+    larger of the arc [m] and the angle of this rotation [rad]. A fixed orientation is constant
+    relative to the tangent; the orientation of the end pose is then ignored, and the length is the
+    arc.
 
-    :raises MotionError: the three points do not lie on a circle.
+    :raises MotionError: two of the three points coincide, or all lie on one line.
     """
 
     def __init__(self, start: Pose, via: Vector3, end: Pose, fixed: bool) -> None:
@@ -208,7 +210,7 @@ class CircularMovePath:
         return rows
 
     def _angle_of(self, point: Vector3) -> float:
-        # The direction of the normal makes the angle grow from start through via to end.
+        # The angle grows from start through via to end, because the normal is cross(via, end).
         r = subtract(point, self.centre)
         return atan2(dot(r, self._y), dot(r, self._x)) % (2.0 * pi)
 
@@ -225,8 +227,9 @@ class JointBlendPath:
     """
     Two joint lines at once: the first brakes to the waypoint while the second starts.
 
-    q(u) = q1(s1(u)) + q2(s2(u)) - q_waypoint with s1 = L1 - r1 (1 - u)^2 and s2 = r2 u^2: a
-    parabola that is tangent to both lines (r1 = ``tail``, r2 = ``head``).
+    q(u) = q1(s1(u)) + q2(s2(u)) - q_waypoint with s1 = L1 - r1 (1 - u)^2 and s2 = r2 u^2, where L1
+    is the length of the first line, r1 = ``tail`` and r2 = ``head``. This is a parabola that is
+    tangent to both lines. ``entry_rate`` is ds1/du at u = 0, and ``exit_rate`` ds2/du at u = 1.
     """
 
     def __init__(
@@ -295,7 +298,7 @@ class FilletBlendPath:
     A circular arc tangent to two lines at equal distances d from the waypoint.
 
     If the direction turns by phi, the radius is d / tan(phi/2), which is d for a right angle.
-    The orientation changes as in :class:`ToolBlendPath`, but the position has a constant speed.
+    The orientation changes as in :class:`ToolBlendPath`; the position moves in proportion to u.
     """
 
     def __init__(
@@ -345,10 +348,10 @@ def make_blend(
     before: MovePath, tail: float, after: MovePath, head: float, circular: bool
 ) -> BlendPath:
     """
-    Return the blend of two paths: for two joint lines in joint space, else in tool space.
+    Return the blend of two paths: in joint space if both are joint lines, else in tool space.
 
-    :param circular: whether to blend two tool lines that meet at an angle by an arc.
-    :raises MotionError: the blend is to be an arc, but the second line leads straight back.
+    :param circular: whether to join two tool lines that meet at an angle by an arc.
+    :raises MotionError: ``circular`` is set, and the second line leads straight back.
     """
     if isinstance(before, JointMovePath) and isinstance(after, JointMovePath):
         return JointBlendPath(before, tail, after, head)
@@ -365,7 +368,7 @@ def make_blend(
 
 
 def start_within_radius(move_path: MovePath, radius: float) -> float | None:
-    """Return the parameter at which the tool is ``radius`` [m] from the start; None = never."""
+    """Return the length of the path's start within ``radius`` [m] of its start; None = all."""
     if isinstance(move_path, LinearMovePath):
         return (
             move_path.length * radius / move_path.distance if move_path.distance > radius else None
@@ -374,7 +377,7 @@ def start_within_radius(move_path: MovePath, radius: float) -> float | None:
 
 
 def end_within_radius(move_path: MovePath, radius: float) -> float | None:
-    """Return the length left when the tool is ``radius`` [m] from the end; None = never."""
+    """Return the length of the path's end within ``radius`` [m] of its waypoint; None = all."""
     if isinstance(move_path, LinearMovePath):
         return start_within_radius(move_path, radius)
     return _exit_parameter(
@@ -383,7 +386,7 @@ def end_within_radius(move_path: MovePath, radius: float) -> float | None:
 
 
 def _exit_parameter(pose: Callable[[float], Pose], radius: float, length: float) -> float | None:
-    """Return the first parameter at which ``pose`` leaves the ``radius`` [m]; None = never."""
+    """Return the first s at which ``pose(s)`` is ``radius`` [m] from ``pose(0)``; None = never."""
     origin = pose(0.0).position
     low, f_low = 0.0, -radius
     for i in range(1, _SAMPLES + 1):
@@ -394,7 +397,7 @@ def _exit_parameter(pose: Callable[[float], Pose], radius: float, length: float)
         low, f_low = high, f_high
     else:
         return None
-    # Regula falsi with the Illinois correction: the value at the stale end is halved.
+    # Regula falsi with the Illinois correction: if the same end stays twice, its value is halved.
     side = 0
     for _ in range(_REFINEMENTS):
         middle = (low * f_high - high * f_low) / (f_high - f_low)
@@ -411,7 +414,7 @@ def _exit_parameter(pose: Callable[[float], Pose], radius: float, length: float)
 
 
 def _on_circle(centre: Vector3, x: Vector3, y: Vector3, radius: float, angle: float) -> Vector3:
-    """Return a point of a circle; the angle is measured from x towards y."""
+    """Return a point of a circle; the angle [rad] is measured from x towards y."""
     offset = add(scale(x, radius * cos(angle)), scale(y, radius * sin(angle)))
     return add(centre, offset)
 
@@ -419,7 +422,7 @@ def _on_circle(centre: Vector3, x: Vector3, y: Vector3, radius: float, angle: fl
 def _on_circle_rows(
     centre: Vector3, x: Vector3, y: Vector3, radius: float, angle: Floats
 ) -> Floats:
-    """Return points of a circle (n, 3)."""
+    """Return points (n, 3) of a circle at angles (n,), see :func:`_on_circle`."""
     rows: Floats = (
         np.array(centre)
         + np.outer(radius * np.cos(angle), x)

@@ -3,9 +3,9 @@
 """
 The sequence of move paths and blends that the arm follows, each with its profile.
 
-The robot knows at most one move ahead: the next call comes when the arm enters the blend. Each
-move is therefore planned to end at rest at its waypoint; a call that comes in time cuts the path
-where the blend begins, and the blend and the next path replace the remainder.
+A program calls the next move only when the arm enters the blend of the present one. Each move is
+therefore planned to end at rest at its waypoint. If the next call comes in time, the blend and the
+next path replace the end of the present path.
 """
 
 from __future__ import annotations
@@ -36,10 +36,11 @@ from ur_cartesian_driver.sim.motion.paths.move_paths import (
 
 # A section is over when less than this time is left [s], because sums of cycles are rounded.
 _ROUNDING = 1e-9
-# Speeds and lengths below this are treated as zero, in the units of any path.
+# Speeds and lengths up to this are treated as zero, in the units of any path.
 _MIN_SPEED = 1e-9
-# After a blend, a timed move may have to catch up. The average speed of its remainder is at most
-# this many times the average speed needed from the entry of the blend to the end.
+# If a timed move has lost time in a blend, it runs faster afterwards to keep its time. Its average
+# speed after the blend is at most this many times the average speed with which it would keep its
+# time from the entry of the blend to the end.
 _MAX_CATCH_UP = 2.0
 
 
@@ -73,7 +74,7 @@ class ProfileParameters:
         return timed_ramp(length, self.acceleration, self.speed)
 
     def strongest(self, length: float) -> float:
-        """Return the highest acceleration over a length (of a timed move, from rest to rest)."""
+        """Return the highest acceleration on a path; of a timed move, as if from rest to rest."""
         if self.time > 0.0:
             part = self.ramp_part(length)
             return length / (part * (1.0 - part) * self.time**2)
@@ -83,10 +84,10 @@ class ProfileParameters:
 @dataclass(frozen=True, slots=True)
 class PathSection:
     """
-    One path with one profile.
+    A path with its profile.
 
     :param offset: path parameter at which the profile begins.
-    :param stop: time of the profile at which the next section takes over.
+    :param stop: profile time at which the next section begins [s].
     """
 
     path: MotionPath
@@ -104,9 +105,10 @@ class PathSection:
 @dataclass(frozen=True, slots=True)
 class LastMove:
     """
-    The last move, and the values needed to blend the next one into it.
+    The last move of a :class:`PathMotion`, and the values needed to blend the next one into it.
 
-    :param entry: time in the profile at which the blend begins; the duration if there is no blend.
+    :param radius: blend radius at the waypoint [m]; 0 = no blend.
+    :param entry: profile time at which the blend begins [s]; the duration if there is no blend.
     """
 
     move_path: MovePath
@@ -133,7 +135,7 @@ class PathMotion:
     real_time = False
 
     def preview(self, h: float) -> tuple[Setpoint, tuple[int, float, float]]:
-        """Return the set-point and the state after ``h`` more seconds of the profile."""
+        """Return the set-point and state (see :meth:`accept`) after ``h`` more profile seconds."""
         i, t = self.index, self.time
         while True:
             section = self.sections[i]
@@ -159,7 +161,7 @@ class PathMotion:
 
     @property
     def next_change(self) -> float:
-        """The time [s] of the next change: the entry of the blend, or the section's end."""
+        """The profile time [s] of the next change: entry of the blend, or end of the section."""
         entry = self.last_move.entry
         in_last = self.index + 1 == len(self.sections)
         if in_last and self.last_move.radius > 0.0 and self.time < entry:
@@ -167,7 +169,7 @@ class PathMotion:
         return self.sections[self.index].stop
 
     def may_return(self, cycle: float) -> bool:
-        """Return whether the next cycle enters the blend or, without one, the end is reached."""
+        """Return whether the call may return: the blend begins in a cycle, or the move is over."""
         if self.index + 1 < len(self.sections):
             return False
         if self.last_move.radius > 0.0:
@@ -214,10 +216,11 @@ def append_move_path(
 
     The blend begins at the blend radius, or at the arm's position if the call comes late, and ends
     at the same distance after the waypoint. If the arm already stands still, or the new path does
-    not leave the blend radius, there is no blend and the arm stops at the waypoint. (In a blend
-    both moves have one common speed, so a short new move would run at the speed of the last move.)
+    not leave the blend radius, there is no blend and the arm stops at the waypoint. (A new path
+    that lies wholly in the blend would run at the speed of the last move, because a blend has one
+    speed for both moves.)
 
-    :param speed_ratio: rate half-way through the blend, as a multiple of that of an even change.
+    :param speed_ratio: the ``ratio`` of :func:`two_ramps` in the blend; 1 = a single ramp.
     """
     last, last_move = path_motion.sections[-1], path_motion.last_move
     ahead = path_motion.sections[path_motion.index : -1]
@@ -265,7 +268,7 @@ def _blend_head(
 
 
 def _blend_entry_time(section: PathSection, move_path: MovePath, radius: float) -> float:
-    """Return the time at which the path comes within the radius [m] of its end."""
+    """Return the profile time at which the path comes within the radius [m] of its end."""
     if radius <= 0.0:
         return section.stop
     tail = end_within_radius(move_path, radius)
@@ -287,20 +290,21 @@ def _blend_profiles(
     """
     Return the profiles of the blend (0 to 1) and of the remainder of the new path.
 
-    The rate u' of the blend changes evenly from its value at the entry to the value for the next
-    cruising speed. It does not grow beyond three bounds: the acceleration of the first move, that
-    of the next one (each s'' = 2 r u'^2 <= a, with the length r of that path in the blend), and
-    the speed from which the remainder of the new path is long enough to brake. A first move with a
-    trapezoid enters with v <= sqrt(2 a r), so it keeps its bound anyway. If the first move has a
-    time, its a is the acceleration from rest to rest or, if greater, the next move's times
-    the first length by the next length.
+    The rate u' of the blend parameter changes at a constant acceleration from its value at the
+    entry to the value for the next cruising speed. It does not grow beyond a bound for each of the
+    two moves: s'' = 2 r u'^2 <= a, with the acceleration a of the move and the length r of its
+    path in the blend. The rate at the entry keeps the bound of a first move with a trapezoid,
+    because v <= sqrt(2 a r) there. If the first move has a time, its a is the larger of two: its
+    acceleration from rest to rest, and the next move's acceleration times the ratio of the first
+    length to the next. Without a time for the next move, the rate at the exit is also so low that
+    the remainder of the new path is long enough to brake.
 
     If the next move has a time, the sum of both times is kept: the time that the previous move had
     left until its waypoint is added to the time of the next move.
 
     :param rates: path units per unit of the blend's parameter, at entry and exit.
     :param speed: speed at the entry.
-    :param remaining: time from the entry until rest at the waypoint [s].
+    :param remaining: time from the entry until rest at the waypoint [s], if there were no blend.
     :param after: the parameters of the new move.
     :param head: length of the new path within the blend.
     :param rest: length of the new path after the blend.
@@ -315,7 +319,7 @@ def _blend_profiles(
     if before.time > 0.0:
         strongest = max(strongest, acceleration * length / whole)
     if after.time > 0.0:
-        # The speed is even, except for the braking at the end.
+        # The speed is assumed to be constant from the entry on, except for the braking at the end.
         cruise = (whole + head) / (time * (1.0 - 0.5 * after.ramp_part(whole)))
     else:
         stoppable = sqrt(2.0 * (after.braking or acceleration) * rest)

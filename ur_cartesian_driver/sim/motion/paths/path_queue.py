@@ -3,8 +3,8 @@
 """
 Path moves, which begin from rest, in the blend of the previous move, or after the arm has braked.
 
-A move that a program calls when the blend of the previous move is about to begin is blended with
-that move. A move that cannot begin yet waits until the arm stands still.
+A move is blended with the previous one if the program calls it when the blend is about to begin or
+has begun. A move that cannot begin yet waits until the arm stands still.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _TOUCHING = 1e-9
 
 
 class _Overlap(NamedTuple):
-    """The state before a waypoint that is skipped if another move follows at once."""
+    """The state to restore if a waypoint is skipped because another move follows at once."""
 
     before: PathMotion | None
     last_name: str
@@ -62,17 +62,17 @@ class PathQueue:
         #: Name of the last path move; '' before the first.
         self._last_name = ''
         self._overlap: _Overlap | None = None
-        #: Part of a cycle that the last move did not use, less the time that the laws lose between
-        #: moves [s]. A move that follows at once begins this much earlier, so that the times of
-        #: moves are not rounded to cycles; or later, if the number is negative.
+        #: Part of a cycle that the last move did not use, less ``MotionLaws.idle_between_moves``
+        #: [s]. A move that follows at once begins earlier by this time (later if it is negative),
+        #: so that the times of moves are not rounded to cycles.
         self._spare = 0.0
 
     def clear(self) -> None:
-        """Discard the waiting move."""
+        """Discard the waiting move; an overlapping waypoint is no longer skipped."""
         self._waiting = self._overlap = None
 
     def end_of_frame(self) -> None:
-        """Keep an overlapping waypoint and drop the spare time, because no move has followed."""
+        """Keep an overlapping waypoint and drop the spare time: no move followed in this cycle."""
         self._overlap, self._spare = None, 0.0
 
     def begin(self, call: MotionCall) -> None:
@@ -101,7 +101,11 @@ class PathQueue:
                 self.finish_at_rest()
 
     def finish_at_rest(self) -> None:
-        """End the motion that has come to rest, and begin the move that waited for it."""
+        """
+        End the motion that has come to rest, and begin the move that waited for it.
+
+        A waiting move that cannot begin is reported as a fault.
+        """
         self._active.motion = None
         if self._waiting is None:
             if self._active.move is not None:
@@ -140,12 +144,12 @@ class PathQueue:
         self._follow(None, path_motion, call, margin)
 
     def _begin_in_blend(self, path_motion: PathMotion, call: MotionCall) -> None:
-        """Continue from a move whose blend is about to begin or has begun."""
+        """Blend a move with the running one, whose blend is about to begin or has begun."""
         last = path_motion.last_move
         pose = last.move_path.pose(last.move_path.length)
         q = self._target.ik_branch().joints_at_end_of(last.move_path)
         if q is None and call.name.endswith('j'):
-            # The arm cannot reach the start of the joint line; the running move will fail before.
+            # The arm cannot reach the start of the joint line; the running move fails before that.
             self._wait(call)
             return
         start = PathStart(q or self._target.q, pose)
@@ -208,5 +212,5 @@ class PathQueue:
 
 
 def _distance_to_waypoint(start: Pose, move_path: MovePath) -> float:
-    """Return the distance of the waypoint from the start [m]."""
+    """Return the distance from the start to the waypoint [m]."""
     return start.distance_to(move_path.pose(move_path.length))

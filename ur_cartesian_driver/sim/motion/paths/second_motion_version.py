@@ -13,23 +13,23 @@ from ur_cartesian_driver.sim.motion.paths.path_motion import ProfileParameters
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SecondMotionVersion:
     """
-    How motion version 2 (PolyScope 5.22) differs from version 1, as far as it is known.
+    The known differences of motion version 2 (PolyScope 5.22) from version 1.
 
     The script manual says that speeds and accelerations are clamped to the limits of the hardware
     while moves are planned, that blend radii are reduced so that blends neither overlap nor skip a
-    waypoint, that ramps differ, and that blends run on slightly other paths. It gives no figure,
-    so the fields below are assumed.
+    waypoint, that ramps differ, and that blends run on slightly other paths. It gives no figures,
+    so the values of the fields are assumed.
 
     :raises ValueError: a field is outside its range; the text names the field.
     """
 
-    #: Time for which the acceleration rises at the beginning of a ramp and falls at its end [s]:
-    #: by so much each ramp takes longer. 0 to 0.5; 0 = ramps as in version 1.
+    #: Time for which the acceleration rises at the beginning of a ramp, and falls at its end [s].
+    #: Each ramp takes longer by this time. 0 to 0.5; 0 = ramps as in version 1.
     ramp_rise: float = 0.02
-    #: Fraction of its radius that a blend takes; 0.1 to 1, and 1 = blends as in version 1.
+    #: Factor on the blend radius of a call; 0.1 to 1, and 1 = blends as in version 1.
     blend_fraction: float = 0.9
-    #: Fraction of the way between two waypoints that their blends may take; 0.1 to 0.99, because
-    #: the last one needs a way on which to brake.
+    #: Fraction of the distance between two waypoints that the blends at both may take together;
+    #: 0.1 to 0.99, because the last move needs some distance in which to brake.
     blend_share: float = 0.99
 
     def __post_init__(self) -> None:
@@ -48,10 +48,10 @@ class SecondMotionVersion:
         """
         Return the parameters of a move, clamped to the limits of the arm.
 
-        A move with a time keeps its ramps, and takes longer if the limits require it: it reaches
-        v = d / (T (1 - x)) at a = v / (x T), with the fraction x of the time T for each ramp.
+        A move with a time takes longer if the limits require it; each of its ramps keeps its
+        fraction x of the time T. The move reaches v = d / (T (1 - x)) at a = v / (x T).
 
-        :param length: length of the path, in its unit.
+        :param length: length d of the path, in its unit.
         :param most: the highest acceleration and speed on the path.
         """
         if asked.time > 0.0:
@@ -70,10 +70,10 @@ class SecondMotionVersion:
 
     def reduced_radii(self, before: float, after: float, distance: float) -> tuple[float, float]:
         """
-        Return the radii of the blends at both ends of a move [m], in proportion if too large.
+        Return the blend radii at both ends of a move [m], scaled down if their sum is too large.
 
         :param before: radius at the waypoint where the move begins [m].
-        :param after: radius at its own waypoint [m].
+        :param after: radius at the waypoint where the move ends [m].
         :param distance: distance between the two waypoints [m].
         """
         most, both = self.blend_share * distance, before + after
