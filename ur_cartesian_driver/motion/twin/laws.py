@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The table of the laws of motion, with the values that are assumed of any arm.
+The table of the laws of motion, with the values that are assumed for any arm.
 
-``doc/simulation.md`` says what is known of each law. The laws of the controller are the fields of
-:class:`MotionLaws`. The figures of the arm that follows its targets are the fields of
-:class:`ArmFigures`, which have no value of their own here: they differ between the series, see
-``sim.motion.imperfect_arm``. :data:`LAWS` contains both.
+``doc/simulation.md`` gives the evidence for each law. The fields of :class:`MotionLaws` are the
+laws by which a controller moves its targets. The fields of :class:`ArmFigures` are the errors with
+which an arm follows these targets; they differ between the series of arms, so their values are
+not here but in ``sim.motion.imperfect_arm``. :data:`LAWS` contains both.
 """
 
 from __future__ import annotations
@@ -34,10 +34,11 @@ class Law:
     """
     One law of motion: its meaning, and the values that it can have.
 
-    :param text: the meaning of the value, as a noun clause.
+    :param text: the meaning of the value, as a noun phrase.
     :param unit: unit of the value; '' = none.
-    :param low: least value; ``high``: greatest value.
-    :param choices: the names that the value can be, instead of a number.
+    :param low: least value that is allowed.
+    :param high: greatest value that is allowed.
+    :param choices: the allowed names if the value is a name; empty = the value is a number.
     """
 
     text: str
@@ -46,12 +47,12 @@ class Law:
     high: float = inf
     grade: Grade = Grade.ASSUMED
     choices: tuple[str, ...] = ()
-    #: Name and assumed value; the table fills them in. None = it depends on the series of the arm.
+    #: Name and assumed value, from the field that has this law; None = it differs between series.
     name: str = ''
     assumed: float | str | None = None
 
     def problem(self, value: float | str) -> str:
-        """Return the fault of a value, as a clause; '' if the law can have the value."""
+        """Return the rule that a value breaks, such as ``must be a or b``; '' if it is allowed."""
         if self.choices:
             return '' if value in self.choices else f'must be {" or ".join(self.choices)}'
         if not isinstance(value, str) and self.low <= value <= self.high:
@@ -63,10 +64,10 @@ class Law:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionLaws:
     """
-    The laws of a controller's motions; the defaults are those assumed of any arm.
+    The laws of a controller's motions; the defaults are the values assumed for any arm.
 
-    The laws of blends hold for the blends after ``movej``, ``movel`` and ``movec``; two ``movep``
-    are joined by an arc at constant speed, as documented.
+    The fields ``blend_*`` hold for blends after ``movej``, ``movel`` and ``movec``. Two ``movep``
+    are joined by an arc at constant speed, as the script manual says.
 
     :raises ValueError: a law cannot have its value; the text names the law.
     """
@@ -164,7 +165,7 @@ class ArmFigures:
     """
     The errors of an arm against its targets, and the gaps in its packets; None = not measured.
 
-    The names are those of the simulator's ``Imperfections``.
+    The fields are named as in the simulator's ``Imperfections``.
 
     :raises ValueError: a figure cannot have its value; the text names the figure.
     """
@@ -226,7 +227,7 @@ def _table(kind: type) -> dict[str, Law]:
     }
 
 
-#: The laws of controller and arm, by name, in the order of the file.
+#: The laws of controller and arm, by name, in the order of ``twin.yaml``.
 LAWS: Mapping[str, Law] = MappingProxyType({**_table(MotionLaws), **_table(ArmFigures)})
 
 
@@ -238,5 +239,5 @@ def _check(instance: MotionLaws | ArmFigures) -> None:
             raise ValueError(f'{each.name} is {value}; it {problem}.')
 
 
-#: The laws that are assumed of any arm.
+#: The laws that are assumed for any arm.
 ASSUMED_LAWS = MotionLaws()

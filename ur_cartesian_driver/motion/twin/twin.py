@@ -25,19 +25,20 @@ class Estimate:
     """
     The measured value of a law.
 
-    :raises ValueError: the interval is not finite, or does not contain the value.
+    :raises ValueError: a name has an interval; or the interval of a number is missing, is not
+        finite, or does not contain the number.
     """
 
     value: float | str
-    #: The 95 % interval of a number; None for a name.
+    #: The 95 % confidence interval (low, high) of a number; None for a name.
     interval: tuple[float, float] | None = None
-    #: What the value was found from, for example ``12 starts of programs``.
+    #: The recorded events from which the value was estimated, such as ``12 starts of programs``.
     evidence: str = ''
-    #: What of the recordings the law does not explain, for example ``0.4 ms``.
+    #: The residual that the law leaves in the recordings, for example ``0.4 ms``.
     left_over: str = ''
 
     def __post_init__(self) -> None:
-        """Refuse intervals that do not belong to the value."""
+        """Refuse an interval that is missing or does not suit the value."""
         if isinstance(self.value, str):
             if self.interval is not None:
                 raise ValueError(f'has an interval, but its value, {self.value}, is no number')
@@ -51,7 +52,7 @@ class Estimate:
             )
 
     def text(self, unit: str) -> str:
-        """Return value and interval as people read them."""
+        """Return value and interval for people to read, such as ``0.158 s (0.154 to 0.162)``."""
         if isinstance(self.value, str):
             return self.value
         low, high = self.interval or (self.value, self.value)
@@ -60,7 +61,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArmIdentity:
-    """The arm on which laws were measured, or which is to move by them; '' and 0 = unknown."""
+    """An arm on which laws were measured, or to which they are applied; '' and 0 = unknown."""
 
     model: str = ''
     serial_number: str = ''
@@ -69,7 +70,7 @@ class ArmIdentity:
     motion_version: int = 0
 
     def differences(self, robot: ArmIdentity) -> str:
-        """Return how a robot differs from this arm, as a clause; '' if nothing known differs."""
+        """Return the known differences of a robot from this arm, for a sentence; '' if none."""
         different = []
         for name, text in _IDENTITY.items():
             own, other = getattr(self, name), getattr(robot, name)
@@ -83,9 +84,9 @@ UNKNOWN_ARM = ArmIdentity()
 
 def checked_software(text: str) -> str:
     """
-    Return a version of the controller's software.
+    Return the text of a software version unchanged.
 
-    :raises ValueError: the text is none.
+    :raises ValueError: the text is no version: two to four numbers with dots between them.
     """
     if re.fullmatch(r'\d+(\.\d+){1,3}', text) is None:
         raise ValueError(f'{text} is no version; write it like 5.21 or 5.21.0')
@@ -94,9 +95,9 @@ def checked_software(text: str) -> str:
 
 def checked_day(text: str) -> str:
     """
-    Return a date, YYYY-MM-DD.
+    Return a date in the form YYYY-MM-DD.
 
-    :raises ValueError: the text is none.
+    :raises ValueError: the text is no ISO date.
     """
     try:
         return date.fromisoformat(text).isoformat()
@@ -114,7 +115,7 @@ _IDENTITY = {
 
 
 def _same(name: str, own: str | int, other: str | int) -> bool:
-    """Return whether two known values are the same; software as far as both name it."""
+    """Return whether two known values agree; versions need only agree in the numbers of both."""
     if name != 'software':
         return own == other
     pairs = zip(str(own).split('.')[:3], str(other).split('.')[:3], strict=False)
@@ -126,7 +127,8 @@ class Twin:
     """
     The laws that were measured on one arm; all other laws are assumed.
 
-    :raises ValueError: a law is unknown, or cannot have its value; the text names the law.
+    :raises ValueError: a law is unknown, cannot have its value, or is both estimated and not
+        identified; the text names the law.
     """
 
     arm: ArmIdentity
@@ -135,9 +137,9 @@ class Twin:
     #: The recordings from which the laws were estimated.
     files: tuple[str, ...] = ()
     estimates: Mapping[str, Estimate] = field(default_factory=dict)
-    #: Laws that were not identified -> the reason, and the experiment that would do it.
+    #: Laws that were not identified -> the reason, and the experiment that would identify them.
     not_identified: Mapping[str, str] = field(default_factory=dict)
-    #: The laws of the controller: the measured ones, and the assumed for the rest.
+    #: The laws of the controller, with the assumed values where none were measured.
     laws: MotionLaws = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -162,7 +164,7 @@ class Twin:
         return {name: self.estimates[name].value for name in names}
 
     def half_width(self, name: str) -> float:
-        """Return the larger distance of an interval's end from the value; 0 if not measured."""
+        """Return the larger distance from a value to an end of its interval; 0 if it has none."""
         estimate = self.estimates.get(name)
         if estimate is None or estimate.interval is None or isinstance(estimate.value, str):
             return 0.0
@@ -170,7 +172,7 @@ class Twin:
         return max(high - estimate.value, estimate.value - low)
 
     def measured(self, *names: str) -> str:
-        """Return the measured ones of some laws with their intervals, as a clause; '' if none."""
+        """Return values and intervals of the given laws that were measured; '' if none."""
         return ', '.join(
             f'{name} {self.estimates[name].text(LAWS[name].unit)}'
             for name in names
@@ -180,9 +182,9 @@ class Twin:
 
 def laws_of(twin: Twin | None, turn_ratio: float) -> MotionLaws:
     """
-    Return the laws of a controller: the measured ones, and the assumed for the rest.
+    Return the laws of a controller, with the assumed values where ``twin`` measured none.
 
-    :param turn_ratio: the assumed turn ratio.
+    :param turn_ratio: the turn ratio [rad/m] if ``twin`` does not have it.
     """
     if twin is None:
         return _assumed_laws(turn_ratio)
@@ -191,6 +193,6 @@ def laws_of(twin: Twin | None, turn_ratio: float) -> MotionLaws:
     )
 
 
-@lru_cache(maxsize=8)  # a plan asks for them again and again
+@lru_cache(maxsize=8)  # a plan asks for them many times
 def _assumed_laws(turn_ratio: float) -> MotionLaws:
     return replace(ASSUMED_LAWS, turn_ratio=turn_ratio)

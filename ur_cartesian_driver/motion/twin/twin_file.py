@@ -23,7 +23,7 @@ Read and write ``twin.yaml``: the measured laws of one arm, one law a paragraph.
     blend_begin:
       not_identified: no blends in the files; record some moves with r
 
-A law that is left out is assumed. Every error names the line.
+A law that is left out has its assumed value. Every error names the line.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ from ur_cartesian_driver.motion.twin.twin import (
 from ur_cartesian_driver.motion.yaml_nodes import NodeReader, text_of_file
 
 if TYPE_CHECKING:
-    import yaml  # else with the first file: a simulator without one needs only numpy
+    import yaml  # imported lazily: a simulator without a file needs only numpy
 
-#: The version of the format, with which a file begins.
+#: The version of the format, which is the field ``twin`` of a file.
 FORMAT = 1
 
 _HEAD = ('twin', 'arm', 'date', 'files')
@@ -80,7 +80,7 @@ def twin_from_text(text: str, name: str) -> Twin:
 
 
 def twin_text(twin: Twin) -> str:
-    """Return the text of a file; :func:`twin_from_text` returns the same twin."""
+    """Return the text of ``twin.yaml``, from which :func:`twin_from_text` reads the same twin."""
     arm = {key: getattr(twin.arm, key) for key in _ARM if getattr(twin.arm, key)}
     day = date.fromisoformat(twin.date)
     head = {'twin': FORMAT, 'arm': arm, 'date': day, 'files': list(twin.files)}
@@ -121,7 +121,7 @@ def _entry(law: Law, estimate: Estimate) -> dict[str, Any]:
 
 
 def _dumped(content: dict[str, Any]) -> str:
-    """Return fields as YAML; lists, and mappings in fields, take one line."""
+    """Return fields as YAML, with innermost lists and mappings in brackets instead of lines."""
     import yaml
 
     is_nested = any(isinstance(value, list | dict) for value in content.values())
@@ -173,7 +173,7 @@ class _Reader(NodeReader):
         )
 
     def _law(self, law: Law, node: yaml.Node) -> Estimate | str:
-        """Return the estimate of a law, or the reason why it was not identified."""
+        """Return the estimate of a law, or the text of its field ``not_identified``."""
         entries = self.entries(node, law.name, (*_ESTIMATE, 'not_identified'))
         if 'not_identified' in entries:
             if len(entries) > 1:
