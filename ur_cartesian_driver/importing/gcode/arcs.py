@@ -43,9 +43,11 @@ class Arc(NamedTuple):
     centre: tuple[float, float]
     start: Sequence[float]
     end: Sequence[float]
+    #: The angle at the start, measured from the first axis of the plane towards the second.
     begin: float
-    #: The signed angle of all turns.
+    #: The angle of all turns, in the same direction positive.
     sweep: float
+    #: The distances of start and end from the centre.
     radii: tuple[float, float]
 
     @property
@@ -55,7 +57,7 @@ class Arc(NamedTuple):
         return abs(self.end[axis] - self.start[axis]) > _MIN_RISE
 
     def place(self, share: float) -> Vector3:
-        """Return the point at a fraction of the arc; if its radii differ, it is a spiral."""
+        """Return the point at a fraction of the arc, which is a spiral if its radii differ."""
         if share == 1.0:
             x, y, z = self.end
             return (x, y, z)
@@ -70,9 +72,9 @@ class Arc(NamedTuple):
 
     def lines(self, tolerance: float) -> list[Vector3]:
         """
-        Return the end points of lines that stay within a tolerance [m] of the arc.
+        Return the end points of a chain of lines that stays within a tolerance [m] of the arc.
 
-        :raises ValueError: there would be too many lines.
+        :raises ValueError: the chain would have too many lines.
         """
         step = 2.0 * acos(max(0.0, 1.0 - min(1.0, tolerance / max(self.radii))))
         count = max(2, ceil(abs(self.sweep) / max(step, 1e-6)))
@@ -102,6 +104,7 @@ def arc_between(
     :param centre: the centre in the plane, or else a radius: negative if the arc is longer than
         a half circle.
     :param direction: clockwise -1 (G2), counterclockwise 1 (G3).
+    :param turns: 1 for an arc of at most a full circle; each further turn adds a full circle.
     :raises ValueError: no arc fits these values; the message is a sentence without a full stop.
     """
     a, b, _ = plane.axes

@@ -20,7 +20,7 @@ from ur_cartesian_driver.importing.import_format import Term, term_table, Treatm
 
 
 class Stage(IntEnum):
-    """When a code acts among those of its line; the order is that of RS274/NGC."""
+    """The stages in which the codes of a line act, in the order of RS274/NGC."""
 
     MODE = 0
     OUTPUT = 1
@@ -31,20 +31,21 @@ class Stage(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Code(Term):
-    """A code, or one of the other words of a line."""
+    """A row of the table: a code, a word that is no code, or another form of a line."""
 
     #: The letters of the words that belong to the code.
     words: str = ''
     stage: Stage = Stage.MODE
-    #: A line has at most one code of a group; empty = no such limit.
+    #: The group of the code: codes of one group exclude each other on a line; empty = none.
     group: str = ''
-    #: The letters that need no number on the line of the code.
+    #: The letters that may stand without a number on the line of the code, as in ``G28 X``.
     bare: str = ''
-    #: The code owns its line: what follows are its arguments, whether they are words or not.
+    #: Whether the code owns its line, so that everything after it is an argument, word or not.
     alone: bool = False
-    #: What follows is a text, a message or the name of a file, and is never read as words.
+    #: Whether a text follows, such as a message or the name of a file, which has no words.
     text: bool = False
-    #: The place of the tool is not known after the code: it moves to a place of the machine, say.
+    #: Whether the tool position is unknown after the code, such as after a move to a machine
+    #: position.
     moves_away: bool = False
 
 
@@ -63,7 +64,7 @@ _refused = partial(_rows, Treatment.REFUSED)
 
 
 def _numbers(letter: str, *ranges: int | tuple[int, int]) -> tuple[str, ...]:
-    """Return the names of codes; a pair means all numbers from its first to its last."""
+    """Return the names of codes with a letter; a pair means all numbers from first to last."""
     return tuple(
         f'{letter}{number}'
         for each in ranges
@@ -87,13 +88,13 @@ _NO_WAIT = 'the path does not wait'
 _FLOW = 'let the CAM write the program out'
 _TEXT = 'a message, or the name of a file'
 OTHER_FILE = 'other files are not read'
-#: Beginnings of the names of Klipper's commands that do not move the tool.
+#: First parts of the names of Klipper's commands that do not move the tool.
 _HARMLESS = (
     *('SET_', 'EXCLUDE_', 'TIMELAPSE_', 'TURN_OFF_', 'SAVE_GCODE_STATE', 'BED_MESH_PROFILE'),
     *('BED_MESH_CLEAR', 'TEMPERATURE_WAIT', 'UPDATE_DELAYED_GCODE'),
 )
 
-#: Commands of a printer with several heads, by their first letters: T takes a head, P parks it.
+#: Names of the rows for printers with several heads, by first letter: T takes a head, P parks it.
 TOOLS_OF_PRINTER = {'T': 'T S L', 'P': 'P S'}
 
 _MOTION = (
@@ -312,7 +313,7 @@ _PRINTERS = (
     _refused('printers', 'it restores modes', 'RESTORE_GCODE_STATE'),
 )
 
-#: Codes by name. A code and a word that changes its meaning have a row together: ``G10 L20``.
+#: Codes by name. If a word changes the meaning of a code, the name contains both: ``G10 L20``.
 CODES: Mapping[str, Code] = term_table(
     *_MOTION, *_MODES, *_OFFSETS, *_OUTPUTS, *_TOOLS, *_PROGRAM, *_PRINTERS
 )
@@ -321,12 +322,12 @@ _CHANGED_BY_WORDS = frozenset(name.split()[0] for name in CODES if name[0] in 'G
 
 @lru_cache(maxsize=1024)
 def code_named(name: str) -> Code | None:
-    """Return the row of a code or name, or None; G29.5 of a printer uses the row of G29."""
+    """Return the row of a code or name; None = not known. A printer's G29.5 has the row of G29."""
     row = CODES.get(name)
     if row is None and '.' in name:
         family = CODES.get(name.partition('.')[0])
         return family if family and family.topic == 'printers' else None
-    # A name has at least three letters: X_5 is a broken word.
+    # A name must have three letters, because X_5 is a broken word.
     is_name = '_' in name and sum(map(str.isalpha, name)) > 2
     if row is None and is_name:
         start = next(filter(name.startswith, _HARMLESS), 'other names with _')
@@ -336,7 +337,7 @@ def code_named(name: str) -> Code | None:
 
 def code_on_line(name: str, words: Mapping[str, float], *, is_alone: bool) -> Code | None:
     """
-    Return the row of a code with the words of its line; None = the code is not known.
+    Return the row of a code, which can depend on the words of its line; None = not known.
 
     :param is_alone: whether the line has no other code.
     """
@@ -345,7 +346,8 @@ def code_on_line(name: str, words: Mapping[str, float], *, is_alone: bool) -> Co
             return CODES.get(f'G10 L{words["L"]:g}')
         if (
             # With more words than P, G5 is a spline, and not the look-ahead of the row G5 P. In
-            # G80 G43 H1, the H belongs to G43, and the row G80 H does not apply.
+            # G80 G43 H1, the H belongs to G43, and the row G80 H does not apply. With a
+            # coordinate, G92 sets an offset, and not the speed limit of the row G92 S.
             (name == 'G5' and words.keys() != {'P'})
             or (name == 'G80' and not is_alone)
             or (name == 'G92' and not words.keys().isdisjoint('XYZ'))

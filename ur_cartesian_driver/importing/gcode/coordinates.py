@@ -3,10 +3,10 @@
 """
 The position of the tool in the frame of the file, from the coordinates of the program.
 
-A program does not say where the tool is at its beginning, and the machine positions of G28 and G53
+A program does not give the start position of the tool, and the machine positions of G28 and G53
 are not known here. So the position along an axis is unknown before the first absolute coordinate
-of that axis, unless increments come first: then the axis begins at 0, as in RS274/NGC. An axis
-that no line names stays at 0.
+of that axis. If increments come first, the position along the axis starts at 0, as in RS274/NGC.
+An axis that no line names stays at 0.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from typing import NamedTuple
 from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
 
 AXES = 'XYZ'
-#: Two states of an axis: its position is known, or not known yet. A state above 0 means that the
-#: position was lost; the state is the number of the line that lost it.
+#: Two states of an axis: the position along it is known, or not known yet. A state above 0 is the
+#: number of the line that lost the position, see :meth:`Coordinates.lose`.
 _KNOWN, _BEGIN = 0, -1
 
 
@@ -35,10 +35,11 @@ class Coordinates:
 
     def __init__(self) -> None:
         """Begin at an unknown position."""
+        #: The position [m] and the state along each axis, in the order of AXES.
         self.place = [0.0, 0.0, 0.0]
         self.states = [_BEGIN, _BEGIN, _BEGIN]
-        #: ``is_away``: the tool has gone to a machine position since the last point;
-        #: ``has_changed``: the state of an axis has changed since the last point.
+        #: ``is_away``: the tool has gone to a machine position since the last :meth:`record`;
+        #: ``has_changed``: the state of an axis has changed since then.
         self.is_away, self.has_changed = False, True
         #: ``_offsets`` are the present offsets; ``_origin`` are the offsets without G92 and G52.
         self._offsets = self._origin = [_Offset(), _Offset(), _Offset()]
@@ -48,7 +49,7 @@ class Coordinates:
         self._preset_by = ''
         self._is_named, self._was_known = [False, False, False], [False, False, False]
         self._counts_from_zero = [False, False, False]
-        #: Rows of the path, each with the states that the axes have from that row on.
+        #: Rows of the path at which states changed, each with the states from that row on.
         self._history: list[tuple[int, Sequence[int]]] = []
 
     # ---- moves ---------------------------------------------------------------------------------
@@ -74,7 +75,7 @@ class Coordinates:
         return self._is_named[AXES.index(axis)]
 
     def absolute(self, axis: int, coordinate: float) -> float:
-        """Return a coordinate in the frame of the file."""
+        """Convert a coordinate of the program to the frame of the file [m]."""
         return coordinate + self._offsets[axis].length
 
     def lose(self, axes: str, line: int) -> None:
@@ -82,7 +83,7 @@ class Coordinates:
         for axis in map(AXES.index, axes):
             self.is_away = True
             self._set_state(axis, line)
-            # Homing cancels G92 in Marlin but not in RS274/NGC: the offset is now unknown.
+            # Homing cancels G92 in Marlin but not in RS274/NGC, so the offset is now unknown.
             if self._preset_by == 'G92' and self._offsets[axis] != self._origin[axis]:
                 self._set_offset(axis, _Offset(state=line))
 
@@ -133,7 +134,7 @@ class Coordinates:
 
     def shift(self, line: int, offsets: Mapping[int, float]) -> None:
         """
-        Move the origin of the coordinates (G52).
+        Shift the origin of the coordinates [m] from that of the work offset (G52).
 
         :raises BrokenFile: G92 is in use.
         """
@@ -177,7 +178,7 @@ class Coordinates:
         )
 
     def record(self, row: int) -> None:
-        """Record the present states of the axes, which apply from a row of the path on."""
+        """Record that the present states of the axes apply from a row of the path on."""
         self._history.append((row, (*self.states,)))
         for axis, state in enumerate(self.states):
             self._was_known[axis] |= state == _KNOWN

@@ -16,7 +16,7 @@ from ur_cartesian_driver.importing.text_file import file_lines, file_text
 
 def collect_gcode(file: Path, options: ImportOptions, into: PathCollector) -> None:
     """
-    Read a program.
+    Add the points of a program to a path.
 
     :raises BrokenFile: a line is no G-code, or cannot be executed.
     """

@@ -33,11 +33,12 @@ from ur_cartesian_driver.importing.text_file import quoted
 
 _MOTIONS = frozenset(('G0', 'G1', 'G2', 'G3'))
 _OF_MOTION = frozenset('XYZIJKRP')
-# W is no axis on Prusa's printers; on a lathe, U and W are increments along X and Z.
+# The letters of axes with G28, G30 and G53. W is not among them, because it is no axis on Prusa's
+# printers; nor is U, because U and W are increments along X and Z on a lathe.
 _AXIS_WORDS = frozenset('XYZABCE')
 #: Codes that move to a machine position: along the named axes, or along all if none is named.
 _WITH_AXES = ('G28', 'G30', 'G53')
-#: The codes by which a lathe is known, and those that end a feed per turn.
+#: Matches the codes from which _is_lathe() recognises a lathe, and those that end G99 (G94, G98).
 _LATHE_CODE = re.compile(r'G\s*0*(50|92|94|96|98|99)(?![.\d])', re.I)
 #: Matches a move home along X by an increment U, which only a lathe or a wire machine has.
 _LATHE_HOME = re.compile(r'G\s*0*(28|30)(?![.\d]).*U\s*[-+.\d]', re.I)
@@ -46,10 +47,9 @@ _S_WORD, _F_WORD, _AXIS = (
 )
 _CONDITION_END = re.compile(r'\s*M623\b', re.I)
 _UNITS = {'G20': LENGTH_UNITS['in'], 'G21': LENGTH_UNITS['mm']}
-#: The codes of the work offsets; G10 numbers them from 1.
+#: The codes of the work offsets, in the order in which the P of a G10 numbers them from 1.
 _FRAMES = ('G54', 'G55', 'G56', 'G57', 'G58', 'G59', 'G59.1', 'G59.2', 'G59.3')
-#: The words that are the time of a G4 wherever they stand in its line; if there is none of them,
-#: S or F is the time.
+#: Any of these words in the line of a G4 is its time. If the line has none of them, its S or F is.
 _DWELL = 'PXU'
 #: Codes that get a P only if no other code of their line takes it.
 _LEAVE_P = frozenset((*_FRAMES, 'M0', 'M1', 'M2', 'M6', 'M30', 'M60'))
@@ -71,7 +71,8 @@ class GcodeMachine:
         """
         Begin at the first line.
 
-        :param is_sinumerik: names call subprograms, and M17 ends one.
+        :param is_sinumerik: whether names call subprograms and M17 ends them, as on a Sinumerik;
+            such lines are refused.
         """
         self._is_sinumerik = is_sinumerik
         self._lines, self._options, self._into = lines, options, into
@@ -82,7 +83,7 @@ class GcodeMachine:
         self._has_begun = self._seen_percent = False
         self._frame = _FRAMES[0]
         self._surface_speed = False
-        #: Whether F is per turn of the spindle; None = no code has said it yet.
+        #: Whether F is per turn of the spindle; None = no code has determined it yet.
         self._feed_per_turn: bool | None = None
         #: The line of an M622 whose M623 is still to come; 0 = none.
         self._condition = 0
@@ -150,14 +151,15 @@ class GcodeMachine:
             self._move(words)
 
     def _obey(self, codes: Sequence[str], words: _Words, bare: str) -> None:
-        """Execute a line that is more than one motion: other codes, several, or bare letters."""
+        """Execute a line with a code other than G0 to G3, with several codes, or bare letters."""
         rows = [self._row(code, words, is_alone=len(codes) == 1) for code in codes]
         if len(rows) == 1 and rows[0].alone:
             self._do(codes[0], rows[0], words, bare)
             return
         self._check_codes(codes, rows, words)
         own: list[_Words] = [{} for _ in rows]
-        # G64 takes its P and Q first, those in _LEAVE_P last; G64 acts after the unit of its line.
+        # G64 takes its P and Q first; the codes in _LEAVE_P take theirs last. In ``todo``, G64
+        # comes last, so that a G20 or G21 of the line sets the unit of P before.
         order = {
             i: (row.group != PATH_CONTROL, codes[i] in _LEAVE_P) for i, row in enumerate(rows)
         }
@@ -240,7 +242,7 @@ class GcodeMachine:
                 others.discard('S')
             if row.name == 'other M-codes':
                 others &= _OF_MOTION
-            if code != 'G96':  # its S is that of a spindle
+            if code != 'G96':  # because its S is for the spindle anyway
                 self._check_shared(code, values, rows, has_motion=has_motion)
             if others and (row.alone or row.name == 'other M-codes'):
                 raise self._fail(
@@ -250,7 +252,7 @@ class GcodeMachine:
     def _check_shared(
         self, code: str, own: _Words, rows: Sequence[Code], *, has_motion: bool
     ) -> None:
-        """Refuse an S or F of a code that the spindle or the motion of its line could mean."""
+        """Refuse an S or F that could belong to a code or to the spindle or motion of its line."""
         has_spindle = any(row.group == 'spindle' for row in rows)
         for letter, is_shared in (('S', has_spindle), ('F', has_motion)):
             if letter in own and is_shared:
@@ -261,7 +263,7 @@ class GcodeMachine:
     def _check_path_control(
         self, code: str, own: _Words, codes: Sequence[str], rows: Sequence[Code]
     ) -> None:
-        """Refuse a P or Q of G64 that is no tolerance, or that another code could mean."""
+        """Refuse a P or Q of G64 that is negative, or that could belong to another code."""
         for letter, value in own.items():
             if value < 0.0:
                 raise self._fail(f'{code} {letter}{value:g} is no tolerance')
@@ -287,7 +289,7 @@ class GcodeMachine:
             )
 
     def _leave_out(self, code: str, row: Code, own: _Words) -> None:
-        """Switch the output of an M-code, or else say that the code is left out."""
+        """Switch the output of an M-code, or else add the remark that the code is left out."""
         if code[0] == 'M' and (row.reason == NO_OUTPUT or code in self._outputs):
             self._outputs.switch(self._line, code, own)
         else:
@@ -363,7 +365,7 @@ class GcodeMachine:
         self._path.share_of_x = 0.5 if code == 'G7' else 1.0
 
     def _set_path_control(self, code: str, own: _Words) -> None:
-        """Set how far corners may be rounded (G64 P), or that the tool stops there (G61)."""
+        """Set the tolerance for rounding corners (G64 P), or stop at them (G61)."""
         if self._options.blend:
             self._omit(code, 'the option blend says where the tool stops')
             return
@@ -417,7 +419,7 @@ class GcodeMachine:
         self._path.coordinates.cancel_preset(code, self._line)
 
     def _set_table(self, code: str, own: _Words) -> None:
-        """Set the present coordinates (G10 L20); leave out or refuse a work offset (G10 L2)."""
+        """Set the present coordinates (G10 L20), or leave out or refuse a work offset (G10 L2)."""
         number = own.get('P', 0.0)
         kind = f'{code} L{own["L"]:g}'
         if number and (number not in range(1, 10) or _FRAMES[int(number) - 1] != self._frame):
@@ -477,7 +479,8 @@ class GcodeMachine:
         """
         Return whether the program is for a lathe.
 
-        It has a surface speed, or limits it, or feeds per turn, or goes home along U without V.
+        It sets a surface speed (G96), limits the spindle speed (G50 S, G92 S), gives a feed per
+        turn (G99), or goes home along U without having V words.
         """
         per_turn = False
         for line in self._lines:
@@ -496,7 +499,7 @@ class GcodeMachine:
 
     @cached_property
     def _has_v(self) -> bool:
-        """Return whether there are V words: U is then an axis of a wire, no increment along X."""
+        """Return whether there are V words, so that U is an axis of a wire, not along X."""
         return any(re.search(r'V\s*[-+.0-9]', line, re.I) for line in self._lines)
 
 

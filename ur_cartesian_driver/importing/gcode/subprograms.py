@@ -70,7 +70,7 @@ class LineSequence:
         self._next = len(self._lines)
 
     def never_executed(self) -> Iterator[int]:
-        """Yield the numbers of the lines with words that were not executed."""
+        """Yield the numbers of the lines that have words and were not executed."""
         row = self._is_executed.find(False)
         while row >= 0:
             if _COMMENT.sub('', self._lines[row]).strip(' \t%'):
@@ -79,9 +79,10 @@ class LineSequence:
 
     def check_program_number(self, line: int, number: int, *, is_first: bool) -> None:
         """
-        Accept an O number at the program's beginning.
+        Accept an O number that is executed only if it is the first line of the main program.
 
-        :raises BrokenFile: execution has run into a later O number.
+        :param is_first: whether no code or word has been executed before.
+        :raises BrokenFile: execution has run into another O number.
         """
         if self._calls:
             raise BrokenFile(
@@ -118,7 +119,9 @@ class LineSequence:
 
     def back(self, line: int, words: dict[str, float]) -> bool:
         """
-        Repeat the subprogram or continue after its call (M99); return False in the main program.
+        Repeat the subprogram, or continue after its call (M99).
+
+        In the main program, end it and return False.
 
         :raises BrokenFile: M99 names a line to continue at, or is in the main program before an
             M2 or M30.

@@ -41,14 +41,15 @@ class CodeOutputs:
 
     @property
     def drives_power(self) -> bool:
-        """Return whether S keeps an output on."""
+        """Return whether the output of S is on."""
         return bool(self._power_output and self._power and self._spindle != _SPINDLE_OFF)
 
     def set_power(self, line: int, value: float, *, beside_spindle: bool) -> None:
         """
-        Set the power, the number of an S word.
+        Set the power to the number of an S word.
 
-        :param beside_spindle: whether M3, M4 or M5 is on the same line, and so acts next.
+        :param beside_spindle: whether M3, M4 or M5 is on the same line, so that :meth:`switch`
+            follows.
         """
         changed, self._power = value != self._power, value
         by_value = any(values for code in ('M3', 'M4') for values in self._keys.get(code, ()))
@@ -64,8 +65,8 @@ class CodeOutputs:
         Switch the outputs that the options give for a code.
 
         :param values: the words that belong to the code.
-        :raises BrokenFile: the code has values, but the options give its output without any; or S
-            is out of range.
+        :raises BrokenFile: the code has values, but the options give an output only for the code
+            without values; or S is out of range.
         """
         if code in ('M3', 'M4', 'M5'):
             was_on, self._spindle = self._spindle != _SPINDLE_OFF, code

@@ -35,7 +35,7 @@ class Toolpath:
         #: Factor on X: 0.5 if X is a diameter (G7), 1 if it is a radius (G8); None = not given.
         self.share_of_x: float | None = None
         self._has_begun = False
-        #: Allowed distance of the tool from a corner, in ``_corner_unit``; 0 = the tool stops at
+        #: Distance by which the tool may miss a corner, in ``_corner_unit``; 0 = the tool stops at
         #: the corner, None = as the options say.
         self._corner: float | None = None
         #: The unit of ``_corner`` [m]; None = the first unit in the file.
@@ -59,7 +59,7 @@ class Toolpath:
 
     def set_corner(self, number: float | None) -> None:
         """
-        Set the allowed distance of the tool from the following corners.
+        Set the distance by which the tool may miss the following corners.
 
         :param number: the distance in the unit of lengths; 0 = the tool stops at each corner,
             None = as the options say.
@@ -67,7 +67,7 @@ class Toolpath:
         self._corner, self._corner_unit = number, self.unit
 
     def _corner_at(self, line: int) -> float | None:
-        """Return the allowed distance [m] from the corner after a motion; None = as in options."""
+        """Return the distance [m] by which the tool may miss the corner; None = as in options."""
         if not self._corner:
             return self._corner
         if self._corner_unit is None:

@@ -26,7 +26,7 @@ from ur_cartesian_driver.importing.text_file import quoted
 #: Matches a comment.
 COMMENT = re.compile(r'\([^()]*\)|;.*')
 _MESSAGE = re.compile(r'\(\s*(MSG|DEBUG|PRINT|LOG)\s*,', re.I)
-# Replaces each comment until the check that no comment divides a word. No text file has this
+# Stands for each comment until it is checked that no comment divides a word. No text file has this
 # character.
 _MARK = '\0'
 _DIVIDED_WORD = re.compile(rf'[A-Z]{_MARK}+[-+.0-9]|[-+.0-9]{_MARK}+[.0-9]')
@@ -46,7 +46,7 @@ _NAME = re.compile(r'\s*([A-Za-z_]{2}\w*)')
 _PROGRAM_NUMBER = re.compile(r'[O:]([0-9]{1,8})')
 # Matches Fanuc's name of a program, which follows the program's number or replaces it.
 _PROGRAM_NAME = re.compile(r'<[^<>]+>$')
-# Matches a printer's commands. A CNC writes T1 S500, too, so a T needs an L to be a printer's.
+# Matches the commands of TOOLS_OF_PRINTER. A T must have an L, because a CNC writes T1 S500, too.
 _TOOL_OF_PRINTER = re.compile(r'(?:T[0-9]+S[01]L[0-2]|P[0-9]+S[01](?:L[0-2])?)(?:D[01])?')
 
 
@@ -125,7 +125,7 @@ def _code_name(letter: str, value: str) -> str:
 
 
 def _printer_code(text: str) -> str | None:
-    """Return the M-code of a line if text or non-numeric values follow it, else None."""
+    """Return the M-code of a line whose other text is not to be read as words, else None."""
     match = _M_CODE.match(text)
     entry = code_named(name := _code_name('M', match[1])) if match else None
     if match is None or entry is None:
@@ -144,7 +144,7 @@ def _is_one_command(line: str, text: str) -> bool:
 
 
 def _odd_block(number: int, line: str, text: str) -> Block:
-    """Return the block of a line that does not consist of words with numbers."""
+    """Return the block of a line that begins with O, or is not made of words with numbers."""
     first = text[:1]
     if first in ('%', '/', ''):
         return Block([first] if first else [], {})

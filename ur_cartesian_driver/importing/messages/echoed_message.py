@@ -5,7 +5,7 @@ Messages as ``ros2 topic echo`` and ``rostopic echo`` print them.
 
 Such a text is YAML with a document for each message, and consists of mappings, lists, numbers and
 texts only. Every parsed value carries its line number. Only PyYAML's event parser is used, because
-the texts of its other errors and its limits on nesting differ between versions.
+in its later stages, the error texts and the limits on nesting differ between versions.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 _MAX_DEPTH = 50
 _END_OF_MESSAGE = re.compile(r'^---[ \t]*$', re.MULTILINE)
 _BLANK_LINES = re.compile(r'(?:[ \t]*\n)*')
-#: The notice of a lost message; the hyphens at its end are not on a line of their own.
+#: Matches the notice of a lost message, whose final hyphens are not on a line of their own.
 _LOST = re.compile(r'^A message was lost!!!\n\ttotal count change:.*\n\ttotal count:.*---$', re.M)
 #: Matches the directives that YAML allows before the first document.
 _DIRECTIVES = re.compile(r'\A(?:%(?:YAML|TAG)[ \t][^\n]*\n)+(?=---)')
@@ -59,7 +59,7 @@ class MessagePart:
 
 
 class MessageList(list[Any]):
-    """A list with its line."""
+    """A list with its line number."""
 
     def __init__(self, line: int) -> None:
         """Begin empty."""
@@ -68,13 +68,13 @@ class MessageList(list[Any]):
 
 
 class MessageNumber(float):
-    """A number with its line."""
+    """A number with its line number."""
 
     line: int
 
 
 class MessageText(str):
-    """A text with its line."""
+    """A text with its line number."""
 
     line: int
 
@@ -91,9 +91,9 @@ class EchoedMessage:
 
     def read(self) -> MessagePart:
         """
-        Return the fields.
+        Return the fields of the message.
 
-        :raises BrokenFile: the text is no message, or is cut off.
+        :raises BrokenFile: the text is no message, is several messages, or is cut off.
         """
         if strange := _FORBIDDEN.search(self.text):
             line = self.line + self.text.count('\n', 0, strange.start())
@@ -117,7 +117,7 @@ class EchoedMessage:
         return values[0]
 
     def _no_message(self, row: int) -> BrokenFile:
-        """Return the error for invalid YAML; ``row`` is where PyYAML failed."""
+        """Return the error for invalid YAML; ``row`` is the line (from 0) where PyYAML failed."""
         lines = self.text.split('\n')
         row = min(row, len(lines) - 1)
         if '\t' in lines[row][: len(lines[row]) - len(lines[row].lstrip())]:
@@ -128,7 +128,7 @@ class EchoedMessage:
 
 
 def echoed_messages(text: str, remarks: ImportNotes) -> list[EchoedMessage]:
-    """Split a text into its messages, without reading them."""
+    """Split a text into its messages without parsing them; note lost messages in ``remarks``."""
     text = text.replace('\r\n', '\n').replace('\r', '\n').translate(_NO_LINE_ENDS)
     text = _DIRECTIVES.sub(lambda found: '\n' * found[0].count('\n'), text)
     for lost in _LOST.finditer(text):
@@ -152,7 +152,7 @@ def _value(event: Any, events: Iterator[Any], first: int, depth: int) -> Any:
     """
     Return the value that begins with an event of PyYAML.
 
-    :param first: the line of the file at which the text begins that PyYAML parses.
+    :param first: the line of the file in which the parsed text begins.
     :raises BrokenFile: the value is a reference or is nested too deeply, or a field in it has no
         name or occurs twice.
     """
