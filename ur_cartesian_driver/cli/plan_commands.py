@@ -4,8 +4,8 @@
 ``ur-cartesian validate`` and ``show``: check and plan a goal without a driver.
 
 The command line gives the values that a driver would read from its robot: model, calibration,
-joint positions and TCP. Only ``show --live`` reads joint positions and TCP from a robot. There are
-no tf2 frames.
+joint positions and TCP. Only ``show --live`` reads joint positions and TCP from a robot. No frames
+are looked up in tf2.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 #: Default address on which pages are served.
 LOOPBACK = '127.0.0.1'
-#: Packets per second; pause before a new attempt to connect to a lost robot [s].
+#: Rate at which robot states are read [Hz]; pause before the robot is connected again [s].
 LIVE_RATE, RECONNECT_PERIOD = 20.0, 1.0
 
 
@@ -69,7 +69,7 @@ def validate(arguments: argparse.Namespace) -> int:
 
 
 def show(arguments: argparse.Namespace) -> int:
-    """Write or open the page of a goal, even of a refused one, or follow a robot."""
+    """Write or open a page that shows a goal, even a refused one; with --live, follow a robot."""
     from ur_cartesian_driver.preview import motion_page, refusal_page
 
     if arguments.live:
@@ -168,8 +168,8 @@ class GoalPlanning:
         """
         Read the parameters and the goal.
 
-        :param robot: the state of the robot; None = the state that the arguments give.
-        :param model: name of the arm's model; empty = the one that the arguments give.
+        :param robot: the state of the robot; None = the arm rests as the arguments say.
+        :param model: name of the arm's model; empty = the arguments or the parameters name it.
         """
         from ur_cartesian_driver.planning.preflight.clearance import self_collision_remark
         from ur_cartesian_driver.ros.parameters.parameter_files import read_settings

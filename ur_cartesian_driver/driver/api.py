@@ -3,9 +3,9 @@
 """
 The Python API: plan, execute and stop motions of one robot, with no ROS running.
 
-A :class:`Driver` plans in the process of its owner. A robot loop, in its own process or thread,
-holds all sockets to the robot; the driver sends it requests and gets notifications back
-(:mod:`~.ipc.channel`).
+A :class:`Driver` plans in the process of its owner, which is the code that creates it. The *robot
+loop*, in its own process or thread, holds all sockets to the robot; the driver sends requests to
+it and receives notifications from it (:mod:`~.ipc.channel`).
 """
 
 from __future__ import annotations
@@ -94,9 +94,10 @@ from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, Serv
 NO_STATE = 'The robot does not report its state.'
 LOOP_LOST = 'The robot loop ended unexpectedly, or hangs; the robot program stops the arm.'
 
-#: Longest time from the cancel of a motion to its outcome [s], whatever the robot does.
+#: Longest wait for the outcome of a cancelled motion [s]: the robot loop gives an outcome within
+#: this time, whatever the robot does.
 CANCEL_TIMEOUT = 2.0 * STOP_TIMEOUT + 1.0
-# Joint changes up to this [rad], about a mm at the tool, do not count as motion.
+# The arm counts as unmoved if no joint has changed by more than this [rad], a mm at the tool.
 _SAME_JOINTS = 1e-3
 
 
@@ -112,8 +113,8 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
             motion = driver.start(plan)  # returns at once
             outcome = motion.result()
 
-    :meth:`execute` does the last three steps in one call. Callbacks run on the driver's own reader
-    thread: keep them short.
+    :meth:`execute` does the last three steps in one call. Callbacks run on the thread that reads
+    the notifications of the robot loop: keep them short.
     """
 
     def __init__(
@@ -130,7 +131,8 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
 
         :param frames: the frames that paths can name; None = the standard frames.
         :param auto_heartbeat: whether a thread of the driver sends the heartbeats. An owner that
-            can hang (a ROS executor) sets False and calls :meth:`heartbeat` itself.
+            can hang (a ROS executor) sets False and calls :meth:`heartbeat` itself, so that the
+            arm stops if the owner hangs.
         :param logger: receives the driver's messages; each of several drivers may have its own.
         :raises ValueError: ``ur_type`` is unknown.
         """
@@ -165,7 +167,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
     # ---- connection ---------------------------------------------------------------------------
 
     def open(self) -> None:
-        """Start the robot loop and return; it connects and reconnects by itself."""
+        """Start the robot loop and return; the loop connects, and reconnects, by itself."""
         if remark := self_collision_remark(self.config.ur_type, self.options):
             self._log.warning('%s', remark)
         if functions := self.config.prelude.functions:
@@ -180,12 +182,16 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         """Stop a running motion and end the robot loop and all threads. May be called twice."""
         if not self._loop.close():
             return
-        # The status is set first, so that new motions, which would never end, are refused.
+        # Set the status first: it refuses new motions, which would never end without the loop.
         self._robot.set_status(ConnectionStatus(message='The driver is closed; open it.'))
         self._running.abort('The driver was closed.')
 
     def heartbeat(self) -> None:
-        """Tell the robot loop that the owner is alive, at least once every ``node_timeout``."""
+        """
+        Tell the robot loop that the owner is alive.
+
+        The loop stops the arm if it gets no heartbeat for ``node_timeout``.
+        """
         self._send(OwnerHeartbeat())
 
     # ---- state and status ---------------------------------------------------------------------
@@ -225,12 +231,12 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
 
     @property
     def signals(self) -> Signals | None:
-        """Inputs, outputs and tool; None before the first report and while disconnected."""
+        """The robot's inputs and outputs; None before the first report and while disconnected."""
         return self._robot.signals
 
     @property
     def gaps(self) -> LinkGaps:
-        """The longest recent gaps between robot states and between keepalives."""
+        """The longest gaps between robot states, and between keepalives to the robot program."""
         return self._robot.gaps
 
     @property
@@ -239,16 +245,16 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         return self._robot.arm
 
     def add_status_listener(self, callback: Callable[[ConnectionStatus], None]) -> None:
-        """Call back with each new status, and at once with the present one."""
+        """Call ``callback`` with each new status, and at once with the present one."""
         self._robot.status_listeners.append(callback)
         callback(self.status)
 
     def add_servo_listener(self, callback: Callable[[ServoReport], None]) -> None:
-        """Call back with each report on the streamed set-points of a motion."""
+        """Call ``callback`` with each report on set-points that the driver streams."""
         self._robot.servo_listeners.append(callback)
 
     def add_pulse_listener(self, callback: Callable[[Pulse], None]) -> None:
-        """Call back with each pulse of a goal (``pulses``), in order."""
+        """Call ``callback`` with each output pulse of a goal's ``pulses``, in order."""
         self._robot.pulse_listeners.append(callback)
 
     def wait_ready(self, timeout: float) -> None:
@@ -265,7 +271,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
 
     def plan(self, goal: Goal | Path | JointGoal) -> ArmPlan:
         """
-        Check a goal and choose its primitives, starting from :attr:`rest_state`; nothing moves.
+        Check a goal and choose the robot's motions for it, from :attr:`rest_state`; nothing moves.
 
         ``plan(goal).show()`` opens a page with the arm on its path.
 
@@ -288,7 +294,9 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
 
     def renewed(self, plan: Plan) -> Plan:
         """
-        Return the plan, or a new one if it begins with a travel and the arm moved meanwhile.
+        Return ``plan``, or a new one if the plan begins with a travel and the arm has moved since.
+
+        A travel is a motion through the air, from the position of the arm to the first point.
 
         :raises GoalRefused: the goal fails a check from the present position of the arm.
         :raises RobotNotReady: the robot does not report its state.
@@ -324,7 +332,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         A plan that begins with a travel is renewed first, see :meth:`renewed`.
 
         :raises RobotNotReady: the robot program is not connected, a motion is running, or the plan
-            was made for another robot program.
+            was made for a robot program other than the running one.
         :raises GoalRefused: the cell has changed since the plan was made, and the arm would touch
             it; or :meth:`renewed` refuses the goal.
         :raises LocalProtocolError: a value of the plan does not fit into a message.
@@ -358,7 +366,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         preempt: bool = False,
     ) -> Outcome:
         """
-        Plan and run a goal or path, and wait for its outcome; a refusal is an outcome too.
+        Plan and run a goal or path, and wait for its outcome; a refused goal has an outcome, too.
 
         :param preempt: whether to stop a running motion for this goal, once the goal has passed
             all checks from the position where the arm is predicted to come to rest; False =
@@ -419,7 +427,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
 
     @property
     def progress(self) -> Progress | None:
-        """The newest progress report of the running motion; None = there is none."""
+        """The newest progress report of the running motion; None = no motion or no report yet."""
         motions = self._running.handles
         return motions[0].progress if motions else None
 
@@ -436,7 +444,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
 
     def call(self, call: ServiceCall) -> Future[ServiceAnswer]:
         """
-        Start a call and return at once; the future always gets an answer, never an error.
+        Start a service call and return at once; the future gets an answer even if the call fails.
 
         :raises LocalProtocolError: the argument is not a :class:`ServiceCall`.
         """
@@ -476,7 +484,7 @@ class Driver(RobotServices, InteractiveMotions, ChangeableCell):
         return goal
 
     def _options_for(self, state: RobotState) -> PlanningOptions:
-        """Return the planning options, completed with reports of the connected robot."""
+        """Return the planning options, completed with the properties of the connected robot."""
         status = self.status
         return self.options.for_program(
             self.config,

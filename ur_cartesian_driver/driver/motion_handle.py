@@ -32,13 +32,13 @@ from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 OnProgress = Callable[[Progress], None]
 
 
-#: Why clients cannot slow a motion whose goal has no ``feed_override``: field, problem, remedy.
+#: Field, problem and remedy of the error if a goal without ``feed_override`` is to be slowed.
 NO_FEED_OVERRIDE = (
     'feed_override',
     'is not set in the running goal',
     'set its minimum in the goal',
 )
-#: The same for all motions, if an input of the robot gives the signal.
+#: Likewise if the parameter ``feed_override_input`` is set: then no client can slow a motion.
 HAS_FEED_INPUT = (
     'feed_override_input',
     'names an input of the robot, whose signal slows all goals',
@@ -56,16 +56,16 @@ class MotionHandle:
         send: Callable[[Request], None],
         make_report: Callable[[], object],
     ) -> None:
-        """Wrap a running motion; :meth:`~.api.Driver.start` makes handles."""
+        """Wrap a running motion; users get handles from :meth:`~.api.Driver.start`."""
         self.number = number
         self._outcome, self._send, self._make_report = outcome, send, make_report
         #: Appends points; None = the goal was sent without keep_open. Set by the driver.
         self.appender: Appender | None = None
-        #: The largest age of path offsets [s]; None = the goal permits no offsets. Set by the
-        #: driver.
+        #: Largest accepted age of a path offset [s]; None = the goal permits no offsets. Set by
+        #: the driver.
         self.offset_timeout: float | None = None
-        #: Why clients cannot slow the motion: field, problem, remedy; None = they can. Set by the
-        #: driver.
+        #: Field, problem and remedy of the error that :meth:`set_feed_override` raises; None =
+        #: the motion can be slowed. Set by the driver.
         self.feed_problem: tuple[str, str, str] | None = NO_FEED_OVERRIDE
         #: The newest progress report; None before the first report.
         self.progress: Progress | None = None
@@ -120,8 +120,8 @@ class MotionHandle:
         :raises AlreadySent: the tail can no longer be replaced, because it was passed or sent; the
             error gives the first point and time that are still replaceable.
         :raises GoalRefused: a check or the robot loop refused the points, as the text explains; no
-            point was accepted, and the goal goes on. Only if the loop did not answer, it is
-            unknown whether it accepted the points.
+            point was accepted, and the goal goes on. The exception is a loop that did not answer:
+            it may have accepted the points.
         """
         if self.appender is None:
             raise RobotNotReady('The goal was sent without keep_open: nothing can be appended.')
@@ -142,9 +142,9 @@ class MotionHandle:
         """
         Displace the tool from its path from now on; ignored by a motion that has ended.
 
-        :param along: offset along the path [m]. Like ``across`` and ``normal`` it is in the frame
-            of the path (:mod:`~ur_cartesian_driver.motion.plan.offset_band`), and bounded by
-            ``path_offset.limits`` of the goal.
+        :param along: offset along the tangent of the path [m]. The module
+            :mod:`~ur_cartesian_driver.motion.plan.offset_band` defines the directions of
+            ``across`` and ``normal``; ``path_offset.limits`` of the goal bounds all three.
         :param age: time since the offset was measured [s].
         :raises InvalidGoal: the goal permits no offset, a value is not a finite number, or the age
             is negative or more than ``path_offset.timeout``; the previous offset stays.
@@ -173,14 +173,16 @@ class MotionHandle:
         """
         Slow the motion from now on; ignored by a motion that has ended.
 
-        The motion runs at the fraction times the speed slider, within the bounds and at the rate
-        of ``feed_override`` of the goal. Call it again before ``feed_override.timeout`` has
-        passed: a stale or invalid fraction brings the motion to ``feed_override.minimum``.
+        The motion then runs at ``fraction``, multiplied by the robot's speed slider. The goal's
+        ``feed_override`` sets the bounds of the fraction, and the rate at which it changes. Call
+        the method again before ``feed_override.timeout`` has passed: a stale or invalid fraction
+        brings the motion to ``feed_override.minimum``.
 
-        :param fraction: of the planned speed, 0 to 1; all other numbers, and NaN, are invalid.
+        :param fraction: fraction of the planned speed, 0 to 1; all other numbers, and NaN, are
+            invalid.
         :param age: time since the fraction was measured [s].
         :raises InvalidGoal: the goal has no feed override, an input of the robot gives the signal
-            (parameter ``feed_override_input``), or a value is not a number.
+            (parameter ``feed_override_input``), or an argument has no numeric type.
         """
         if self.feed_problem is not None:
             raise InvalidGoal(*self.feed_problem)
@@ -202,16 +204,20 @@ class MotionHandle:
         :raises TimeoutError: no outcome came within ``timeout`` [s]; the motion goes on.
         """
         if timeout is None:
-            self._make_report()  # now, because the arm moves and this thread has to wait
+            self._make_report()  # while the arm moves, as this thread has to wait anyway
         return self._outcome.result(timeout)
 
     def add_done_callback(self, callback: Callable[[Outcome], None]) -> None:
-        """Call back with the outcome, from the driver's reader thread or at once."""
+        """
+        Call ``callback`` with the outcome, as soon as it arrives or at once if it has arrived.
+
+        A later call comes from the thread that delivers the outcome, usually the driver's.
+        """
         self._outcome.add_done_callback(lambda future: callback(future.result()))
 
 
 class ActiveMotion:
-    """The driver's side of a motion: its progress and its end."""
+    """The driver's side of a running motion: passes on the progress and the outcome."""
 
     def __init__(
         self,
@@ -228,13 +234,13 @@ class ActiveMotion:
 
         :param send: sends requests to the robot loop.
         :param log: receives the exceptions of ``on_progress``.
-        :param path: follows the progress; None = the motion has no planned path.
+        :param path: receives the progress reports, too; None = the motion has no planned path.
         """
         self._outcome: Future[Outcome] = Future()
         self._on_progress, self._log = on_progress, log
         #: Guards the attributes below.
         self._lock = threading.Lock()
-        #: The plan; None once a thread makes its report.
+        #: The plan; None once a thread has taken it to make its report.
         self._plan: Plan | None = plan
         #: The report of the plan; None before it is made.
         self._plan_report: tuple[str, ...] | None = None
@@ -272,7 +278,7 @@ class ActiveMotion:
             self._give(ended, report)
 
     def report(self, progress: Progress) -> None:
-        """Keep a progress report of the robot loop, and pass it on."""
+        """Store a progress report of the robot loop; pass it to the path and ``on_progress``."""
         self.motion.progress = progress
         if self.path is not None:
             self.path.report(progress)

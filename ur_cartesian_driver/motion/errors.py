@@ -18,7 +18,7 @@ The errors of this package: a class, with the action's code, for each way a goal
     |   |-- JointLimitExceeded       the path leaves the range of a joint
     |   |-- CollisionPredicted       the arm would hit itself, a plane or a body
     |   `-- RobotNotReady            not connected, not powered, program not running, busy
-    |-- ExecutionEnded           a goal ended before its last point
+    |-- ExecutionEnded           an accepted goal ended without success
     |   |-- PathToleranceViolated, GoalToleranceViolated
     |   |-- ProtectiveStop, EmergencyStop, ProgramStopped, ConnectionLost
     |   |-- Preempted, Cancelled
@@ -27,7 +27,7 @@ The errors of this package: a class, with the action's code, for each way a goal
         |-- LocalProtocolError       we tried to send something illegal; nothing was sent
         `-- RemoteProtocolError      the robot sent nonsense; its bytes are in the text
 
-:data:`ERRORS` is the table of codes and classes, which ``Outcome.raise_for_error()`` uses.
+:data:`ERRORS` maps each code to its class; ``Outcome.raise_for_error()`` uses it.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class ErrorCode(IntEnum):
     ROBOT_NOT_READY = -18
 
 
-#: Longest text of a user that an error quotes in full.
+#: Longest text of a user that an error quotes in full [characters].
 _MAX_ECHO = 80
 
 
@@ -74,7 +74,7 @@ def shortened(text: str) -> str:
 
 
 def suggestion(name: str, known: Iterable[str], otherwise: str) -> str:
-    """Return the advice on an unknown name: the nearest known one, else ``otherwise``."""
+    """Return the advice on an unknown name: the most similar known name, else ``otherwise``."""
     near = get_close_matches(name, list(known), n=1)
     return f'did you mean {near[0]}?' if near else otherwise
 
@@ -84,16 +84,16 @@ class DriverError(Exception):
 
     #: The action's code for this error.
     code: ClassVar[ErrorCode]
-    #: The report of the failed goal if the error was raised from its outcome; else empty.
+    #: The report of the failed goal if the error was made from its outcome; else empty.
     report: tuple[str, ...] = ()
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Copy and pickle by the text, because some constructors take only parts of it."""
+        """Copy and pickle by the text, because some constructors build it from other values."""
         return _restore, (type(self), str(self)), self.__dict__
 
 
 class GoalRefused(DriverError):
-    """A goal was refused before anything moved, or the rest of it because the cell changed."""
+    """A goal was refused before it moved the arm, or its rest was, because the cell changed."""
 
     def reworded(self, sentence: str) -> GoalRefused:
         """Return the same refusal with another sentence."""
@@ -104,7 +104,7 @@ class InvalidGoal(GoalRefused):
     """The goal contradicts itself or the rules; the text names point and field."""
 
     code = ErrorCode.INVALID_GOAL
-    #: The wrong field; empty if the error was raised from an outcome.
+    #: The wrong field; empty if the error was made from an outcome.
     field = ''
 
     def __init__(self, field: str, problem: str, remedy: str = '') -> None:
@@ -187,13 +187,15 @@ class CollisionPredicted(GoalRefused):
     code = ErrorCode.COLLISION
     #: The joint positions at the collision [rad]; None if they are not known.
     q: tuple[float, float, float, float, float, float] | None = None
-    #: The names of the two bodies, of the cell or of the arm's links; empty if not known.
+    #: The names of the two bodies that would touch (bodies of the cell or links of the arm);
+    #: empty if not known.
     bodies: tuple[str, ...] = ()
-    #: The :class:`~.cell.Cell` at the collision, with the parts moved so far; None = not known.
+    #: The :class:`~.cell.Cell` at the time of the collision, when the goal may have moved parts
+    #: already; None = not known.
     cell: object = None
 
     def reworded(self, sentence: str) -> GoalRefused:
-        """Return the same refusal, of the same place and bodies, with another sentence."""
+        """Return the same refusal, with the same joints, bodies and cell but another sentence."""
         error = super().reworded(sentence)
         error.__dict__.update(self.__dict__)
         return error
@@ -206,7 +208,7 @@ class RobotNotReady(GoalRefused):
 
 
 class ExecutionEnded(DriverError):
-    """A goal ended before its last point."""
+    """An accepted goal ended without success."""
 
 
 class PathToleranceViolated(ExecutionEnded):

@@ -22,15 +22,19 @@ T = TypeVar('T')
 
 #: Poses that differ by no more than this count as the same [m], [rad].
 SAME_POSITION, SAME_ANGLE = 1e-6, 1e-6
-#: Direction cosine of two axes up to which the axes count as perpendicular.
+#: Two axes count as perpendicular up to this cosine of the angle between them.
 _ALIGNED = 1e-12
-#: The fields of a point that are rates.
+#: The fields of a waypoint that are rates, which are derivatives of its pose over time.
 RATES = ('twist', 'acceleration', 'jerk')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Feed:
-    """Settings of motions, which hold until they are changed; 0 = the driver's default."""
+    """
+    Settings of a path's motions, which hold until they are changed [m, rad, s].
+
+    A value of 0 selects the driver's default.
+    """
 
     speed: float = 0.0
     acceleration: float = 0.0
@@ -52,12 +56,13 @@ class PathPoint:
     segment: Segment = field(default_factory=Segment)
     #: Duration of the motion [ns]; 0 = the speed decides.
     duration: int = 0
-    #: The events that happen or begin here, with waypoints numbered as if this were point 0. An
-    #: event that has to end, but whose last waypoint is 0, has no end yet.
+    #: The events that happen or begin here; their waypoint indices count from this point. If an
+    #: event covers several points, a last waypoint of 0 means that its end is not known yet.
     events: tuple[Any, ...] = ()
-    #: Whether the blend comes from the feed; if so, it is left out at the last point of a path.
+    #: Whether the blend comes from the :class:`Feed`, not from the motion; if so, the last point
+    #: of a path gets no blend.
     feed_blend: bool = False
-    #: Whether the blend is chosen when the path becomes a goal.
+    #: Whether the driver chooses the blend when the path becomes a goal.
     auto_blend: bool = False
     #: Whether a spline leads to the point.
     in_spline: bool = False
@@ -85,8 +90,8 @@ def with_fields(where: str, record: T, fields: Mapping[str, Any]) -> T:
     """
     Return a goal or a segment with other values in some of its fields.
 
-    :param where: the name of the goal or segment in a refusal.
-    :raises InvalidGoal: a field cannot have the value.
+    :param where: the name of the goal or segment in error messages.
+    :raises InvalidGoal: a field does not accept its new value.
     """
     kind: type[T] = type(record)
     try:
@@ -98,7 +103,7 @@ def with_fields(where: str, record: T, fields: Mapping[str, Any]) -> T:
 
 
 def point_fields(segment: Segment) -> dict[str, Any]:
-    """Return the fields of a segment that belong to the point where it ends."""
+    """Return the names and values of a segment's fields that concern only its end point."""
     return {
         each.name: getattr(segment, each.name) for each in goal_fields(Segment) if each.is_of_point
     }
@@ -106,9 +111,11 @@ def point_fields(segment: Segment) -> dict[str, Any]:
 
 def moved(point: PathPoint, T: Pose, where: str) -> PathPoint:
     """
-    Return a point with its poses and rates transformed by a pose in its frame.
+    Return a point moved by ``T``: poses become ``T @ pose``, and rates turn with ``T``.
 
-    :raises InvalidGoal: a rate has free and given components, which the transform would mix.
+    :param where: the name of the operation in error messages.
+    :raises InvalidGoal: a rate has both free (NaN) and given components, which the rotation would
+        mix.
     """
     waypoint, via = point.waypoint, point.segment.via
     rates: dict[str, Any] = {
@@ -129,7 +136,7 @@ def _turned(rates: Vector6, q: Quaternion, where: str, name: str) -> Vector6:
 
 
 def _rotated(q: Quaternion, v: Vector3, where: str, name: str) -> Vector3:
-    """Return a rotated vector; NaN is a free component."""
+    """Return a rotated vector; NaN stands for a component that the driver chooses."""
     if not any(map(isnan, v)):
         return rotate(q, v)
     axes = [rotate(q, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
@@ -158,13 +165,17 @@ def seen_from(
     quintic: bool,
 ) -> PathPoint:
     """
-    Return a point as passed by another frame on the tool, whose pose is ``T_tool_new``.
+    Return a point given for the tool as a point for another frame on the tool.
 
+    :param T_tool_new: the pose of the other frame in the frame of the tool.
     :param before: the pose of the preceding point or start; None = not known.
     :param after: the pose of the following point; None = there is none.
-    :param quintic: whether the path gives accelerations; if not, they stay 0, which means none.
-    :raises InvalidGoal: the tool turns on an arc; or it turns at a point of a spline in a way that
-        the driver chooses, so that the other frame's speed is not known.
+    :param where: the name of the operation in error messages.
+    :param quintic: whether the points of the path give accelerations; if not, the acceleration
+        stays 0, which means that none is given.
+    :raises InvalidGoal: the tool turns on an arc, so that the other frame leaves the arc; or the
+        driver chooses how the tool turns at a point of a spline, so that the other frame's speed
+        is not known.
     """
     waypoint, segment = point.waypoint, point.segment
     offset = rotate(waypoint.pose.quaternion, T_tool_new.position)
@@ -208,13 +219,17 @@ def seen_from(
 
 
 def _turn_of(rates: Vector6, turns: bool) -> Vector3:
-    """Return the angular rates; free ones are 0 where the tool does not turn."""
+    """Return the angular part of rates; free (NaN) components are 0 if the tool does not turn."""
     a, b, c = (x if turns or not isnan(x) else 0.0 for x in rates[3:])
     return (a, b, c)
 
 
 def backwards(point: Waypoint) -> Waypoint:
-    """Return a point passed the other way: speeds and jerks change sign, accelerations do not."""
+    """
+    Return a point for the opposite direction of motion.
+
+    Twist and jerk change sign; the acceleration does not.
+    """
     return replace(point, twist=_negative(point.twist), jerk=_negative(point.jerk))
 
 
@@ -229,7 +244,7 @@ def is_same(a: Pose, b: Pose) -> bool:
 
 def merged(first: Goal, second: Goal) -> Goal:
     """
-    Return the combined settings of two paths.
+    Return the goal fields of two joined paths: for each field, the value that is not the default.
 
     :raises InvalidGoal: the paths set the same field to different values.
     """

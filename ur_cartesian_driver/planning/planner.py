@@ -1,16 +1,17 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Plan a goal: choose the primitives, and refuse goals that the arm cannot execute.
+Plan a goal: choose its primitives (the single motions of the robot), or refuse the goal.
 
 :func:`plan` checks the goal
 (:func:`~ur_cartesian_driver.planning.request.joint_points.check_for_arm`), expresses it for the
 TCP that is active while it runs, and calls the planner of the execution mode: :func:`plan_moves`
 or :func:`plan_spline_goal`.
 
-The stages of :func:`plan_moves`: the curve of every segment with the configuration in which the
-arm arrives, and the blends between the curves; clearance; times and speeds; primitives, outputs,
-reference path and report. The first stage that finds a fault in the goal raises the refusal.
+:func:`plan_moves` works in stages. The first finds the curve of every segment, the configuration
+in which the arm arrives, and the blends between the curves; the second checks the clearance; the
+third computes times and speeds; the last makes primitives, outputs, reference path and report. A
+stage that finds a fault in the goal raises :class:`GoalRefused`.
 """
 
 from __future__ import annotations
@@ -113,11 +114,12 @@ from ur_cartesian_driver.planning.spline.spline_planner import (
 from ur_cartesian_driver.planning.stop_prediction import at_set_point
 from ur_cartesian_driver.planning.travel.travel_to_goal import plan_with_travel
 
-#: Static error of the TCP of a CB3 arm at full reach [m]: about 0.3 mm, from the 0.2 to 0.4 mrad
-#: that were recorded on the joints of a UR10.
+#: Static error of the TCP of a CB3 arm at full reach [m]: about 0.3 mm, because the joints of a
+#: UR10 were recorded at rest 0.2 to 0.4 mrad beside their targets.
 CB3_STATIC_ERROR = 3e-4
-#: Sample densities of the two searches for rotations about a free axis, as multiples of the usual
-#: density: the second search sees singularities between the samples of the first.
+#: Sample densities of the two searches for rotations about a free axis (about which the driver may
+#: turn the tool), as multiples of the usual density: the second search sees singularities between
+#: the samples of the first.
 _SEARCH_DENSITIES = (1, 4)
 
 #: A function that plans a checked goal.
@@ -154,7 +156,7 @@ def _plan_direct(
     options: PlanningOptions,
     running: PlannedSegment | None = None,
 ) -> Plan:
-    """Return the plan of a goal without a travel to its first point."""
+    """Return the plan of a goal; the arm goes directly to the first point, without a travel."""
     table = check_for_arm(goal, state.T_flange_tcp, arm, options)
     if table.segments.free_axes.any():
         return _plan_free(table, state, arm, options)
@@ -190,9 +192,9 @@ def _plan_fixed(
 
 def _plan_free(table: GoalTable, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
     """
-    Return the plan of a checked goal with a free axis, and choose the rotations about this axis.
+    Return the plan of a checked goal with a free axis; choose the rotations about this axis.
 
-    If no choice passes the checks, the goal is planned with the orientations of its points.
+    If no choice passes the checks, the goal is planned with the orientations given by its points.
     """
     refusal: GoalRefused | None = None
     found = 'no rotation about the free axis was found that leads along the whole path'
@@ -225,8 +227,9 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     if planner.kinematics.frame_moves:
         check_part_keeps_orientation(goal, planner.targets, state.actual_tcp_pose, first)
     if options.laws.blend_begin < 1.0 and goal.segments.blend_radii.any():
-        # A goal that is refused with the assumed blends must not pass because of a measured law:
-        # the path with the assumed blends has to be possible, too. Its duration does not matter.
+        # The digital twin's law gives the blends that were measured on this robot. A goal must not
+        # pass only thanks to that law, so the path with the assumed blends is checked first, but
+        # not its duration.
         _checked_path(planner, first, replace(options, twin=None, twin_file=''), [], {})
     paths, geometries, lines = _checked_path(
         planner, first, options, planner.remarks, planner.reasons
@@ -273,8 +276,8 @@ def _checked_path(
     """
     Return the joint paths and geometries from point ``first`` on, and report lines on clearance.
 
-    :param remarks: gets the remarks on the path.
-    :param reasons: gets, by point, the reasons for unusual primitives.
+    :param remarks: the list to which the remarks on the path are appended.
+    :param reasons: by point index, the lists to which reasons for unusual primitives are appended.
     """
     state = planner.state
     paths = JointPathPlanner(
@@ -423,7 +426,7 @@ def _held_part_remark(plan: Plan, planner: GoalPlanner) -> str:
 
 class GoalPlanner:
     """
-    One goal as input of the planners of all execution modes, and the last step of these planners.
+    One goal, prepared for the planners of all execution modes; :meth:`plan` is their last step.
 
     The object collects the remarks for the report of the goal.
 
@@ -452,7 +455,7 @@ class GoalPlanner:
         self.remarks = list(retargeted.remarks)
         #: By point: the reasons for a primitive that is not the usual one of its segment type.
         self.reasons: dict[int, list[str]] = {}
-        #: The points in the frame of the path, rows (n, 7): in base, or on a held part.
+        #: (n, 7) the poses of the points in the robot's base, or in the frame of a held part.
         self.targets = transform_rows(goal.T_base_frame, goal.waypoints.poses)
         self.timed = is_timed(goal)
         self.mode = resolve_execution_mode(goal)
@@ -476,9 +479,10 @@ class GoalPlanner:
 
     def first_target(self) -> int:
         """
-        Return the number of the first point that needs a motion.
+        Return the index of the first point that needs a motion.
 
-        It is 1 if point 0 is at time 0, because the robot is at point 0 already; else it is 0.
+        It is 1 if the goal has times and point 0 is at time 0, because the robot must be at point
+        0 already; otherwise it is 0.
 
         :raises InvalidGoal: point 0 is at time 0, but the robot is elsewhere.
         :raises InvalidPosture: point 0 is at time 0, but the arm has another posture.
@@ -500,12 +504,12 @@ class GoalPlanner:
         point_times: Floats | None = None,
     ) -> Plan:
         """
-        Return the plan of a motion with its stops and outputs.
+        Return the plan of a motion, after inserting its stops and outputs.
 
-        :param goal: the goal as planned, without stops.
+        :param goal: the goal as planned, before the stops are inserted.
         :param remarks: appended to the remarks that have been collected so far.
-        :param point_times: (n,) when each point is passed [s], not including stops; None = each
-            point is at the end of a piece.
+        :param point_times: (n,) time at which each point is passed [s], before stops delay it;
+            None = each point is at the end of a piece.
         :raises GoalRefused: the tool is slower than demanded, an output cannot be placed, or
             offsets of the path are not possible.
         """

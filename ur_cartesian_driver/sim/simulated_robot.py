@@ -48,9 +48,11 @@ from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 T = TypeVar('T')
 
+# Longest wait for a call between two cycles, and for the compilation of a program [s].
 _CALL_TIMEOUT = 10.0
 _COMPILE_TIMEOUT = 120.0
-#: Port of a read-only twin (such as 30011), minus the port of its script interface (30001).
+#: Port of a read-only interface (such as 30011), minus the port of the interface that sends the
+#: same data and also accepts scripts (30001).
 READ_ONLY_DISTANCE = 10
 
 
@@ -85,7 +87,7 @@ class RobotSnapshot:
     speed_slider: float
     speed_scaling: float
     digital_outputs: int
-    #: Texts of programs (`textmsg`) and errors, newest last.
+    #: Texts that programs wrote (`textmsg`), and texts of errors; newest last.
     messages: tuple[str, ...]
     popups: tuple[str, ...]
 
@@ -110,17 +112,17 @@ class SimulatedRobot:
         """
         Make a robot; it runs from `start` to `close`, or during `run`.
 
-        :param sockets: the sockets of programs; None = TCP.
+        :param sockets: the sockets that programs can open; None = TCP sockets.
         :param clock: the clock for the cycles; None = a clock with the rate of the configuration.
         :raises UnloadableProgram: the program that the configuration names cannot be loaded.
-        :raises ValueError: a fault of the configuration is not understood.
+        :raises ValueError: the text of a fault in the configuration is not understood.
         """
         self.config = config or SimulatorConfig()
         #: The error that has ended the thread; None = no error.
         self._failure: Exception | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
-        #: Called in the robot's thread when a program's socket has received bytes: with the port
-        #: of the peer and the bytes.
+        #: Called in the robot's thread when a socket of a program has received bytes, with the
+        #: port of the peer and the bytes as arguments.
         self.on_socket_data: Callable[[int, bytes], None] | None = None
         impaired = ImpairedSockets(
             sockets or TcpScriptSockets(self._on_socket_data, self.config.host)
@@ -333,7 +335,9 @@ class SimulatedRobot:
 
     def call(self, function: Callable[[Controller], T]) -> T:
         """
-        Call a function with the controller between two cycles, and return or raise its result.
+        Call a function with the controller, between two cycles; return its result.
+
+        An exception of the function is raised here.
 
         While the robot does not run, the function is called at once.
 
@@ -373,7 +377,7 @@ class SimulatedRobot:
 
     def inject(self, *faults: Fault | str) -> None:
         """
-        Set faults, as values or as text; each happens when it is triggered.
+        Add faults, given as values or as texts; each takes effect when its trigger occurs.
 
         :raises ValueError: a text is not understood, or the robot has no such interface.
         """
@@ -381,7 +385,7 @@ class SimulatedRobot:
         self.call(lambda _: self._faults.add(*parsed))
 
     def clear_faults(self) -> None:
-        """Forget pending faults and end lasting faults."""
+        """Remove the faults that have not taken effect yet, and end those that last."""
         self.call(lambda _: self._faults.clear())
 
     def set_speed_slider(self, fraction: float) -> None:
@@ -396,7 +400,8 @@ class SimulatedRobot:
         """
         Unlock the protective stop, as at the pendant.
 
-        :raises RuntimeError: there is no stop, or the unlock delay since the stop is not over.
+        :raises RuntimeError: there is no protective stop, or the delay that it requires is not
+            over.
         """
         self._safety(SafetyEvent.UNLOCK)
 
@@ -418,7 +423,7 @@ class SimulatedRobot:
 
     def pause_program(self) -> None:
         """
-        Pause the program on its path.
+        Pause the program, as at the pendant; the arm stops on its path.
 
         :raises RuntimeError: no program is playing.
         """

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Commands of a goal machine, for the owner of the sockets."""
+"""Commands of a goal machine (the logic of one running goal) to the owner of the sockets."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ class GoalCommand:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SendControl(GoalCommand):
-    """Send a trajectory action on the reverse socket."""
+    """Send a trajectory action, such as START, on the reverse socket to the robot program."""
 
     action: TrajectoryAction
     #: Number of points, for the actions that need it (:func:`~.reverse.trajectory`).
     count: int = 0
-    #: For START: whether offsets that arrive through registers displace the path.
+    #: For START: whether the robot program displaces the path by offsets from its RTDE registers.
     takes_offsets: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetFeedTarget(GoalCommand):
-    """Have the robot program change to a feed, until the next one or the end of the goal."""
+    """Have the robot program change its speed, until the next such command or the goal's end."""
 
     #: Fraction of the planned speed, 0 to 1.
     fraction: float
@@ -43,7 +43,11 @@ class SetFeedTarget(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SendPoints(GoalCommand):
-    """Send the records ``first`` up to, not including, ``end`` on the trajectory socket."""
+    """
+    Send encoded motions and outputs of the goal on the trajectory socket.
+
+    The records ``first`` up to, not including, ``end`` are sent; a record is one motion or output.
+    """
 
     first: int
     end: int
@@ -65,7 +69,7 @@ class RestoreTcp(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SendSafeOutputs(GoalCommand):
-    """Have the robot program store, set or forget safe values, or restore outputs."""
+    """Have the robot program store, set or forget safe values of outputs, or restore outputs."""
 
     action: SafeOutputsAction
     #: The robot program reports this number once it has carried out the command.
@@ -82,7 +86,7 @@ class SecureOutputs(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RestoreOutputs(GoalCommand):
-    """Write no safe values any more, because the robot program restores the outputs."""
+    """Stop writing safe values of outputs, because the robot program restores the outputs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,35 +112,37 @@ class ReportPulses(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnswerAppend(GoalCommand):
-    """Answer an append: all points are accepted, or none."""
+    """Answer a request to append points: all points are accepted, or none."""
 
+    #: Number of the request.
     number: int
     #: Why the points are refused, as a sentence; '' = they are accepted.
     refusal: str = ''
-    #: Whether points planned from rest would be accepted, because the ending has been sent.
+    #: Whether the points would be accepted if they were planned from rest, because the motion that
+    #: brings the arm to rest has been sent.
     replan_from_rest: bool = False
-    #: If a new tail begins too early: the earliest time at which it would be accepted [s].
+    #: If the points replace the old ones from too early a time: the earliest accepted time [s].
     earliest_cut: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OpenServo(GoalCommand):
-    """Claim the RTDE inputs of the buffered servo, and request its RTDE outputs."""
+    """Claim the RTDE inputs for streamed set-points, and request the RTDE outputs that answer."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OpenOffsets(GoalCommand):
-    """Claim the RTDE inputs of path offsets, and request their RTDE outputs."""
+    """Claim the RTDE inputs for path offsets, and request the RTDE outputs that answer."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CloseOffsets(GoalCommand):
-    """Release the RTDE inputs of path offsets."""
+    """Release the RTDE inputs for path offsets."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EnterServo(GoalCommand):
-    """Have the robot program read the inputs of the buffered servo."""
+    """Have the robot program follow the set-points in its RTDE inputs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,7 +159,7 @@ class LeaveServo(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportServo(GoalCommand):
-    """Report the state of the servo."""
+    """Report how the robot program follows the streamed set-points."""
 
     report: ServoReport
 

@@ -18,7 +18,11 @@ _SMALL_ANGLE = 1e-9
 
 
 def multiply_rows(a: Floats, b: Floats) -> Floats:
-    """Return the rotations ``b`` followed by ``a`` (n, 4), not normalised."""
+    """
+    Return the quaternion products ``a b`` (n, 4), which rotate by ``b`` first; not normalised.
+
+    Each of ``a`` and ``b`` has n rows or one row, which is used for all.
+    """
     ax, ay, az, aw = a.T
     bx, by, bz, bw = b.T
     rows = np.empty((len(a) if len(b) == 1 else len(b), 4))  # for few rows np.stack is slow
@@ -51,14 +55,18 @@ def length_rows(vectors: Floats) -> Floats:
 
 
 def distance_rows(a: Floats, b: Floats) -> Floats:
-    """Return the distances between positions (n, 3 or more) [m]; huge ones do not overflow."""
+    """
+    Return the distances (n,) [m] between positions, the first three columns of ``a`` and ``b``.
+
+    Huge distances do not overflow.
+    """
     x, y, z = (b[:, :3] - a[:, :3]).T
     distances: Floats = np.hypot(np.hypot(x, y), z)
     return distances
 
 
 def angle_rows(a: Floats, b: Floats) -> Floats:
-    """Return the angles between orientations (n, 4) [rad], within [0, pi]."""
+    """Return the angles (n,) [rad], within [0, pi], between unit quaternions (n, 4)."""
     turn = multiply_rows(conjugate_rows(a), b)
     angle: Floats = 2.0 * np.arctan2(length_rows(turn[:, :3]), np.abs(turn[:, 3]))
     return angle
@@ -145,7 +153,11 @@ def normalized_rows(quaternions: Floats) -> Floats:
 
 
 def keep_hemisphere(poses: Floats) -> None:
-    """Flip quaternions (-q is the same orientation as q) so that they do not jump between rows."""
+    """
+    Negate quaternions of ``poses``, in place, so that they do not jump between rows.
+
+    A quaternion q and its negative -q are the same orientation.
+    """
     dots = np.einsum('ij,ij->i', poses[1:, 3:], poses[:-1, 3:])
     signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0))
     poses[1:, 3:] *= signs[:, np.newaxis]

@@ -4,7 +4,8 @@
 One accepted goal, from its acceptance to its outcome, in a thread of its own.
 
 A run converts the goal, plans it, waits for its start time and for the arm, and follows the
-motion. The executor handles a goal only twice: when it is accepted, and when its outcome is known.
+motion. The threads of the node's executor handle a goal only twice: when it is accepted, and when
+its outcome is known.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ from ur_cartesian_driver.ros.node_endpoints import SHUT_DOWN_ERRORS
 #: Period of the reads of the node's clock while a goal waits for its start time [s]; the clock
 #: may be a simulated one.
 CLOCK_PERIOD = 0.05
-#: How long rclpy may take from its cancel callback to the state CANCELING [s].
+#: Longest wait for rclpy to change a goal's state to CANCELING after its cancel callback [s].
 CANCELING_TIMEOUT = 1.0
 
 SHUTDOWN = 'The driver node is shutting down'
@@ -66,13 +67,14 @@ class GoalRun:
         self._context = context
         self._on_end = on_end
         self._received = context.now()
-        #: The start time of the motion [ns]; 0: at once.
+        #: The start time of the motion [ns]; 0 = at once.
         self._start_time = nanoseconds(handle.request.trajectory.header.stamp)
         self.arm_request = ArmRequest(f'goal {self.key.hex()[:8]}', self._preempt_motion)
         self.thread = threading.Thread(target=self._run, name=self.arm_request.name, daemon=True)
         #: Whether the goal waits for its start time.
         self.is_waiting = self.is_scheduled
-        #: Key and response of the last accepted append request, to answer a repeat of it.
+        #: Key and response of the last accepted append request, so that a repetition of the
+        #: request gets the same response.
         self.last_append: tuple[object, Any] | None = None
         self._lock = threading.Lock()
         self._motion: MotionHandle | None = None
@@ -189,7 +191,8 @@ class GoalRun:
         Acquire the arm and plan the goal.
 
         :raises GoalRefused: the goal is malformed, the arm is not free, or planning refuses the
-            goal; the first of these is the reason.
+            goal. These are checked in this order, so a malformed goal is reported as such even if
+            the arm is not free.
         """
         arbiter = self._context.arbiter
         if not arbiter.acquire(self.arm_request):
@@ -213,9 +216,9 @@ class GoalRun:
         """
         Plan the goal, preempt older goals, and return the plan.
 
-        The goal is first planned from the place where the arm would come to rest, so that a
-        refusal disturbs no other goal. It is planned again if another goal has moved the arm
-        meanwhile.
+        The goal is first planned from the position where the arm would come to rest if it stopped
+        now, so that a refused goal disturbs no other one. It is planned again if another goal has
+        moved the arm meanwhile.
 
         :raises GoalRefused: the goal is refused, or the running motion cannot be preempted.
         """
@@ -289,18 +292,19 @@ class GoalRun:
         make = self.action.feedback_of(self.handle.request, plan, self._context)
 
         def publish(progress: Progress) -> None:
-            # A client that reacts to the first feedback must find the motion. The driver holds no
-            # lock here, and has sent the whole request to start: this wait cannot block the start.
+            # A client may react to the first feedback, so motion() must return the motion by then.
+            # This wait cannot delay the start of the motion, because the driver holds no lock here
+            # and has already sent the whole request to start.
             self._begun.wait()
             message = make(progress)
-            # The node, or all of ROS, may be shutting down; the motion is then cancelled anyway.
+            # Ignore that the node, or all of ROS, is shutting down, which cancels the motion.
             with contextlib.suppress(*SHUT_DOWN_ERRORS):
                 self.handle.publish_feedback(message)
 
         return publish
 
     def _refusal_text(self, error: DriverError) -> str:
-        """Return the text of a refusal, which also names a goal that was preempted in vain."""
+        """Return the text of an error; a refusal also names the goal that was preempted for it."""
         preempted = self.arm_request.preempted
         if not (isinstance(error, GoalRefused) and preempted):
             return str(error)

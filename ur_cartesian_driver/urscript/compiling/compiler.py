@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Compiles syntax trees to Python code, once per program, so that a cycle costs little.
+Compiles the syntax trees of URScript programs to Python code, which runs faster than the trees.
 
-Work is counted in nodes of the syntax tree, because a thread may evaluate only so many in a cycle
-(its `fuel`). On entering a block of statements, the code takes the nodes of the block from the
-fuel: it pays for them.
+A thread may evaluate a limited number of syntax tree nodes in each cycle of the controller; its
+`fuel` is the number that is left. At the beginning of a block of statements, the Python code
+*pays* for the block: it subtracts the number of nodes in the block from the fuel.
 """
 
 from __future__ import annotations
@@ -34,12 +34,13 @@ from ur_cartesian_driver.urscript.compiling.scopes import Builtin, Scope
 from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
 from ur_cartesian_driver.urscript.script_errors import CompileError
 
-#: Python keeps the interpreter lock while it compiles, which delays the cycles. So a long block of
-#: a program's body is compiled in parts of about this many nodes, about 3 ms.
+#: Python holds the interpreter lock while it compiles, which delays the controller's cycles in the
+#: other thread. So a long block of a program's body is compiled in parts of about this many nodes,
+#: which take about 3 ms each.
 MAX_NODES = 400
 
 
-#: Cache of compiled functions, see :func:`_function_code`.
+#: Cache of compiled functions, see :func:`_function_code`; it is emptied at MAX_FUNCTIONS.
 _functions: dict[Hashable, FunctionCode] = {}
 MAX_FUNCTIONS = 2000
 
@@ -56,8 +57,8 @@ def compile_program(
     Compile a checked program.
 
     :param root: the scope of the program's body, from `resolve`.
-    :param known: the functions of a running program to which this one is added, by the identity
-        of their scopes.
+    :param known: the functions of the running program to which this one is added, by the id() of
+        their scopes; empty = this program runs on its own.
     :param interleaves: whether threads may be switched between any two statements.
     :param prefix: first part of the names of all generated functions.
     :raises CompileError: loops are nested more deeply than Python allows.
@@ -104,7 +105,7 @@ def _function_code(scope: Scope, shared: Shared, names: Hashable) -> FunctionCod
     return found
 
 
-#: Jumps: statements that leave an iteration, a loop or the function around it.
+#: Jumps: statements that leave the current iteration, loop or function.
 _BREAK, _CONTINUE, _RETURN = 'break', 'continue', 'return'
 
 
@@ -146,11 +147,11 @@ class _FunctionCompiler(ExpressionCompiler):
         body: list[ast.stmt],
         parameters: Sequence[tree.FunctionParameter] = (),
     ) -> CodeType:
-        """Compile the definition of a Python function."""
+        """Return the compiled definition of a Python function."""
         self.at(self._scope.owner)
         if self._assigned:
             body.insert(0, self.node(ast.Global, sorted(self._assigned)))
-        if self._function.suspends:  # a generator even if nothing in it takes time
+        if self._function.suspends:  # a yield that is never reached makes it a generator
             body.append(self.if_true(self.constant(False), [self.do(self.wait())]))
         # Python requires a default for each parameter after the first one with a default.
         optional = [i for i, each in enumerate(parameters) if each.default is not None]
@@ -196,7 +197,11 @@ class _FunctionCompiler(ExpressionCompiler):
             yield statements[begin:]
 
     def _part(self, statements: tree.StatementBlock) -> tuple[list[ast.stmt], int]:
-        """Compile statements as a separate Python function; all their variables are global."""
+        """
+        Compile statements as a separate Python function; all their variables are global.
+
+        Return the code that calls the function, and the cost of the statements in nodes.
+        """
         around = self._loops, self._exits, self._assigned
         self._loops, exits, self._assigned = 0, set[str](), set()
         self._exits = exits
@@ -227,7 +232,7 @@ class _FunctionCompiler(ExpressionCompiler):
         ], weight
 
     def _leave(self, jump: str) -> ast.stmt:
-        """Leave a loop or the function; a part returns the jump to the code that calls it."""
+        """Return the code of a jump; a part returns the jump to the code that calls the part."""
         if self._loops and jump != _RETURN:
             return self.node(ast.Break if jump == _BREAK else ast.Continue)
         if self._exits is None:
@@ -236,7 +241,11 @@ class _FunctionCompiler(ExpressionCompiler):
         return self.node(ast.Return, self.constant(jump))
 
     def _statement_at_switch(self, node: tree.Statement) -> tuple[list[ast.stmt], int]:
-        """Compile a statement, after a point where threads can switch; return code and cost."""
+        """
+        Return the code and the cost in nodes of a statement.
+
+        If threads may be switched anywhere, the code begins with a point where they can switch.
+        """
         if isinstance(node, tree.LabelStatement | tree.FunctionDefinition):
             return [], 0
         python, weight = self._statement(node)
@@ -298,7 +307,7 @@ class _FunctionCompiler(ExpressionCompiler):
         return [self.set(name, value.python)], 1 + value.weight
 
     def _assigned_variable(self, name: str, qualifier: str = '') -> str:
-        """Return the generated name of an assigned variable; note it if it is global."""
+        """Return the generated name of an assigned variable; note global ones in `_assigned`."""
         variable = self.variable(name, qualifier)
         if variable == global_name(name):
             self._assigned.add(variable)
