@@ -113,6 +113,21 @@ def test_a_flat_corner_does_not_tell_one_curve_from_another():
     assert 'its corner of 4 degrees does not tell' in reason(*corner(4.0))
 
 
+@pytest.mark.parametrize('radius', [0.002, 0.005, 0.02])
+def test_an_arc_is_no_parabola_however_flat_the_corner(radius):
+    laws = replace(LAWS, shape='arc')
+    shapes = []
+    for angle in (11.0, 13.0, 16.0, 20.0, 26.0, 40.0):
+        chain, calls = corner(angle, radius=radius)
+        found = identify([recorded('corner', chain, laws, QUIET, Random(3))], calls)
+        shape = found.results['blend_shape']
+        if isinstance(shape, Unknown):
+            assert 'does not tell a parabola from an arc' in shape.reason
+        shapes.append('' if isinstance(shape, Unknown) else shape.value)
+    assert set(shapes) == {'', 'unknown'}
+    assert shapes[-1] == 'unknown'
+
+
 def test_blends_that_fill_a_move_leave_no_straight_stretch():
     points = np.zeros((4, 6))
     points[1:, 0] = 0.1, 0.1, 0.2

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import cos, hypot, sin, sqrt
+from math import cos, degrees, hypot, sin, sqrt
 
 import numpy as np
 
@@ -32,6 +32,9 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 #: A curve that is so many times as far off the parabola as the lines are uneven is another one;
 #: least unevenness [m or rad].
 _ROUGH, _EVEN = 3.0, 1e-7
+#: How far an arc is off the nearest parabola, root mean square, by the length that it takes of a
+#: line and by the cube of a small corner.
+_ARC = 2e-3
 #: Errors, and share of the radius, by which a blend may end elsewhere than as far as it begins.
 _ERRORS, _SHARE = 5.0, 1e-3
 #: Degree of the tool's place along a joint line. It is fitted in a range from the corner, in
@@ -70,16 +73,22 @@ def find_blend(corner: BlendCorner) -> FoundBlend | str:
     """Return the law of a blend, or why it cannot be evaluated."""
     blend = _Blend(corner)
     start, off = blend.parabola()
+    bound = _ROUGH * max(corner.unevenness, _EVEN)
     found = FoundBlend(
         angle=corner.angle,
         of_lines=corner.of_lines,
         off=off,
-        is_parabola=off < _ROUGH * max(corner.unevenness, _EVEN),
+        is_parabola=off < bound,
         begin='it follows no parabola',
         speed_ratio='it follows no parabola',
     )
     if not found.is_parabola:
         return found
+    if _ARC * min(start[_TAIL:]) * corner.angle**3 < bound:
+        return (
+            f'a blend of {1e3 * corner.radius:.3g} mm at a corner of {degrees(corner.angle):.2g} '
+            'degrees does not tell a parabola from an arc'
+        )
     curve = blend.curve(start)
     if curve is None:
         return 'its packets do not determine its curve'
