@@ -1,11 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The pipe between the owner of a driver and the robot loop.
+The pipe between the owner of a driver and the robot loop, which controls the robot.
+
+The owner is the program or node that plans the motions. It sends the loop a :data:`Request`; the
+loop sends a :data:`Notification`. Each motion has a number, the field ``motion`` of the messages.
 
 A message is sent as its length, then three pickles and its large arrays. The first pickle is the
-notification that refuses the message, for a receiver that cannot read it (None = the message needs
-no answer). The second has the sizes of the arrays, which follow it, each at a multiple of
+notification with which a receiver that cannot read the message answers it (None = the message
+needs no answer). The second has the sizes of the arrays, which follow it, each at a multiple of
 :data:`ALIGNMENT`. The last is the message itself, one of the dataclasses below. Both ends run this
 package, and no other process can open the pipe (a pair of sockets), so pickle is safe here. A
 large plan has 60 MB of arrays: neither sending nor unpickling copies them (PEP 574).
@@ -37,7 +40,8 @@ from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, Serv
 
 LENGTH = struct.Struct('>I')
 Buffer: TypeAlias = bytes | memoryview
-#: Arrays of at least the first size are sent beside the pickle, at multiples of the second [B].
+#: Arrays of at least ``LARGE_ARRAY`` bytes are sent outside the pickle, each beginning at a
+#: multiple of ``ALIGNMENT`` bytes.
 LARGE_ARRAY, ALIGNMENT = 1 << 16, 16
 #: The reason given if the receiver cannot read the message.
 UNREADABLE = (
@@ -79,8 +83,8 @@ class Configure:
     """The first message: the configuration of the robot loop."""
 
     config: DriverConfig
-    #: Whether the robot program may be uploaded on the first connection; not if an earlier loop of
-    #: the same owner has seen it stopped.
+    #: Whether the robot program may be uploaded on the first connection; False if it had stopped
+    #: when an earlier loop of the same owner ended.
     may_upload: bool = True
     #: A temporary TCP that an earlier loop of the same owner may not have restored.
     temporary_tcp: TemporaryTcpSet | None = None
@@ -95,7 +99,7 @@ class ArmSetup:
 
     @classmethod
     def of(cls, arm: Arm) -> ArmSetup:
-        """Return the model and geometry of an arm, which are sent faster than the arm itself."""
+        """Return the setup of an arm, which is sent faster than the :class:`Arm` itself."""
         return cls(model=arm.model, geometry=arm.geometry)
 
 
@@ -110,10 +114,11 @@ class LiveSetup:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StartMotion:
-    """Run a motion, with its encoded records (84 bytes each)."""
+    """Run a motion."""
 
     motion: int
     job: MotionJob
+    #: The records of the motion: encoded instructions for the robot program, 84 bytes each.
     points: bytes
     #: Metadata of the plan for the recording, as JSON; empty = none.
     plan_metadata: str = ''
@@ -159,10 +164,11 @@ class SetFeedOverride:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AppendToMotion:
-    """Append records (84 bytes each) to a motion with keep_open; AppendAnswered answers it."""
+    """Append to a motion with keep_open; :class:`AppendAnswered` answers it."""
 
     motion: int
     append_job: AppendJob
+    #: The appended records, as in :class:`StartMotion`.
     points: bytes
 
 
@@ -277,7 +283,7 @@ class SignalsChanged:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopHeartbeat:
-    """The robot loop is alive; carries the longest gaps since the last heartbeat."""
+    """The robot loop is alive; reports its longest gaps since the last heartbeat."""
 
     gaps: LinkGaps = field(default_factory=LinkGaps)
 
@@ -323,7 +329,7 @@ Notification: TypeAlias = (
 
 def refusal_of(message: Request | Notification, reason: str) -> Notification | None:
     """
-    Return the answer to a message that was not carried out; None = it needs no answer.
+    Return the notification that answers a message that was not carried out; None = none does.
 
     :param reason: the reason, as a sentence.
     """

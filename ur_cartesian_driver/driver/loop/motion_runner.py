@@ -1,6 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The running motion of a robot loop: its machine, points, recording and end."""
+"""
+The running motion of the robot loop: its state machine, points, recording and end.
+
+The owner of the loop is the process or thread at the other end of the pipe (:mod:`~.loop_host`).
+"""
 
 from __future__ import annotations
 
@@ -88,8 +92,8 @@ from ur_cartesian_driver.robot.rtde.register_connection import (
     servo_exchange,
 )
 
-#: Data of this size [bytes] or more is handled in a thread, because that takes longer than a few
-#: milliseconds.
+#: Data of this size [bytes] or more is processed in a thread, because its processing takes longer
+#: than a few milliseconds.
 MIN_THREAD_SIZE = 1 << 18
 #: Longest wait at shutdown for the recording of the last motion [s].
 RECORD_TIMEOUT = 1.0
@@ -98,7 +102,7 @@ T = TypeVar('T')
 
 
 class MotionRunner:
-    """Runs one motion at a time: passes events to its machine, and the commands to the link."""
+    """Runs one motion at a time: passes events to its machine, and carries out the commands."""
 
     def __init__(
         self,
@@ -121,11 +125,12 @@ class MotionRunner:
         self._tcp_restorer, self._spawn = tcp_restorer, spawn
         self._is_changing_settings = is_changing_settings
         self._machine: GoalMachine | None = None
+        #: Number of the running motion, which requests for it carry; 0 = no motion runs.
         self._number = 0
         self._points = PointBuffer()
-        #: The RTDE inputs of a motion with set-points or path offsets; None = not claimed.
+        #: The connection that writes RTDE inputs for set-points or path offsets; None = not open.
         self._inputs: RegisterConnection | None = None
-        #: The append that the machine is deciding on at this moment.
+        #: The request whose points the machine is accepting or refusing at this moment.
         self._pending_append: AppendToMotion | None = None
         self._recorder = Recorder(
             config.record_directory,
@@ -143,7 +148,7 @@ class MotionRunner:
     # ---- requests -----------------------------------------------------------------------------
 
     async def start(self, request: StartMotion) -> None:
-        """Start a motion, or refuse it with a reason."""
+        """Start a motion, or send its owner the reason why it cannot start."""
         machine = await run_in_thread_if_large(
             MIN_THREAD_SIZE if is_slow_to_make(request) else len(request.points),
             make_machine,
@@ -154,7 +159,7 @@ class MotionRunner:
         reason = self._refusal(job)
         if not reason:
             foreign = await self._foreign_program(job)
-            reason = self._refusal(job) or foreign  # the program may be gone meanwhile
+            reason = self._refusal(job) or foreign  # checked again after the wait
         if reason:
             refusal = Outcome(code=ErrorCode.ROBOT_NOT_READY, text=reason)
             self._pipe.send(MotionEnded(motion=request.motion, outcome=refusal))
@@ -195,8 +200,8 @@ class MotionRunner:
         """
         Offer points to the running motion.
 
-        Points for another motion are refused, and so are points that only the driver's own robot
-        program can run if another program runs.
+        Points for another motion are refused. Points that only the driver's own robot program can
+        execute are refused if another program runs on the robot.
         """
         foreign = await self._foreign_program(request.append_job.job)
         if request.motion != self._number or self._machine is None:
@@ -212,7 +217,7 @@ class MotionRunner:
         self._pipe.send(AppendAnswered(motion=request.motion, answer=answer))
 
     def set_live_target(self, request: SetLiveTarget) -> None:
-        """Give the running session another target; ignore a target for another session."""
+        """Give the running live session another target; ignore a target for another session."""
         if request.motion == self._number and self._machine is not None:
             self._machine.can.steering.set_target(request.T_base_tcp, request.age, _now())
 
@@ -250,7 +255,7 @@ class MotionRunner:
         self._ends.report_pending()
 
     def close_recorder(self) -> None:
-        """Finish the recording of the last motion; with a slow disk this may take a while."""
+        """Finish the recording of the last motion; a slow disk can delay this by some seconds."""
         self._recorder.close(RECORD_TIMEOUT)
 
     # ---- events and commands ------------------------------------------------------------------
@@ -259,8 +264,9 @@ class MotionRunner:
         """
         Pass an event to the running motion's machine, and carry out the machine's commands.
 
-        If no motion runs, a robot state goes to the :class:`TcpRestorer`. Then the newest state is
-        published.
+        If no motion runs, a robot state goes to the :class:`TcpRestorer`, which may still have to
+        restore the TCP of an earlier motion. In both cases, the newest state is published
+        afterwards.
         """
         if self._machine is not None:
             self._step(self._machine, event)
@@ -363,7 +369,7 @@ class MotionRunner:
         )
 
     def _leave_servo(self) -> None:
-        """Have the robot program leave the servo, and release the RTDE inputs of the motion."""
+        """Make the robot program stop following set-points, and release the RTDE inputs."""
         if self._inputs is not None:
             self._link.control.send_servo(False)
             self._close_inputs()
@@ -374,7 +380,11 @@ class MotionRunner:
             self._inputs = None
 
     def _set_temporary_tcp(self, T_flange_tcp: Pose) -> None:
-        """Set the TCP for a goal; tell the owner first, so that the next loop can restore it."""
+        """
+        Set the TCP for a goal.
+
+        The owner is told first, so that a new loop can restore the TCP if this one dies.
+        """
         assert self._machine is not None
         assert self._machine.temporary_tcp is not None
         temporary_tcp = self._machine.temporary_tcp
@@ -447,7 +457,7 @@ def _call_soon(
 
 async def run_in_thread_if_large(size: int, function: Callable[..., T], *arguments: object) -> T:
     """
-    Call a function, in a thread if it handles much data, so that keepalives stay on time.
+    Call a function, in a thread if it handles much data: the loop must send keepalives on time.
 
     :param size: amount of data that the function handles [bytes].
     """

@@ -70,8 +70,9 @@ class Feeder(ABC):
         """
         Return the commands that send the next piece of the motion after a packet of the robot.
 
-        State packets are passed in MOVING only, after the machine has acted on them; register
-        packets are passed in every state, before the machine acts on them.
+        A ``StateReceived`` is passed in the state MOVING only, after the machine has acted on it.
+        Reports through registers (``ServoReceived``, ``OffsetReceived``) are passed in every
+        state, before the machine acts on them.
 
         :param now: time of a steady clock [s].
         """
@@ -85,7 +86,7 @@ class Feeder(ABC):
 class Prepared:
     """The robot has to be prepared before the motion."""
 
-    #: The name of the motion, for the refusal if another client holds the robot's RTDE inputs.
+    #: The kind of motion, for the error message if another client holds the robot's RTDE inputs.
     motion = ''
 
     def prepare(self) -> list[GoalCommand]:
@@ -112,7 +113,7 @@ class Appendable:
         return [AnswerAppend(number=append_job.number, refusal='The goal is not open.')]
 
     def supply(self, state: GoalState) -> Meaning:
-        """Return the due signal about the supply of points (such as STARVING), or none."""
+        """Return the signal about the supply of points that is due now, such as STARVING."""
         return NO_MEANING
 
 
@@ -145,7 +146,7 @@ class Displaced:
     """The tool is off the path of the goal because offsets displace it."""
 
     def applied_offset(self, packet: RobotState) -> AppliedOffset:
-        """Return the offset that the controller's target has now."""
+        """Return the offset of the pose that the controller commands now (its target)."""
         return NO_OFFSET
 
 
@@ -156,7 +157,7 @@ class Overridable:
         """
         Accept a value of the signal.
 
-        :param fraction: of the planned speed.
+        :param fraction: fraction of the planned speed.
         :param age: how old the value is on arrival [s].
         :param now: time of a steady clock [s].
         """
@@ -214,7 +215,7 @@ class Streaming:
 
     def motions_begun(self, packet: RobotState) -> tuple[int | None, int]:
         """
-        Return the number of motions that the robot has begun, and the lag of its target.
+        Return the number of motions that the robot has begun, and how far its target can lag it.
 
         :returns: the count since START (None = unknown), and the largest number of motions by
             which the controller's target lags behind that count.
@@ -222,7 +223,7 @@ class Streaming:
         return packet.points_begun, 0
 
     def is_read(self, now: float) -> bool:
-        """Return whether the program has read a set-point lately: a still arm is then no fault."""
+        """Return whether the program has read a set-point lately; then a still arm is no fault."""
         return False
 
     def has_arrived(self, packet: RobotState) -> bool:

@@ -5,6 +5,11 @@ Compare each packet of the robot with the plan of a goal, to find its progress a
 
 The monitor finds faults and decides nothing: the table of :mod:`~.goal_transitions` gives the
 consequence of each fault in each state.
+
+The *target* is the pose that the controller commands at this moment, as RTDE reports it. A
+*record* is one instruction for the robot program. Most records are *motions*; the program reports
+how many of them it has begun. A goal that waits at rest for more points continues in a new
+*trajectory*.
 """
 
 from __future__ import annotations
@@ -28,10 +33,10 @@ from ur_cartesian_driver.motion.plan.offset_band import AppliedOffset, NO_OFFSET
 from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 
-#: The largest distance [m] and angle [rad] of the arm from the start of the plan, and of the
-#: controller's target from a place where the arm has waited.
+#: Largest distance [m] and angle [rad] between the arm and the start of the plan, and between the
+#: target and the place at which the arm has waited for points.
 START_POSITION_TOLERANCE, START_ANGLE_TOLERANCE = 0.001, 0.01
-#: The largest distance [m] and angle [rad] of the controller's own target from the plan.
+#: Largest distance [m] and angle [rad] between the target and the plan.
 MAX_PLAN_DEVIATION = (0.002, 0.02)
 
 
@@ -44,10 +49,10 @@ class GoalMonitor:
         """
         Begin before the first packet.
 
-        :param max_plan_deviation: the largest distance [m] and angle [rad] of the controller's
-            own target from the plan; 0 = no limit.
+        :param max_plan_deviation: the largest distance [m] and angle [rad] between the target and
+            the plan; 0 = no limit.
         """
-        #: The last appended job, or the first job; the records of the whole goal.
+        #: The newest job, which an appended job replaces; the records of the whole goal.
         self.job, self.records = job, WireRecords(job)
         self._start = pose_from_row(job.reference.poses[0])
         self._tracker = PathTracker(job.reference)
@@ -59,13 +64,13 @@ class GoalMonitor:
         self._standstill = Standstill(job.reference, job.output_delay)
         self._max_plan_deviation = max_plan_deviation
         self._clearly_allowed = tuple(limit or inf for limit in max_plan_deviation)
-        #: Whether the robot program is known to have read START: it has begun a point, or the
-        #: target has moved.
+        #: Whether the robot program is known to have started the trajectory: it has begun a
+        #: motion, or the target has moved.
         self._has_begun = False
-        #: Number of begun motions of the goal: in total, and in earlier trajectories.
+        #: Number of begun motions: of the goal, and of its trajectories before the running one.
         self._motions_begun = self._motions_before = 0
-        #: The count reported before START (None = no trajectory of this goal was started yet);
-        #: whether the robot may still report that count.
+        #: The count of begun motions that the robot reported before the command START (None = no
+        #: trajectory was started yet); whether the robot may still report that count.
         self._stale_begun: int | None = None
         self._awaits_count = False
         #: Running time of the newest motion [s]; its number.
@@ -75,11 +80,12 @@ class GoalMonitor:
         self._applied_offset, self._feed = NO_OFFSET, FULL_FEED
         #: Whether a contact watch outside of the goal stops the arm at contact, and moves it back.
         self.contact_is_watched = False
-        #: Scaled time: time since the start, as the controller's clock ran [s]; delay allowed to
-        #: the goal, because the motion began late, waited or was slowed [s].
+        #: Time since the start in the time of the motion, which runs slower than real time while
+        #: the motion is slowed [s]; delay that the end of the goal may have, because the motion
+        #: began late, waited or was slowed [s].
         self.scaled_time = self.allowed_delay = 0.0
-        #: Delay of the controller's clock by slider and pauses, in the interval before the newest
-        #: packet [s], whether or not the arm moved.
+        #: Time by which speed slider and pauses have delayed motions between the previous and the
+        #: newest packet [s]; it also counts while the arm does not move.
         self.held_time = 0.0
         #: Rate of the motion's time just before the newest packet: 0 = stopped, 1 = real time.
         self.rate = 0.0
@@ -90,9 +96,9 @@ class GoalMonitor:
         """
         Note that a trajectory starts, perhaps from rest in the middle of the goal.
 
-        :param stale_begun: the count of begun motions that the robot reports until it reads START:
-            the register keeps the previous goal's count, so the count is trusted once it changes.
-        :param sent: number of records of the goal sent before.
+        :param stale_begun: the count of begun motions that the robot reports until it reads START.
+            This is the count of the previous trajectory, so the count is trusted once it changes.
+        :param sent: number of records of the goal that were sent before this trajectory.
         """
         self._stale_begun, self._awaits_count = stale_begun, True
         self._motions_begun = self._motions_before = self.records.motions_before(sent)
@@ -111,11 +117,12 @@ class GoalMonitor:
         feed: FeedState = FULL_FEED,
     ) -> None:
         """
-        Process a packet; while the goal moves the arm, also advance time and path position.
+        Process a packet; if ``moving``, also advance the time and the position on the path.
 
         :param begun: number of begun motions that the robot reports; None = it gives no count.
-        :param behind: largest lag of the controller's target behind that count, in motions.
-        :param applied_offset: the offset that displaces the path at the controller's target.
+        :param behind: largest number of motions by which the target can lag behind that count.
+        :param moving: whether the goal moves the arm.
+        :param applied_offset: the path offset at the target.
         :param feed: the feed override of the motion.
         """
         before, self.latest = self.latest, state
@@ -144,7 +151,7 @@ class GoalMonitor:
         self._standstill.update(before, state, passed, feed.value)
 
     def _count(self, begun: int | None) -> None:
-        """Accept the reported count of motions, unless it may be the previous goal's."""
+        """Accept the reported count of motions, unless it may be the previous trajectory's."""
         if begun is None or self._stale_begun is None or not self.job.reports_points_begun:
             return
         if not self._awaits_count or begun != self._stale_begun:
@@ -161,12 +168,13 @@ class GoalMonitor:
             fastest = max(fastest, tracker_speed(before.target_tcp_twist))
         running = self.records.running_waypoints(begun, behind)
         if running is not None and running[1] < running[0] and self._press() is not None:
-            # The press may hold the tool off its path, but the previous point has been passed.
+            # A press may hold the tool off its path, so the tracker is told that the previous
+            # point was passed.
             self._tracker.pass_stop(running[1])
         self._tracker.update(self._tracked(state.target_tcp_pose), 2.0 * passed * fastest, running)
 
     def finish(self, time: float = inf) -> None:
-        """Set the position to the end of the path, or to a rest at a planned time [s]."""
+        """Set the position to the end of the path, or to the rest at a planned time [s]."""
         self._tracker.finish(time)
 
     def append(self, job: MotionJob, records_before: int) -> None:
@@ -192,7 +200,7 @@ class GoalMonitor:
         return self._tracker.time()
 
     def waypoint(self) -> int:
-        """Return the index of the next point of the goal."""
+        """Return the index of the point to which the tool moves."""
         return self._tracker.waypoint()
 
     def place(self) -> PathPlace | None:
@@ -200,7 +208,7 @@ class GoalMonitor:
         return self._tracker.place() if self._has_begun else None
 
     def buffered(self, sent: int) -> float:
-        """Return the planned time of the sent records ahead of the arm [s]."""
+        """Return the planned time from the arm's place to the end of ``sent`` records [s]."""
         return max(0.0, self.records.end_time(sent) - self._tracker.time())
 
     def records_begun(self) -> int:
@@ -211,14 +219,22 @@ class GoalMonitor:
         )
 
     def script_call(self) -> tuple[float, str]:
-        """Return timeout [s] and place (clause) of the running script function; (0, '') = none."""
+        """
+        Return the timeout [s] of the running script call, and a clause that names its place.
+
+        (0, '') = no function of the user's prelude is running.
+        """
         if not self.job.script_calls:
             return 0.0, ''
         record = self.records.begun_records(self._motions_begun) - 1
         return self.job.script_calls.get(record, (0.0, ''))
 
     def _input_wait(self) -> tuple[float, str]:
-        """Return the timeout [s] and failure clause of a running wait for an input; 0 = none."""
+        """
+        Return the timeout [s] of the running wait for an input, and the clause for its failure.
+
+        (0, '') = the program does not wait for an input.
+        """
         running = None
         if self.job.input_waits:
             running = self.records.running_waypoints(self._motions_begun)
@@ -311,7 +327,11 @@ class GoalMonitor:
         return None
 
     def law_clause(self) -> str:
-        """Return a clause if the robot moves by other laws of motion than the plan, else ''."""
+        """
+        Return a clause if the controller's motion version differs from the planned one, else ''.
+
+        The version decides how the controller times movej and movel; plans assume version 1.
+        """
         job, version = self.job, 0 if self.latest is None else self.latest.motion_version
         is_moves = job.reports_points_begun and not job.execution.traits.is_spline
         if not is_moves or version <= 1:
@@ -375,14 +395,14 @@ class GoalMonitor:
         return None
 
     def _late_call(self) -> str | None:
-        """Return a clause if a function of the prelude takes too long, else None."""
+        """Return a clause if a function of the user's prelude takes too long, else None."""
         timeout, where = self.script_call()
         if not timeout or self._running_time <= timeout:
             return None
         return f'the robot program has been {where} for more than its timeout of {timeout:g} s'
 
     def _wrong_speed(self, state: RobotState) -> str | None:
-        """Return a clause if a program without progress reports is much too fast or slow."""
+        """Return a clause if a program that reports no progress moves far too fast or slowly."""
         if self._speed_check is None or not self._awaits_count:
             return None
         return self._speed_check.violation(state.target_tcp_twist, self.scaled_time, self.time())
@@ -407,14 +427,14 @@ class GoalMonitor:
     # ---- the planned pose of a tool that may give way -----------------------------------------
 
     def _press(self) -> PressWindow | None:
-        """Return the press at the present path position, or None."""
+        """Return the press that includes the present path position, or None."""
         if not self.job.presses:
             return None
         time = self._tracker.time()
         return next((press for press in self.job.presses if press.contains(time)), None)
 
     def _desired(self, state: RobotState) -> Pose:
-        """Return the planned pose near the present path position, with the path offset."""
+        """Return the planned pose nearest to the tool, displaced by the path offset."""
         planned = self._tracker.desired(
             self._tracked(state.actual_tcp_pose), state.target_tcp_twist
         )
@@ -423,9 +443,9 @@ class GoalMonitor:
 
     def _tracked(self, pose: Pose) -> Pose:
         """
-        Return a pose without the path offset, and without the way that the tool gives in a press.
+        Return a pose without the path offset, and without the tool's yield in a press.
 
-        The share of that way that may be progress along the path is kept.
+        Yield along the path cannot be told from progress, so this share of it is kept.
         """
         pose, press = self._undisplaced(pose), self._press()
         if press is None or self._tracker.time() > press.end:
@@ -436,7 +456,7 @@ class GoalMonitor:
         )
 
     def _stiff(self, pose: Pose) -> Pose:
-        """Return a pose as it would be without the path offset and if the press were rigid."""
+        """Return a pose without the path offset, and without any yield of the tool in a press."""
         pose, press = self._undisplaced(pose), self._press()
         return pose if press is None else press.without_yield(self._tracker.pose(), pose)
 
@@ -449,7 +469,7 @@ class GoalMonitor:
         return self.contact_is_watched or (press is not None and press.ends_at_contact)
 
     def _retracted(self, pose: Pose, planned: Pose) -> Pose:
-        """Return the planned pose, or an earlier one if the tool retracts after contact."""
+        """Return the planned pose, or an earlier one if it is nearer to a retracting tool."""
         if not self._may_retract():
             return planned
         behind = self._tracker.behind(pose)

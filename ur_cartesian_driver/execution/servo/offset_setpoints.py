@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Set-points of a path that offsets displace while the arm moves.
+Set-points with path offsets: the client displaces the tool from its path while the arm moves.
 
 The tool moves towards the requested offset (:mod:`~ur_cartesian_driver.execution.offsets`) with
-bounded speed and acceleration along each axis of the frame of the path, never beyond the limits of
-the goal, and back to its path in time for the end of the motion. All of this runs in the time of
-the motion: when the motion is held, so is the offset.
+bounded speed and acceleration along each of three axes: along, across and normal to the path. It
+never leaves the limits of the goal, and is back on its path for the end of the motion. All of this
+runs in the time of the motion: when the motion is held, so is the offset.
 
 The joint positions of the path are changed so that the tool is displaced but turns as planned.
 """
@@ -45,18 +45,18 @@ from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 #: Length of the steps, in the time of the motion, in which the offset moves [s].
 STEP = MIN_STEP
-#: Number of set-points remembered, to find the one that the arm has reached: more than are in
-#: flight.
+#: Number of set-points remembered, to find the one that the arm has reached; more than are on
+#: their way to the arm.
 HISTORY = 192
 _ROUNDING = 1e-9
 
 
 class BoundedOffset:
     """
-    The offset, which moves towards a target within the bounds of a band.
+    The offset, which moves towards a target within the bounds of an :class:`OffsetBand`.
 
-    Speed and acceleration are bounded on each axis by itself, so each can stop at its limit in
-    time.
+    Speed and acceleration are bounded on each axis by itself, so the offset can stop in time at
+    the limit of each axis.
     """
 
     def __init__(self, band: OffsetBand) -> None:
@@ -92,7 +92,7 @@ class BoundedOffset:
 
 
 class OffsetSetpoints(Displaced):
-    """The set-points of another source, displaced."""
+    """The set-points of another source, displaced by path offsets."""
 
     def __init__(
         self,
@@ -118,7 +118,7 @@ class OffsetSetpoints(Displaced):
         self._before = ZERO3
         #: Displacement of the newest set-point from the joints on the path [rad].
         self._change: Vector6 = ZERO6
-        # The newest set-points: joints, shift of the tool, offset in the frame of the path.
+        # The newest set-points: joints [rad], shift and offset of :class:`AppliedOffset` [m].
         self._history: Floats = np.zeros((HISTORY, 12))
         self._count = self._seen = 0
 
@@ -159,8 +159,8 @@ class OffsetSetpoints(Displaced):
             shift = self._band.shift(self._time, offset)
             flange = self._arm.forward(on_path)
             near = add6(on_path, self._change)
-            # The band was checked in planning: only rounding can leave no solution, and then the
-            # last change is kept.
+            # Planning has checked the whole band, so inverse kinematics fails by rounding only;
+            # then the last change is kept.
             moved = shift
             if self._moving_frame is not None:
                 moved = self._moving_frame.flange_shift(flange, shift)
@@ -174,10 +174,10 @@ class OffsetSetpoints(Displaced):
 
     def applied_offset(self, packet: RobotState) -> AppliedOffset:
         """
-        Return the offset that the controller's target has now.
+        Return the offset of the joints that the controller commands now (its target).
 
-        This is the offset of the set-point nearest to the target, among the set-points not passed
-        before.
+        This is the offset of the set-point nearest to the target; set-points that were passed
+        before are not considered.
         """
         if not self._count:
             return NO_OFFSET
