@@ -1,12 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Goals from other files: CSV, G-code, DXF, ROS messages, recordings, URScript.
+Make goals from files of other formats: CSV, G-code, DXF, ROS messages, recordings, URScript.
 
 Each format has a module that collects points; `imported_goal` makes a goal of the points, in the
 same way for all formats. Nothing is dropped silently: remarks list everything in the file that the
-goal lacks, with its lines.
-Other packages can add formats: doc/adding_a_format.md.
+goal lacks, with its lines. Other packages can add formats: doc/adding_a_format.md.
 """
 
 from __future__ import annotations
@@ -113,7 +112,7 @@ def import_message(message: Any, options: ImportOptions | None = None) -> Import
     """
     Read a nav_msgs/Path, a trajectory_msgs/JointTrajectory, or another message with a path.
 
-    In the remarks, numbers of points (from 1) take the place of lines.
+    Remarks on a message name numbers of points, from 1, instead of lines.
 
     :raises BrokenFile: the message has no path, or a value does not suit its field.
     """

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Import options, the same for all formats, and the notation of their outputs."""
+"""Import options, the same for all formats, and the notation in which users write them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.goal.goal import CORNER_DEVIATION, IOCommand, OutputKind
 from ur_cartesian_driver.motion.goal.output_names import output_fault
 
-#: Length units [m].
+#: Length of each unit [m].
 LENGTH_UNITS: Mapping[str, float] = {
     'um': 1e-6,
     'mm': 1e-3,
@@ -41,9 +41,10 @@ _CODE = re.compile(rf'S|M[0-9]+(\.[0-9]+)?(\s*{_CODE_WORD.pattern})*')
 class ToolOrientation(Enum):
     """The source of the tool's orientation."""
 
-    #: At each point: the file's orientation; without one, against the normal; else down.
+    #: At each point, the orientation in the file; without one, as NORMALS; without normal, as
+    #: DOWN.
     FILE = 'file'
-    #: The tool's axis z against the normals of the file.
+    #: The tool's axis z opposite to the surface normals in the file.
     NORMALS = 'normals'
     #: The tool's z opposite to z of the frame, and its x along y of the frame.
     DOWN = 'down'
@@ -55,7 +56,7 @@ class CodeOutput:
 
     kind: OutputKind
     pin: int
-    #: The value that the output gets, 0 to 1; for S, the S number that means 1.
+    #: The value that the output gets, 0 to 1; for the code S, the S number at which it gets 1.
     value: float
 
     def command(self, value: float) -> IOCommand:
@@ -106,7 +107,8 @@ def parse_length(text: str) -> float:
     """
     Return the length [m] in a text with a unit, such as ``0.1mm``.
 
-    :raises ValueError: the text is no length, has no unit, or is not at least 0 and below 100 m.
+    :raises ValueError: the text is no length or has no unit, or the length is negative, or 100 m
+        or more.
     """
     match = _LENGTH.fullmatch(text)
     if match is None or match[2].lower() not in LENGTH_UNITS:
@@ -123,8 +125,8 @@ class ImportOptions:
 
     #: The frame of the points; empty = the frame of the file, else the robot's base.
     frame: str = ''
-    #: The frame that follows the path, such as a fixed tool before a held part; empty = the
-    #: active TCP.
+    #: The frame that moves along the path; a fixed tool, for a path on a part that the arm holds.
+    #: Empty = the active TCP.
     tool: str = ''
     #: The pose of the file's origin in the frame.
     origin: Pose = IDENTITY
@@ -140,7 +142,8 @@ class ImportOptions:
     travel_speed: float | None = None
     #: Acceleration [m/s^2] of lines and arcs; None = the file's, else the driver's parameter.
     acceleration: float | None = None
-    #: Duration [s] of the motion to the first point, if the file has times; None = its first time.
+    #: Duration [s] of the motion to the first point, if the file has times; None = the time of
+    #: this point in the file.
     approach_time: float | None = None
     #: Blend radius [m] at inner points for which the file has none; smaller where lines are short.
     blend: float = 0.0
@@ -165,15 +168,15 @@ class ImportOptions:
 
     @property
     def moves_path(self) -> bool:
-        """Whether an option moves or scales the path, which joint positions cannot follow."""
+        """Whether an option moves or scales the path; joint positions permit no such option."""
         moved = self.frame not in ('', 'base') or self.origin != IDENTITY
         return moved or bool(self.tool) or self.scale != 1.0
 
     def __post_init__(self) -> None:
         """
-        Refuse a corner that no goal can have.
+        Check ``corner``.
 
-        :raises ValueError: the corner is out of its range, or a blend is given, too.
+        :raises ValueError: ``corner`` is out of its range, or ``blend`` is given, too.
         """
         if not CORNER_DEVIATION.holds(self.corner):
             raise ValueError(f'corner {CORNER_DEVIATION.refusal(self.corner)[0]}')

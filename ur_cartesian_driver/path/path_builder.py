@@ -4,8 +4,9 @@
 A path of the tool, composed motion by motion.
 
 A :class:`Path` never changes: each method returns a new one. Units are SI (:func:`~.units.mm` and
-:func:`~.units.deg` convert), poses place the controlled frame in the frame of the path. A mistake
-raises an :exc:`~ur_cartesian_driver.motion.errors.InvalidGoal` at the program line that makes it.
+:func:`~.units.deg` convert). Each pose is the pose of the controlled frame (by default the active
+TCP) in the frame of the path (by default the robot's base). A mistake raises an
+:exc:`~ur_cartesian_driver.motion.errors.InvalidGoal` at the program line that makes it.
 """
 
 from __future__ import annotations
@@ -123,9 +124,9 @@ class Path(PathWithEvents):
         """
         Set the largest deviations on the path and at its end; None = as before.
 
-        :param time: largest delay of the end after its planned time [s], negative = any.
-        :param stall: how long the motion waits for an arm that is off its path [s], SERVO only;
-            0 = such an arm is stopped, and the goal ends.
+        :param time: largest delay of the end after its planned time [s]; negative = no limit.
+        :param stall: longest wait of the motion for an arm outside the path tolerance [s], SERVO
+            only; 0 = no wait: the arm is stopped, and the goal ends.
         :raises InvalidGoal: a value is not a tolerance, or not a finite time.
         """
         where = 'tolerances()'
@@ -167,8 +168,9 @@ class Path(PathWithEvents):
 
     def steady(self, min_fraction: float = 0.95) -> Path:
         """
-        Demand a fraction (0 to 1) of the asked speed everywhere; a slower path is refused.
+        Have planning refuse the path if it is anywhere slower than a fraction of its given speed.
 
+        :param min_fraction: the fraction, 0 to 1.
         :raises InvalidGoal: the fraction is out of its range.
         """
         return self._with_settings('steady()', min_speed_fraction=min_fraction)
@@ -182,8 +184,8 @@ class Path(PathWithEvents):
         ``line(..., corner_deviation=mm(0.1))``.
 
         :param deviation: [m]; 0 = corners are rounded only after motions with their own deviation.
-        :param angle: how far the tool may be turned from its programmed orientation [rad]; 0 =
-            0.02.
+        :param angle: largest turn of the tool away from its programmed orientation [rad]; 0
+            selects the default, 0.02.
         :raises InvalidGoal: a number is out of its range.
         """
         for name, value, bounds, remedy in (
@@ -214,11 +216,13 @@ class Path(PathWithEvents):
         Offsets are set by ``set_path_offset`` of the running motion, or on the topic
         ``~/path_offset``.
 
-        :param along: largest offset along the path, either way [m]; likewise ``across`` it and
-            ``normal`` to it.
-        :param speed: largest speed of the offset along each axis [m/s]; 0 = 0.02.
-        :param acceleration: largest acceleration of the offset along each axis [m/s^2]; 0 = 0.2.
-        :param timeout: age from which an offset is stale [s]; 0 = 0.5.
+        :param along: largest offset along the path, either way [m]; ``across``: along the cross
+            product of the path's direction and the tool's z axis; ``normal``: normal to both.
+        :param speed: largest speed of the offset along each of these axes [m/s]; 0 selects the
+            default, 0.02.
+        :param acceleration: largest acceleration of the offset along each axis [m/s^2]; 0 selects
+            the default, 0.2.
+        :param timeout: age from which an offset is stale [s]; 0 selects the default, 0.5.
         :param on_stale: whether a stale offset stays, or the tool goes back to its path.
         :raises InvalidGoal: a number is out of its range.
         """
@@ -243,8 +247,8 @@ class Path(PathWithEvents):
         :param minimum: smallest fraction of the planned speed, 0.01 to 1; also before the first
             signal, and while the signal is stale or invalid.
         :param maximum: largest fraction of the planned speed.
-        :param rate: largest change of the fraction [1/s]; 0 = 0.5.
-        :param timeout: age from which the signal is stale [s]; 0 = 0.5.
+        :param rate: largest change of the fraction [1/s]; 0 selects the default, 0.5.
+        :param timeout: age from which the signal is stale [s]; 0 selects the default, 0.5.
         :raises InvalidGoal: a number is out of its range.
         """
         bounds = FeedOverride(minimum=minimum, maximum=maximum, rate=rate, timeout=timeout)
@@ -254,8 +258,8 @@ class Path(PathWithEvents):
         """
         Allow points to be appended while the arm moves.
 
-        :param replace_horizon: how far ahead of the arm points are fixed [s]; later points can be
-            replaced. 0 = no points can be replaced.
+        :param replace_horizon: time from now for which the motion is fixed [s]; points after this
+            time can be replaced. 0 = no points can be replaced.
         :raises InvalidGoal: the horizon is out of its range.
         """
         return self._with_settings('keep_open()', keep_open=True, replace_horizon=replace_horizon)
@@ -264,9 +268,9 @@ class Path(PathWithEvents):
         """
         Let the arm travel to the path if the arm is far away, or the direct way is refused.
 
-        The driver plans the travel together with the path (PRIMITIVES without durations). A start
-        becomes the first point of the path; if the direct way is free, the arm goes there on a
-        line.
+        The driver plans the travel together with the path (PRIMITIVES without durations). If the
+        path has a start, it becomes the first point; the arm moves there on a line if that is
+        free.
         """
         path = self._with_settings('allow_travel()', allow_travel=True)
         if self._start is None:
@@ -358,7 +362,7 @@ class Path(PathWithEvents):
         Return the path of :meth:`travel_to`, and the arm's joints and the cell at its end.
 
         :param place: the arm's joints and the cell at the end of this path.
-        :param where: the beginning of refusals.
+        :param where: the beginning of error messages, such as "The travel".
         """
         traveller = Traveller(by, place, other._begin(by, where), where)
         runs = traveller.runs()
@@ -401,7 +405,7 @@ class Path(PathWithEvents):
         Return the beginning of the path, for an arm that travels to it.
 
         :raises InvalidGoal: the path has no start.
-        :raises NotAvailable: the frame of the path moves with the arm.
+        :raises NotAvailable: the path's frame moves with the arm, on a held part.
         """
         if self.start is None or not self._points:
             raise no_start(where)
@@ -416,7 +420,7 @@ class Path(PathWithEvents):
         return PathBegin(goal, self.start)
 
     def _with_legs(self, legs: Iterable[Leg], factor: float) -> Path:
-        """Return the path with the motions of a travel, whose blends are scaled by a factor."""
+        """Return this path followed by a travel's motions, their blends scaled by ``factor``."""
         path = self.free(None)
         for leg in legs:
             blend = factor * leg.blend
@@ -432,7 +436,8 @@ class Path(PathWithEvents):
         """
         Return this path moved by a distance [m].
 
-        :param of_tool: move each point along the axes of the tool there, not of the frame.
+        :param of_tool: move each point along the tool's axes at this point, not along the axes of
+            the path's frame.
         :raises InvalidGoal: with ``of_tool``, an arc turns the tool, so that the result is not an
             arc; or the tool turns in a spline at a point whose twist has no angular part.
         """
@@ -459,10 +464,10 @@ class Path(PathWithEvents):
 
     def transformed(self, T: Pose) -> Path:
         """
-        Return this path with each pose transformed by a pose in the frame: ``T @ pose``.
+        Return this path with each pose replaced by ``T @ pose``, both in the path's frame.
 
-        :raises InvalidGoal: the position is too far away, or the pose turns a twist of a spline
-            that has only some of its linear or angular components.
+        :raises InvalidGoal: the position of ``T`` is out of bounds, or ``T`` turns a twist of a
+            spline that has only some of its linear or angular components.
         """
         T = Pose(
             vector('transformed()', T.position, MAX_COORDINATE), unit_quaternion('T', T.quaternion)
@@ -524,8 +529,8 @@ class Path(PathWithEvents):
 
         For ``overlap`` and ``approach`` [m] see :func:`~.resumption.resume`.
 
-        :raises InvalidGoal: the path is kept open, its frame moves with the arm, or a number is
-            out of its range.
+        :raises InvalidGoal: the path has :meth:`keep_open`, its frame moves with the arm, or a
+            number is out of its range.
         """
         left = resume(self._table(), place, overlap=overlap, approach=approach, start=self.start)
         return Path.from_goal(left.goal)
@@ -565,7 +570,7 @@ class Path(PathWithEvents):
 
     def weave(self, amplitude: float, wavelength: float) -> Path:
         """
-        Return a spline that swings to both sides of this path, across the axis z of the tool.
+        Return a spline that swings to both sides of this path, at right angles to the tool's z.
 
         Lines and arcs without corners become a spline through eight points on each wave. The
         motion is from rest to rest, at the speed along the path that :meth:`at` has set.
@@ -601,11 +606,11 @@ class Path(PathWithEvents):
 
     def goal(self, frames: Frames | None = None, snapshot: ArmSnapshot | None = None) -> Goal:
         """
-        Return the goal, as the driver plans it.
+        Return the path as a goal whose frames are resolved, which is what the driver plans.
 
         :param frames: poses of the frames that the path names; None = only the frames that every
             robot has.
-        :param snapshot: the arm, for frames that move with it.
+        :param snapshot: the state of the arm; needed if a frame moves with the arm.
         :raises InvalidGoal: a frame is not known.
         :raises RobotNotReady: a frame moves with the arm, whose pose is not known.
         """
@@ -655,7 +660,7 @@ class Path(PathWithEvents):
         return cls.from_goal(goal_from_fields(message))
 
     def to_yaml(self) -> str:
-        """Return the YAML of a goal file; numbers keep every bit."""
+        """Return the YAML of a goal file; reading it back gives exactly the same numbers."""
         return goal_text(self._fields())
 
     @classmethod
@@ -678,7 +683,7 @@ class Path(PathWithEvents):
         return cls.from_message(read_goal_file(FilePath(file)))
 
     def _table(self) -> GoalTable:
-        """Return the goal with its frames unresolved."""
+        """Return the path as a goal that names its frames, but does not have their poses."""
         self._check_ends()
         if self._start is not None and self._start.segment.dwell:
             raise InvalidGoal(

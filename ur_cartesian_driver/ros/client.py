@@ -93,9 +93,11 @@ def apply_leads(
     goal: FollowCartesianTrajectory.Goal, leads: Sequence[Lead], file: str
 ) -> FollowCartesianTrajectory.Goal:
     """
-    Shift the outputs that name a lead to their earlier times, as a driver does; return the goal.
+    Switch each output that names a lead earlier by this lead, as a driver does; return the goal.
 
-    :param file: the file of the leads, for refusals.
+    A lead is the time by which an output has to switch early, because its valve acts late.
+
+    :param file: the file of the leads, for error messages.
     :raises InvalidGoal: as for :func:`~ur_cartesian_driver.motion.goal.leads.with_lead_times`.
     """
     commands = with_lead_times(io_commands(goal), leads, file)
@@ -113,9 +115,10 @@ def resumed_goal(
     goal: FollowCartesianTrajectory.Goal, place: PathPlace, *, overlap: float, approach: float
 ) -> tuple[FollowCartesianTrajectory.Goal, ResumedGoal]:
     """
-    Return the rest of a goal that was stopped at a place, as a message and as a resumed goal.
+    Return the rest of a goal that was stopped at a place, as a message and as a ResumedGoal.
 
-    :param overlap: a length [m], like ``approach``; see :func:`~ur_cartesian_driver.path.resume`.
+    For ``overlap`` and ``approach`` [m] see :func:`~ur_cartesian_driver.path.resume`.
+
     :raises InvalidGoal: the goal cannot be resumed.
     """
     left = resume(goal_from_fields(goal), place, overlap=overlap, approach=approach)
@@ -216,7 +219,7 @@ class GoalClient:
         """
         Send a goal and return its status (:data:`STATUS_NAMES`) and result.
 
-        A goal of many points is sent in flat arrays.
+        A goal of many points is sent with its points packed into arrays.
 
         On the first SIGINT, SIGTERM or SIGHUP, the client cancels the goal, waits for its result
         and sets :attr:`signal_number`; on the second one, it raises KeyboardInterrupt.
@@ -229,7 +232,7 @@ class GoalClient:
             goal goes on.
         :raises TimeoutError: no driver answers.
         :raises ConnectionError: the goal was not accepted, or the driver is gone or was started
-            again; in the latter cases the end of the goal is not known.
+            again; in the last two cases it is not known how the goal ended.
         """
         driver = self._find_driver(timeout)
         if goal.keep_open and self._append_service is None:
@@ -301,9 +304,10 @@ class GoalClient:
 
         This can be called from anywhere while the goal runs, also in the callback of :meth:`send`.
 
-        :param along: offset in the direction of the motion [m]; ``across``: in the direction
-            along x the tool's z axis; ``normal``: in the direction along x across. Each is limited
-            to the ``path_offset.limits`` of the goal.
+        :param along: offset in the direction of the motion [m]; ``across``: in the direction of
+            the cross product of this direction and the tool's z axis; ``normal``: in the direction
+            of the cross product of the other two. Each offset is limited to the
+            ``path_offset.limits`` of the goal.
         """
         if self._offsets is None:
             self._offsets = self._node.create_publisher(
@@ -317,10 +321,11 @@ class GoalClient:
         """
         Slow the running goal from now on, if it permits a feed override.
 
-        This can be called from anywhere while the goal runs, also in the callback of :meth:`send`;
-        call it again before the ``feed_override.timeout`` of the goal has passed.
+        This can be called from anywhere while the goal runs, also in the callback of :meth:`send`.
+        The fraction becomes stale after the ``feed_override.timeout`` of the goal; call this again
+        before that.
 
-        :param fraction: of the planned speed, 0 to 1.
+        :param fraction: fraction of the planned speed, 0 to 1.
         """
         if self._feeds is None:
             self._feeds = self._node.create_publisher(Float64, f'{self._driver}/feed_override', 1)
@@ -340,14 +345,15 @@ class GoalClient:
         This can be called from anywhere while the goal runs, also in the callback of :meth:`send`.
         The call does not wait; requests are sent one after the other.
 
-        :param path: a path or message with times from the start of the goal, of which only
-            points, segments and outputs are used. Outputs count from the first point of the path
-            or, in a message, of the goal. None = no points, allowed only with ``last``.
+        :param path: a path or goal message, of which only points, segments and outputs are used.
+            Its times count from the start of the running goal. The outputs of a path number its
+            own points from 0, the outputs of a message the points of the running goal. None = no
+            points, allowed only with ``last``.
         :param last: whether these are the last points of the goal.
         :param replace_from_point: the first point that the new ones replace, together with all
             later points.
-        :param replace_from_time: alternatively, the time from which new points replace old ones
-            [s].
+        :param replace_from_time: alternatively, the time from the start of the goal from which
+            new points replace old ones [s].
         :returns: a future of the response of ``~/append_points``. If the request is refused,
             ``accepted`` is false, ``message`` says why, and the goal goes on as it was.
         :raises RuntimeError: no goal of this client runs.
@@ -441,7 +447,7 @@ class GoalClient:
 
     def _find_driver(self, timeout: float) -> Endpoints:
         """
-        Wait for the driver, and return its endpoints; a driver that is started later has others.
+        Wait for the driver, and return its endpoints, which a driver that is restarted changes.
 
         A killed driver stays visible for some seconds beside its successor, so this waits until
         only one driver is left.
@@ -527,7 +533,11 @@ class GoalClient:
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:
-        """During the block, store the first signal; the second one raises KeyboardInterrupt."""
+        """
+        During the block, store the first signal; the second one raises KeyboardInterrupt.
+
+        Only the main thread can do this; in another thread, signals are handled as before.
+        """
         if threading.current_thread() is not threading.main_thread():
             yield
             return

@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 _MAX_SECONDS = 2**31 - 1
-#: ``first_index`` of an append request: at the end of the goal, whatever its number of points.
+#: The ``first_index`` of an append request that means: after the last point of the goal.
 AT_END = 2**32 - 1
 
 
@@ -45,11 +45,11 @@ def age_of(stamp: Time, now: int) -> float | None:
 
 def checked_age(stamp: Time, now: int, max_age: float, bound: str, *, ahead: float) -> float:
     """
-    Return the age of a message [s]: 0 for the stamp 0, and not below 0.
+    Return the age of a message [s]; 0 if its stamp is 0 or in the future.
 
     :param now: time of the node's clock [ns].
     :param max_age: largest age [s].
-    :param bound: the name of ``max_age``, for the refusal.
+    :param bound: the name of ``max_age`` in error messages.
     :param ahead: how far the stamp may lie in the future [s], because clocks differ.
     :raises InvalidGoal: the stamp is too old, or too far in the future.
     """
@@ -95,9 +95,8 @@ def class_of(type_name: str) -> Any:
     """
     Return the class of a type such as ``control_msgs/action/FollowJointTrajectory``.
 
-    None if its package is not installed, or lacks the type.
-
-    An installed package that is broken raises its own exception.
+    :returns: the class; None if its package is not installed, or lacks the type.
+    :raises Exception: the package is installed but broken; any exception of its import.
     """
     package, kind, name = type_name.split('/')
     module = f'{package}.{kind}'
