@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Plan the points that are appended to a goal (keep_open) in parts, one after the other.
+Plan, part by part, a goal to which points are appended while it runs (keep_open).
 
 The last motion of a part is planned to end at rest, because the next point is unknown. The driver
 holds this motion back as the *ending* of the goal. If points come in time, the ending is planned
@@ -13,7 +13,9 @@ these. A spline needs no such context, as position, velocity and acceleration ar
 the ending of a spline is a piece that brakes after the last point
 (:func:`~ur_cartesian_driver.planning.spline.spline_planner.plan_stop`).
 
-See :mod:`~.appendable_goal` for client time and motion time.
+A *record* is one instruction for the robot program. A record is *committed* if the robot executes
+it whatever points come later: the records of the ending are not committed. See
+:mod:`~.appendable_goal` for client time and motion time.
 """
 
 from __future__ import annotations
@@ -92,7 +94,7 @@ class AppendPlan:
 
     #: The plan, including the ending; the times of its reference path are motion times.
     plan: Plan
-    #: Number of records of the goal, on the trajectory socket, before the records of this plan.
+    #: Number of records of the goal before the records of this plan.
     records_before: int
     #: Motion time at which those earlier records end [s].
     start_time: float
@@ -102,7 +104,8 @@ class AppendPlan:
     end_time: float | None
     #: The joints over motion time; None = the goal is no spline.
     spline: JointSpline | None = None
-    #: Motion time at which a spline leaves the plan before [s]; None = at that plan's last point.
+    #: Motion time at which a spline departs from the previous plan, whose tail it replaces [s];
+    #: None = it continues from the last point of the previous plan.
     cut_time: float | None = None
     #: The answer to the client.
     text: str
@@ -151,7 +154,8 @@ def plan_append(
     Return the plan of appended points.
 
     :param from_rest: whether the ending was sent, so that the arm is or will be at rest.
-    :raises GoalRefused: the points are wrong; the text numbers points from the goal's start.
+    :raises GoalRefused: the points cannot be executed; the error message numbers points from the
+        start of the goal.
     """
     for i, command in enumerate(appended.io_commands):
         check_record(f'io_commands[{i}]', command)
@@ -179,7 +183,7 @@ def plan_append(
             return planner.append_spline(
                 rest, records_before, time + delay - appendable.last_client_time
             )
-        except TooFast as refusal:  # more time changes nothing about other refusals
+        except TooFast as refusal:  # more time remedies no other error
             last_refusal = refusal
     raise last_refusal
 
@@ -239,9 +243,13 @@ class _PartPlanner:
         return self.moves_part(plan, records_before, start_time)
 
     def _pending_commands(self, first: int, start_time: float) -> tuple[IOCommand, ...]:
-        """Return the part's commands and earlier ones still due, numbered from point ``first``."""
+        """
+        Return the output commands of this part, and the earlier ones that are still due.
+
+        They count the points of the goal from point ``first``, which has the number 0.
+        """
         old = []
-        # Row of the replanned point whose motion is already committed; negative = none.
+        # Index in ``replannable`` of the point whose motion is already committed; negative = none.
         committed = len(self._before.replannable) - 2
         for end_time, command in self._before.outputs:
             if command.waypoint == self._before.points - 1:
@@ -268,7 +276,7 @@ class _PartPlanner:
         return self._part(plan, records_before, start_time, 1, next_goal, timed=timed)
 
     def _replannable(self, plan: Plan) -> tuple[ReplannablePoint, ...]:
-        """Return the last points of the goal, with the state of the arm before each."""
+        """Return the last ``REPLANNED_POINTS`` points, with the state of the arm before each."""
         before = self._before
         known = list(before.replannable) + [
             ReplannablePoint(
@@ -295,11 +303,11 @@ class _PartPlanner:
         self, plan: Plan, start_time: float
     ) -> tuple[tuple[float, IOCommand], ...]:
         """
-        Return the commands whose records belong to the ending; the next part places them again.
+        Return the output commands whose records belong to the ending, each with its due time [s].
 
-        Records that precede the last motion are committed, even if they are due during it. Equal
-        commands have their records in the order of time, so the committed records belong to the
-        earliest of these commands.
+        The next part places them again. Records that precede the last motion are committed, even
+        if they are due during it. Commands that set the same output to the same value have their
+        records in the order of time, so the committed records belong to the earliest of them.
         """
         rows = plan.rows
         ends = _end_times(rows.waypoints, rows.durations, start_time)
@@ -336,7 +344,7 @@ class _PartPlanner:
         """
         Return a part made of spline pieces, which begins in the state ``start``.
 
-        :param time_offset: motion time less client time [s].
+        :param time_offset: motion time minus client time [s].
         """
         before = self._before = replace(self._before, time_offset=time_offset)
         goal = self._spline_goal(start)
@@ -368,7 +376,7 @@ class _PartPlanner:
         return self.spline_part(plan, begin, found.end, records_before)
 
     def _spline_goal(self, start: SplineState) -> GoalTable:
-        """Return the checked goal of the appended points, with motion times and for the TCP."""
+        """Return the checked goal of the appended points: motion times, poses of the TCP."""
         before, appended = self._before, self._appended
         points = WaypointRows.of(appended.waypoints)
         # The points are checked as a goal of their own, with times since the point before them.
@@ -408,7 +416,7 @@ class _PartPlanner:
         Return a part whose ending is a stopping piece, if the arm moves at its last point.
 
         If outputs are due at the last point or later, the piece to that point also belongs to the
-        ending: the outputs follow that piece on the wire, and their triggers depend on the next
+        ending: the outputs are sent after that piece, and their triggers depend on the next
         points.
 
         :param begin: the state at the beginning of the plan; ``end``: at its last point.
@@ -485,7 +493,8 @@ class _PartPlanner:
         if closing is not None:
             stop, path = closing
             rows, reference = rows + stop, reference + path
-            # The stop leads to no point: outputs that are due during it come after the last point.
+            # The stop leads to no point. It gets the number after the last point, so that outputs
+            # that are due during the stop come after the last point.
             waypoints = np.append(waypoints, stop.waypoints + 1)
         ends = _end_times(waypoints, rows.durations, start_time)
         bare = replace(rows, waypoints=waypoints, outputs={})
@@ -523,7 +532,7 @@ class _PartPlanner:
         self, field: str, command: IOCommand, path: TimedPath, ends: Mapping[int, float]
     ) -> float:
         """
-        Return the time at which a new command is due [s].
+        Return the motion time at which a new command is due [s].
 
         :raises InvalidGoal: its place is after the last point, on a path that may change.
         """
@@ -558,6 +567,7 @@ class _PartPlanner:
         Return an append plan, and set the counts of points and records in its ``next_goal``.
 
         :param ending: the number of motions of the ending.
+        :param timed: whether the points have times.
         """
         last, rows = self._appended.last, plan.rows
         # The pulses on the first part were checked, from their beginning, when it was planned.
@@ -592,11 +602,11 @@ class _PartPlanner:
         )
 
     def _at_rest(self, q: Joints) -> RobotState:
-        """Return the state of a robot at rest in a configuration of the goal."""
+        """Return the state of a robot at rest at the joints ``q`` [rad], with the goal's TCP."""
         return state_at_rest(self._arm, q, self._before.T_flange_active)
 
     def _text(self) -> str:
-        """Return the answer, with remarks on ineffective fields of the appended points."""
+        """Return the answer, with remarks on fields of the new points that have no effect."""
         before, appended = self._before, self._appended
         goal = replace(
             before.goal,
@@ -620,8 +630,9 @@ def _renumber_plan(plan: Plan, first: int, waypoint: int, start_time: float) -> 
     """
     Return the plan of the points from ``waypoint`` on, which begins at ``start_time`` [s].
 
-    :param first: the goal's number of the plan's point 0, from which the result counts points.
-    :param waypoint: a number of the goal.
+    :param first: the number in the goal of the plan's point 0; the result uses numbers of the
+        goal.
+    :param waypoint: the first point to keep, by its number in the goal.
     """
     left_out = int(np.searchsorted(plan.rows.waypoints, waypoint - first))
     begin, rows = sum(plan.rows.durations[:left_out].tolist()), plan.rows[left_out:]
@@ -639,7 +650,7 @@ def _renumber_plan(plan: Plan, first: int, waypoint: int, start_time: float) -> 
             notes={row: _renumber_text(note, first) for row, note in rows.notes.items()},
         ),
         reference=path.since(start_time + SAME_TIME),
-        find_slow_stretches=tuple,  # the plan's function would name other points
+        find_slow_stretches=tuple,  # the plan's function would name points by their old numbers
     )
 
 

@@ -4,14 +4,16 @@
 The timing of a chain of moves as the controller executes them, with a row for each move.
 
 The controller looks one move ahead, and plans each move to come to rest at its waypoint. Where the
-blend begins, the next move is called: the current path is cut there. Along the blend, a parameter
-``s`` runs from 0 to 1, and its rate changes linearly over time. After the blend, the next move
-continues at the speed with which the blend ends. So a move depends on the previous one only
-through the handover (:class:`Handover`), and most moves hand over the same state whatever they
-received. All rows are computed at once; then the rows that received a changed handover are
-computed again, until no handover changes.
+blend begins, the controller starts the next move and cuts the path of the current one. Along the
+blend, a parameter ``s`` runs from 0 to 1, and its rate changes linearly over time. After the
+blend, the next move continues at the speed with which the blend ends. So a move depends on the
+previous one only through the handover (:class:`Handover`), and most moves hand over the same state
+whatever they received. All rows are computed at once; then the rows that received a changed
+handover are computed again, until no handover changes.
 
-Lengths are measured as by the robot: in metres, or in radians if the turn or a joint leads.
+As on the robot, the larger of a move's length in metres and turn in radians *leads* the move; in a
+joint move, the joint that turns farthest leads. Lengths, speeds and accelerations are measured in
+the unit of the leading quantity.
 """
 
 from __future__ import annotations
@@ -31,9 +33,10 @@ _MAX_CATCH_UP = 2.0
 _SAME = 1e-10
 #: A move whose duration deviates by at most this [s] counts as in time.
 _IN_TIME = 1e-7
-#: Greatest number of rounds; in each, all moves that miss their wanted times are fitted.
+#: Greatest number of rounds of :meth:`MoveChain.meet`; in each, the speeds of all moves that miss
+#: their wanted times are fitted.
 _MAX_FITS = 60
-#: Greatest number of steps of a fit.
+#: Greatest number of steps of the secant method that fits a speed.
 _FIT_STEPS = 14
 #: A fit ends when the relative errors of all times are below this.
 _SAME_TIME = 1e-13
@@ -43,21 +46,21 @@ _TINY = 1e-300
 
 
 class _Columns:
-    """Columns (n,) of floats."""
+    """A table with a row for each move, stored as columns (n,) of floats."""
 
     __slots__: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     def of(cls, rows: Any) -> Self:
-        """Return the columns of rows (n, m)."""
+        """Return the table with the given rows (n, number of columns)."""
         return cls(*np.array(rows, dtype=np.float64).reshape(-1, len(cls.__slots__)).T.copy())
 
     def take(self, rows: Indices) -> Self:
-        """Return the given rows."""
+        """Return a table of the rows that ``rows`` (a numpy index) selects."""
         return type(self)(*[getattr(self, name)[rows] for name in self.__slots__])
 
     def put(self, rows: Indices, other: Self) -> None:
-        """Replace the given rows by the rows of ``other``."""
+        """Replace the rows that ``rows`` selects by the rows of ``other``, in the same order."""
         for name in self.__slots__:
             getattr(self, name)[rows] = getattr(other, name)
 
@@ -72,12 +75,13 @@ class Moves(_Columns):
     speed: Floats
     #: Greatest acceleration.
     acceleration: Floats
-    #: Time on the wire [s]; 0 = speed and acceleration apply.
+    #: Time that the robot is given for the move [s]; 0 = it is given speed and acceleration.
     time: Floats
     #: For a move with a time: the fraction of this time for which the move speeds up, and also the
     #: fraction for which it brakes.
     ramp_part: Floats
-    #: Length within which the move brakes from full speed; inf = it brakes with its acceleration.
+    #: Length within which the move brakes from its greatest speed; inf = it brakes with its
+    #: acceleration.
     stops_within: Floats
     #: Length of the move within the blend before it; 0 = no blend, the move begins at rest.
     head: Floats
@@ -89,13 +93,13 @@ class Moves(_Columns):
     entry_rate: Floats
     #: Time that the controller loses before the move [s].
     idle: Floats
-    #: Rate half-way through the blend before the move, relative to the rate there if it changed
-    #: linearly over time all along the blend; 1 = it does.
+    #: Rate of ``s`` half-way through the blend before the move, divided by the rate there if it
+    #: changed linearly over time on the whole blend; 1 = it does.
     bend: Floats
 
     @property
     def accelerations(self) -> Floats:
-        """Accelerations; of a move with a time, the one that it needs from rest to rest."""
+        """Accelerations; for a move with a time, the one that it needs from rest to rest."""
         p = self.ramp_part
         by_time = self.length / np.maximum(p * (1.0 - p) * self.time**2, _TINY)
         return np.where(self.time > 0.0, by_time, self.acceleration)
@@ -132,7 +136,7 @@ class MoveTimes(_Columns):
 
     #: Rate of ``s`` at the beginning of the blend before the move [1/s]; 0 = no blend.
     begin_rate: Floats
-    #: Rate of ``s`` at the end of that blend [1/s]; 0 = no blend.
+    #: Rate of ``s`` at the end of the same blend [1/s]; 0 = no blend.
     end_rate: Floats
     #: Length of the profile.
     length: Floats
@@ -216,9 +220,9 @@ class MoveTimes(_Columns):
 
 def ramp_time(begin: Floats, end: Floats, s: Floats | float, bend: Floats) -> Floats:
     """
-    Return the times (n,) [s] to reach ``s`` in blends.
+    Return the times (n,) [s] to reach ``s`` in blends with the rates ``begin`` and ``end`` [1/s].
 
-    Their rates change linearly over time, on the whole blend or on each half of it: see
+    The rates change linearly over time, on the whole blend or on each half of it: see
     :attr:`Moves.bend`.
     """
     even = _even_ramp_time(begin, end, s)
@@ -305,7 +309,13 @@ class MoveChain:
             self._handed.put(rows, new.take(np.flatnonzero(changed)))
 
     def durations_with(self, rows: Indices, moves: Moves) -> Floats:
-        """Return the durations [s] of rows with other moves, each as if only it had changed."""
+        """
+        Return the durations [s] that the moves of some rows have with other parameters.
+
+        Each is computed as if only this move had changed.
+
+        :param moves: the other parameters, for each of ``rows``.
+        """
         times = _carry_out(moves, self._handed.take(rows))
         after = np.minimum(rows + 1, len(self.moves.length) - 1)
         handed = _hand_over(moves, times)
@@ -325,9 +335,9 @@ class MoveChain:
         Change the speeds so that the moves take the wanted times, as far as possible.
 
         :param wanted: times from point to point (n,) [s]; NaN = the move stays as it is.
-        :param rate: rates of the moves (n,) [1/s]: speed over length, or 1 / time on the wire.
-            They are changed in place, up to ``max_rate``.
-        :param at_rate: function of rows and rates that returns the moves.
+        :param rate: rates of the moves (n,) [1/s]: speed over length, or 1 / the time that the
+            robot is given. They are changed in place, up to ``max_rate``.
+        :param at_rate: returns the parameters of the moves of given rows, at given rates.
         :returns: the times that the moves take (n,) [s].
         """
         asked = np.isfinite(wanted)
@@ -421,14 +431,14 @@ def _hand_over(moves: Moves, times: MoveTimes) -> Handover:
 
 def _blend_rates(moves: Moves, handed: Handover) -> tuple[Floats, Floats]:
     """
-    Return the rates at which blends begin and end.
+    Return the rates of ``s`` [1/s] at which blends begin and end.
 
     The rate changes towards the cruising speed of the move after the blend, within three bounds:
-    neither move may exceed its acceleration in the blend (where it is the squared rate times the
-    length per unit of ``s``), and the remainder of the move after the blend must be long enough to
-    brake. The acceleration of a move with a time is the one that it needs from rest to rest. If
-    the move before the blend has a time, its bound is at least the next move's acceleration,
-    scaled by the ratio of the two lengths.
+    neither move may exceed its acceleration in the blend (a rate causes an acceleration of its
+    square times the length per unit of ``s``), and the remainder of the move after the blend must
+    be long enough to brake. The acceleration of a move with a time is the one that it needs from
+    rest to rest. If the move before the blend has a time, its bound is at least the next move's
+    acceleration, scaled by the ratio of the two lengths.
     """
     blended, timed = handed.rate > 0.0, moves.time > 0.0
     time = np.maximum(moves.time + handed.remaining, _TINY)
@@ -451,9 +461,9 @@ def _fit(
     highest: Floats,
 ) -> Floats:
     """
-    Return the rates at which moves take the wanted times; if none does, the nearer bound.
+    Return the rates at which moves take the wanted times; if no rate does, the nearer bound.
 
-    Times are nearly powers of the rate, so the secant method is applied to logarithms.
+    A duration is nearly a power of the rate, so the secant method is applied to logarithms.
     """
     low, high, x = np.log([lowest, highest, np.clip(rate, lowest, highest)])
     took = durations(np.tile(rows, 3), np.concatenate([lowest, highest, np.exp(x)]))
