@@ -149,7 +149,9 @@ class Controller:
         self.process = ProcessState()
         #: Target pose of the last move; None after a stream of set-points.
         self.waypoint: Pose | None = None
+        #: Whether a program supplies the wrench, in place of the robot's own sensor.
         self.external_ft = False
+        #: Time at which the protective stop is unlocked [s]; inf = no unlock is due.
         self._unlock_at = inf
         self.pendant = Pendant(answers=deque(map(str, config.answers)))
         self.stored = StoredSettings()
@@ -361,7 +363,8 @@ class Controller:
         """
         Stop the arm because the program has ended.
 
-        On a path, the arm slows down along the path; otherwise it brakes at ``HARD_STOP``.
+        On a path, the arm slows down along the path; otherwise its joints brake with the
+        deceleration ``HARD_STOP`` of :mod:`~ur_cartesian_driver.sim.motion.motion_ownership`.
 
         If the arm is paused on its path or stopped by a fault, the path is discarded.
         """
@@ -395,7 +398,7 @@ class Controller:
         self.ownership.end_of_frame()
 
     def release(self, thread: Hashable) -> None:
-        """Take the ownership of the motion from a thread that has ended."""
+        """Take the motion that the arm makes for a thread from this thread, which has ended."""
         self.ownership.release(thread)
 
     def start_refusal(self) -> str:
@@ -419,7 +422,7 @@ class Controller:
             self.remote_control = False
 
     def set_slider(self, fraction: float) -> None:
-        """Set the speed slider, cut to 0..1."""
+        """Set the speed slider; a fraction outside 0..1 becomes the nearer bound."""
         self.speed_slider = min(1.0, max(0.0, fraction))
 
     def load_program(self, name: str) -> str:
@@ -457,7 +460,11 @@ class Controller:
             then(self.load_program(name))
 
     def _stored_program(self, file: str) -> SavedProgram | None:
-        """Return a stored program, as text unless it has External Control; None = no such file."""
+        """
+        Return a stored program; None = no such file.
+
+        A program tree without an External Control node is returned as its URScript.
+        """
         program = self.stored_programs.program(file)
         if isinstance(program, ProgramTree) and not program.has_external_control:
             return program.script(file, FetchedScript())

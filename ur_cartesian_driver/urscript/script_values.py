@@ -85,10 +85,15 @@ class RemoteObject(ABC):
 
     @abstractmethod
     def call(self, method: str, arguments: Sequence[Value]) -> Value:
-        """Call a method; if it returns a generator, the call takes frames, as for builtins."""
+        """
+        Call a method and return its value.
+
+        A returned generator means, as for builtins, that the call takes several frames (control
+        cycles): the generator is advanced in each of them.
+        """
 
     def part(self, name: str) -> RemoteObject:
-        """Return an object whose `method` is the method `name.method` of this object."""
+        """Return the object for `this.name`: its method `m` is `name.m` of this object."""
         return _RemotePart(self, name)
 
 
@@ -115,7 +120,7 @@ def type_name(value: Value) -> str:
 NUMBERS = frozenset({int, float})
 
 
-#: The type of the items of most lists, as a set for quick checks.
+#: The set of types of a list of floats, for a quick check of lists.
 FLOATS = frozenset({float})
 
 
@@ -335,7 +340,7 @@ def identity(value: Value) -> Value:
     raise RuntimeException(f"Type error: '+' is not defined for {type_name(value)}")
 
 
-#: The arithmetic operations on two numbers; with two floats, no result needs a check.
+#: The arithmetic operations on two numbers; only a result that is an int can overflow.
 COMPUTE: dict[str, Callable[[Any, Any], int | float]] = {
     '+': operator.add,
     '-': operator.sub,
@@ -343,6 +348,7 @@ COMPUTE: dict[str, Callable[[Any, Any], int | float]] = {
     '/': _divide,
     '%': _remainder,
 }
+#: The binary operators on any two values.
 BINARY: dict[str, Callable[[Value, Value], Value]] = {
     **{symbol: _arithmetic(symbol) for symbol in COMPUTE},
     '==': operator.eq,
@@ -375,7 +381,7 @@ def get_part(container: Value, key: Key) -> Value:
 
 def set_part(container: Value, path: Sequence[Key], value: Value) -> Value:
     """
-    Assign to the part of a value at the end of a path of keys.
+    Assign ``value`` to the part of ``container`` to which the keys in ``path`` lead.
 
     :returns: the container: a new object if it is a pose, else the same object.
     """
@@ -422,7 +428,7 @@ def _fields(container: Value, name: str) -> dict[str, Value]:
 
 
 def _field(struct: Struct, key: tuple[Value, ...]) -> str:
-    """Return the name of the field with an index."""
+    """Return the name of the field that an index selects, as in `struct[0]`."""
     names = list(struct.fields)
     if len(key) != 1:
         raise RuntimeException('Type error: struct has one index, not two')
@@ -438,7 +444,7 @@ def _items(container: Value, key: tuple[Value, ...]) -> Value:
 
 
 def _position(index: Value, length: int) -> int:
-    """Check an index; a whole float, such as a result of `/`, is accepted."""
+    """Return a checked index as an int; a whole float, such as a result of `/`, is accepted."""
     if type(index) is float and index.is_integer():
         index = int(index)
     if type(index) is not int:

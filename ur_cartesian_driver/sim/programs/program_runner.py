@@ -13,6 +13,8 @@ Programs from start to end: one primary program, and secondary programs in paral
 If a program is stopped while the arm moves, the controller stops the arm on its path; the next
 program starts when the arm stands still. A program that does not compile is refused with line and
 column of the error, and the running program continues.
+
+A *frame* is the part of a program that runs in one cycle of the controller.
 """
 
 from __future__ import annotations
@@ -53,17 +55,18 @@ def _parse_cached(text: str, is_line: bool = False) -> ScriptProgram:
 #: Cache of compiled programs, for all controllers of this process. A key contains the `id()` of
 #: its program; the value contains the program, so that no other program can get this id.
 _compiled: dict[Hashable, tuple[ScriptProgram, GeneratedCode]] = {}
+#: The cache is emptied before it would hold more programs than this.
 MAX_COMPILED = 8
 
-#: States in which a program is paused; in which the arm stands still or slows down to a
-#: standstill; and in which a program has not ended.
+#: States in which a program is paused; in which it is paused, or resumes while the arm still
+#: stands; and in which it has not ended.
 PAUSED = frozenset({RuntimeState.PAUSING, RuntimeState.PAUSED})
 HELD = PAUSED | {RuntimeState.RESUMING}
 RUNNING = HELD | {RuntimeState.PLAYING}
 
 
 class CompiledProgram(NamedTuple):
-    """A program that can start."""
+    """A program, and the interpreter that can run it."""
 
     program: ScriptProgram
     interpreter: ScriptInterpreter
@@ -108,7 +111,7 @@ class ProgramArm(Protocol):
         """Brake if a thread was killed in a motion that no other thread continues."""
 
     def release(self, thread: Hashable) -> None:
-        """Take the ownership of the motion from a thread that has ended."""
+        """Take the motion that the arm makes for a thread from this thread, which has ended."""
 
     def start_refusal(self) -> str:
         """Return the reason why no program can run now; empty = a program can run."""
@@ -139,15 +142,17 @@ class ProgramRunner:
         self._messages = messages
         self._arm = arm
         self._interpreter: ScriptInterpreter | None = None
+        #: The interpreter that is running a frame at this moment.
         self._stepping: ScriptInterpreter | None = None
+        #: Name and interpreter of the program that starts once the arm stands still.
         self._queued: tuple[str, ScriptInterpreter] | None = None
         self._secondaries: list[ScriptInterpreter] = []
         self._loaded: ScriptProgram | GenerateScript | None = None
-        #: Marks the start that waits for its generated program; None = no start waits.
+        #: Identifies the start that waits until its program is generated; None = none waits.
         self._awaited: object | None = None
         #: The reason why the last `play` has not started a program; empty = it has.
         self.start_failure = ''
-        #: The builtins, on which compiled code depends in addition to the program.
+        #: Identifies the builtins in keys of the cache, because compiled code depends on them.
         self._signatures = frozenset(
             (name, getattr(function, '__code__', function)) for name, function in builtins.items()
         )
@@ -190,7 +195,7 @@ class ProgramRunner:
         """
         Compile a program and start it; a `sec` runs in parallel with the primary program.
 
-        :param is_line: whether the text is a line of statements.
+        :param is_line: whether the text is a line of statements, not a whole program.
         """
         stops = self._stops
 
@@ -264,9 +269,11 @@ class ProgramRunner:
 
     def load_generated(self, name: str, generate: GenerateScript) -> str:
         """
-        Load a program whose URScript is generated when `play` starts it; return like `load`.
+        Load a program whose URScript is generated when `play` starts it.
 
         Mistakes in the program are found when it is played.
+
+        :returns: the reason for a refusal, else an empty string.
         """
         if self.running:
             return 'a program is running'
@@ -334,7 +341,7 @@ class ProgramRunner:
         if self.name == self.loaded:
             self.start_failure = ''
         self._arm.begin_program()
-        # A real controller writes XXX, too; the text of the message is the name of the program.
+        # The key of a real controller contains XXX, too; the name is the text of the message.
         self._messages.key('PROGRAM_XXX_STARTED', self.name)
 
     def unpause(self) -> None:
