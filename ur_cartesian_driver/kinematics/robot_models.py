@@ -14,8 +14,8 @@ All arms have the same shape; the models differ in six lengths::
     6   0       d6   0    0        wrist 3, ends in the flange
 
 in the distal Denavit-Hartenberg convention, link i = Rz(theta + q) Tz(d) Tx(a) Rx(alpha), from
-the base of the manufacturer (ROS calls it ``base``; ``base_link`` is turned by pi about z) to the
-tool flange (``tool0``). A real arm differs from its model by a few millimetres; it reports its own
+the manufacturer's base frame (``base`` in ROS; ``base_link`` is turned by pi about z) to the tool
+flange (``tool0``). A real arm differs from its model by a few millimetres; it reports its own
 table, in which all 24 numbers may differ.
 
 Sources: Universal Robots publishes the lengths in its article on DH parameters and in the
@@ -94,7 +94,7 @@ class JointLimits:
     speed: Vector6
 
 
-#: A clause that names the source of a limit that is tighter than the model's.
+#: The clause that error messages add to a limit that is tighter than the model's.
 REPORTED = ', which the controller reports in its configuration'
 #: A limit is tighter than another one only if they differ by more than this [rad], [rad/s].
 _ROUNDING = 1e-4
@@ -107,7 +107,7 @@ class RobotModel:
     name: str
     #: Generation of the controller: ``CB3``, ``e`` or ``UR``.
     series: str
-    #: The nominal table.
+    #: The table of an arm without calibration.
     geometry: DhTable
     #: Lowest and highest position of each joint [rad], infinite if the joint turns endlessly.
     position_limits: PositionLimits
@@ -120,7 +120,7 @@ class RobotModel:
     payload: float
     #: Reach in the data sheet, from the shoulder to the centre of the wrist [m].
     max_reach: float
-    #: The robot type in the configuration data of the primary interface.
+    #: Number of the robot type in the configuration data that the primary interface sends.
     wire_type: int
     #: The joints for which the controller reports a tighter range than the model's.
     reported_ranges: frozenset[int] = frozenset()

@@ -19,7 +19,7 @@ from ur_cartesian_driver.motion.state.servo_report import ServoFeedback
 
 
 class TrajectoryResult(IntEnum):
-    """The end of a trajectory as the robot program reports it, numbered as on the wire."""
+    """The end of a trajectory, by the number with which the robot program reports it."""
 
     SUCCESS = 0
     CANCELED = 1
@@ -31,7 +31,7 @@ class TrajectoryResult(IntEnum):
     CONTACT = 4
     #: A required contact did not come.
     NO_CONTACT = 5
-    #: The tool made contact, and a watch beside the trajectory stopped the arm there.
+    #: The tool made contact, and a contact watch that is no part of the goal stopped the arm.
     TOUCHED = 6
 
 
@@ -85,7 +85,7 @@ class LinkLost:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContactWatchChanged:
-    """The robot program has begun or ended its watch for contact beside the goal."""
+    """The robot program has begun or ended a watch for contact that is no part of the goal."""
 
     is_active: bool
 
@@ -163,14 +163,14 @@ class Progress:
     actual_qd: Vector6 = ZERO6
     #: Planned time of the desired pose, from the start of the motion [s].
     time: float = 0.0
-    #: Planned time that is left, at full speed scaling [s].
+    #: Planned time that is left if the robot's speed slider is at 100 % [s].
     time_remaining: float = 0.0
     #: The effective speed of the controller (:mod:`~.effective_speed`), 0 to 1.
     speed_scaling: float = 1.0
     points_received: int = 0
     #: Motion time of the points that the robot holds and has not begun [s].
     buffered: float = 0.0
-    #: SERVO: nominal time by which the arm is behind the newest set-point [s].
+    #: SERVO: nominal time by which the arm is behind the newest set-point [s]; NaN = none.
     lag: float = nan
     #: Time by the controller's clock [s].
     timestamp: float = 0.0
@@ -194,7 +194,7 @@ class Pulse:
     #: Time by the controller's clock of the cycle in which the output switched on [s].
     timestamp: float
     #: Measured pose of the TCP in that cycle, in the robot's base; None = the packet of the cycle
-    #: was lost, and ``timestamp`` is later.
+    #: was lost, and ``timestamp`` is the time of a later packet.
     pose: Pose | None
 
 
@@ -212,7 +212,7 @@ class PathPlace:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """The end of a goal: a code, a sentence, and the report."""
+    """The end of a goal: a code, a sentence, and the lines of the goal's report."""
 
     code: ErrorCode
     text: str

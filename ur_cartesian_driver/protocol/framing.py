@@ -140,7 +140,7 @@ class FrameBuffer:
 
         :param size_width: width of the size field [bytes].
         :param min_size: smallest size of a frame [bytes].
-        :param max_size: largest accepted size [bytes]; it bounds the memory.
+        :param max_size: largest accepted size of a frame [bytes]; a larger one is an error.
         :param what: the name of a frame, for error texts.
         """
         self._width = size_width
@@ -199,7 +199,7 @@ class LineBuffer:
         """
         Start empty.
 
-        :param limit: longest accepted line [bytes]; it bounds the memory.
+        :param limit: longest accepted line [bytes]; a longer one is an error.
         """
         self._limit, self._encoding = limit, encoding
         self._rest = b''
@@ -225,7 +225,7 @@ class LineBuffer:
 
 
 def decode_text(data: bytes, encoding: str = 'utf-8') -> str:
-    """Return a text from the wire; bytes that are not in the encoding become backslash escapes."""
+    """Decode received bytes; bytes that are not in the encoding become backslash escapes."""
     return data.decode(encoding, 'backslashreplace')
 
 

@@ -45,8 +45,8 @@ FRAMES: Mapping[str, int] = MappingProxyType(
         'tool0_controller': 6,
     }
 )
-#: Parts of the arm that may be allowed to touch a body: its links, and the cylinder of the
-#: parameter ``tool_radius``.
+#: Parts of the arm that may be allowed to touch a body: its links, and ``tool``, the cylinder
+#: around the tool whose radius is the parameter ``tool_radius``.
 LINK_NAMES: tuple[str, ...] = (
     'base_link',
     'shoulder_link',
@@ -134,9 +134,9 @@ class CellBody:
 
 def check_clearance(value: float) -> None:
     """
-    Refuse a clearance that is out of bounds.
+    Check a clearance.
 
-    :raises ValueError: the text is a clause.
+    :raises ValueError: it is out of bounds; the message is a clause, for use inside a sentence.
     """
     if not (isfinite(value) and 0.0 <= value <= MAX_CLEARANCE):
         raise ValueError(f'the clearance is {value:g} m; it must be from 0 to {MAX_CLEARANCE:g} m')
@@ -144,10 +144,10 @@ def check_clearance(value: float) -> None:
 
 def check_place(pose: Pose) -> None:
     """
-    Refuse a pose that no body can have.
+    Check the pose of a body or shape.
 
     :raises ValueError: a coordinate is out of bounds, or the quaternion is not of length 1; the
-        text is a clause.
+        message is a clause, for use inside a sentence.
     """
     for axis, value in zip('xyz', pose.position, strict=True):
         if not abs(value) <= MAX_COORDINATE:
@@ -174,7 +174,7 @@ class Cell:
     may_touch: frozenset[frozenset[str]] = frozenset()
     #: Clearance of the bodies that give none [m].
     clearance: float = DEFAULT_CLEARANCE
-    #: Remarks on the files, one sentence each.
+    #: Remarks on the files from which the cell was read, one sentence each.
     remarks: tuple[str, ...] = field(default=(), compare=False)
     #: The names of the bodies.
     names: frozenset[str] = field(init=False, repr=False, compare=False)
@@ -208,7 +208,8 @@ class Cell:
         """
         Return a body.
 
-        :raises ValueError: the cell has no body of this name; the text is a clause.
+        :raises ValueError: the cell has no body of this name; the message is a clause, for use
+            inside a sentence.
         """
         for body in self.bodies:
             if body.name == name:

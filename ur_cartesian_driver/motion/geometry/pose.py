@@ -27,9 +27,10 @@ Quaternion: TypeAlias = tuple[float, float, float, float]
 #: One number, or the numbers of a batch.
 N = TypeVar('N', float, Floats)
 
-#: A larger rotation or joint position [rad] must be in degrees by mistake: two turns.
+#: Two turns [rad]. A larger rotation or joint position was probably given in degrees.
 MAX_ANGLE = 4.0 * pi
 
+# Below this angle [rad], an angle and its sine are taken as equal.
 _SMALL_ANGLE = 1e-9
 # Below this cosine of the pitch, roll and yaw turn about the same axis.
 _GIMBAL_LOCK = 1e-9
@@ -184,7 +185,7 @@ def slerp(a: Quaternion, b: Quaternion, fraction: float) -> Quaternion:
 
 def pose_error(desired: Pose, actual: Pose) -> Pose:
     """
-    Return desired - actual.
+    Return the deviation ``desired`` - ``actual`` of two poses in a common frame.
 
     The position is a difference along the axes of the common frame. The orientation is the
     rotation from the actual to the desired orientation in the axes of the actual one,

@@ -61,6 +61,7 @@ class Sent:
 
     #: Name of the field in the message, with dots for nested messages; '' = as in the dataclass.
     name: str = ''
+    #: The form of the value; None = the usual form for the field's type.
     form: Form | None = None
     #: Whether files list the field even at its default value; None = only if the field has no
     #: default.
@@ -84,15 +85,15 @@ class Range:
 
     low: float = -inf
     high: float = inf
-    #: The unit of the numbers, for the text of a refusal.
+    #: The unit of the numbers, for error messages.
     unit: str = ''
-    #: The advice to the user, for the text of a refusal.
+    #: The advice to the user in error messages.
     remedy: str = ''
     #: Whether ``low`` itself is excluded.
     above: bool = False
     #: The special meaning of 0, which is then allowed even outside the range; '' = 0 has none.
     zero: str = ''
-    #: Whether the field of a spline's point can be NaN; the driver then chooses the number.
+    #: Whether the number can be NaN at a point of a spline; the driver then chooses the number.
     nan_in_splines: bool = False
 
     def holds(self, values: Any) -> Any:
@@ -126,12 +127,16 @@ class Range:
 
 @dataclass(frozen=True, slots=True)
 class ColumnOf:
-    """The annotation of a column: names the field whose values it holds, one for each point."""
+    """
+    The annotation of an array with a value for each point (a column).
+
+    It names the field of a goal dataclass whose values the column holds.
+    """
 
     field: str
     #: Name of the array in ``PackedPoints``; '' = the name of the column, None = no such array.
     packed: str | None = ''
-    #: Whether the array is filled even if every row has the default, instead of being empty.
+    #: Whether the array is filled even if every point has the default, instead of being empty.
     always: bool = False
     #: The column that this one follows in files; '' = the order of the declarations.
     after: str = ''
@@ -139,7 +144,7 @@ class ColumnOf:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GoalField:
-    """A row of the table: a field of a goal dataclass."""
+    """A row of the table of fields: a field of a goal dataclass."""
 
     name: str
     #: Type of the value, without ``None`` and annotations; for a sequence, type of its elements.
@@ -235,7 +240,7 @@ class GoalColumn:
 
     @property
     def mask(self) -> str:
-        """The name of the array that flags the rows with a value; '' = all rows have one."""
+        """The name of the array that flags the points with a value; '' = all points have one."""
         return f'has_{self.field.name}' if self.field.default is None else ''
 
     @property

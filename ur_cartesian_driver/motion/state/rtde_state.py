@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The table of the values that the robot reports by RTDE, and its modes as enumerations."""
+"""The table of the values that the robot reports by RTDE, and the robot's modes."""
 
 from __future__ import annotations
 
@@ -104,7 +104,8 @@ class Rtde:
     name: str
     #: Whether older software lacks the output; the field then has its default.
     optional: bool = False
-    #: Whether goals are monitored with the output; packets in which it is not finite are refused.
+    #: Whether the monitoring of goals uses the output; then a packet in which it is not finite is
+    #: refused.
     monitored: bool = True
 
 
@@ -165,16 +166,17 @@ class RobotState:
     program_version: Annotated[int, Rtde('output_int_register_32', optional=True)] = 0
     #: Number of our robot program, which identifies it.
     program_number: Annotated[int, Rtde('output_int_register_33', optional=True)] = 0
-    #: Count of the connections of our robot program.
+    #: Count of the connections of our robot program; it changes with each connection.
     program_run: Annotated[int, Rtde('output_int_register_34', optional=True)] = 0
     #: Token of the last request to set safe outputs that our robot program has carried out.
     safe_outputs_token: Annotated[int, Rtde('output_int_register_35', optional=True)] = 0
-    #: Motion version of movej and movel when our robot program connected; 0 = unknown.
+    #: Version of the controller's own planning of movej and movel (motion version), as it was when
+    #: our robot program connected; 0 = unknown.
     motion_version: Annotated[int, Rtde('output_int_register_36', optional=True)] = 0
     #: Counts of the pulses that our robot program has given; see the module ``registers``.
     pulse_counts: Annotated[int, Rtde('output_int_register_37', optional=True)] = 0
-    #: Feed override of the robot program's splines, 0 to 1, and the delay of the splines by it
-    #: since our robot program connected [s].
+    #: Fraction of the planned speed at which our robot program runs splines (feed override), 0 to
+    #: 1; total delay of splines by it since our robot program connected [s].
     feed_override: Annotated[
         float, Rtde('output_double_register_31', optional=True, monitored=False)
     ] = 1.0
@@ -189,8 +191,8 @@ class RobotState:
     standard_analog_input1: Annotated[
         float, Rtde('standard_analog_input1', optional=True, monitored=False)
     ] = inf
-    #: How fast the motion of the program runs, 0 to 1; :mod:`~.effective_speed` computes it from
-    #: this packet and the earlier ones.
+    #: Speed of the program's motion relative to its programmed speed, 0 to 1;
+    #: :mod:`~.effective_speed` computes it from this packet and the earlier ones.
     effective_speed: Annotated[float, None] = 1.0
     #: Age of the state when it was read [s]: the time that it took from controller to driver.
     state_age: Annotated[float, None] = 0.0

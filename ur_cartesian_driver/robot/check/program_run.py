@@ -1,6 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Runs programs that move the arm, and records the robot's reports meanwhile."""
+"""
+Runs programs that move the arm, and records the robot's reports meanwhile.
+
+A *row* holds the recorded RTDE outputs of one packet, by name.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +35,7 @@ LOSS_TIME = 0.25
 
 
 class Surprise(Exception):
-    """An unexpected event; the text is a clause."""
+    """An unexpected event; its message is a clause, for use inside a sentence."""
 
 
 async def motion_refusal(address: RobotAddress) -> str:
@@ -82,6 +86,7 @@ class ProgramRun:
         Connect, and wait for the first row.
 
         :raises OSError: the robot does not answer.
+        :raises Surprise: no row comes, or as for :meth:`wait_for`.
         """
         await self.recorder.open()
         await self.probe.open(self._address)
@@ -112,7 +117,11 @@ class ProgramRun:
             raise Surprise(f'the arm does not move: {texts[-1]}')
 
     async def ended(self) -> None:
-        """Wait until the program has ended."""
+        """
+        Wait until the program has ended.
+
+        :raises Surprise: it does not end within :data:`END_TIMEOUT`, or as for :meth:`wait_for`.
+        """
         await self.until(
             lambda row: row['runtime_state'] == RuntimeState.STOPPED,
             END_TIMEOUT,
@@ -135,9 +144,9 @@ class ProgramRun:
 
     async def stop(self) -> bool:
         """
-        Stop the program; return whether a connection took the command.
+        Stop the program; return whether the command was sent on a connection that did not fail.
 
-        On a lost connection the command is sent again for up to :data:`REST_TIMEOUT`.
+        If the connection fails, the command is sent again, for up to :data:`REST_TIMEOUT`.
         """
         loop, request = asyncio.get_running_loop(), encode_command(PrimaryCommand.STOP_PROGRAM)
         end = loop.time() + REST_TIMEOUT
@@ -152,7 +161,7 @@ class ProgramRun:
 
     async def wait_for(self, is_reached: Callable[[Mapping[str, Any]], bool], time: float) -> bool:
         """
-        Check each row for faults until the newest one meets a condition.
+        Wait until the newest row meets a condition, and check each row for faults.
 
         :param time: longest wait [s].
         :return: whether the condition was met in time.
@@ -180,10 +189,11 @@ class ProgramRun:
         self, is_reached: Callable[[Mapping[str, Any]], bool], time: float, otherwise: str
     ) -> None:
         """
-        Check each row for faults until the newest one meets a condition.
+        Wait like :meth:`wait_for`, but raise an error if the condition is not met in time.
 
-        :param otherwise: clause for the error if the condition is not met within ``time`` [s].
-        :raises Surprise: the condition is not met in time, or as for :meth:`wait_for`.
+        :param otherwise: clause for this error, such as "the program does not end".
+        :raises Surprise: the condition is not met within ``time`` [s], or as for
+            :meth:`wait_for`.
         """
         if not await self.wait_for(is_reached, time):
             raise Surprise(f'{otherwise} within {time:g} s')
