@@ -4,7 +4,7 @@
 A file format: its reader, and the treatment of each term that the reader knows.
 
 The reader and its documentation use the same table of terms, so they cannot contradict each other.
-No term is read as another, and none is dropped silently.
+A reader never takes one term for another, and never drops one silently.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Term:
 
     #: The term as the format writes it.
     name: str
-    #: The row of the documentation that lists the term.
+    #: The row, in the documentation's table of this format, that lists the term.
     topic: str
     treatment: Treatment
     #: Why the term is left out, or what to do instead: the text of the remark or the refusal.
@@ -47,11 +47,12 @@ class Term:
 class ImportFormat:
     """A format, as :func:`~ur_cartesian_driver.importing.import_file` uses it."""
 
-    #: Reads a file; raises BrokenFile, ImportError if a package is missing, or OSError.
+    #: Reads a file into the collector; raises BrokenFile, OSError, or ImportError if a package is
+    #: missing.
     collect: Callable[[Path, ImportOptions, PathCollector], None]
     #: The terms that the reader knows.
     terms: Mapping[str, Term] = field(default_factory=dict)
-    #: A sentence of the documentation on all other terms.
+    #: A sentence for the documentation: the treatment of all other terms.
     others: str = ''
 
 
@@ -60,7 +61,7 @@ _T = TypeVar('_T', bound=Term)
 
 def term_table(*rows: Iterable[_T]) -> Mapping[str, _T]:
     """
-    Return terms by their names.
+    Return the terms of all rows by their names.
 
     :raises ValueError: two terms have the same name.
     """

@@ -61,7 +61,7 @@ from ur_cartesian_driver.robot.rtde.signal_stream import SignalStream
 from ur_cartesian_driver.robot.rtde.state_stream import StateStream
 from ur_cartesian_driver.robot.transport import Backoff
 
-#: Wait after the loss of the program, for other connections to report the cause [s].
+#: Time after the loss of the program in which other connections may report the cause [s].
 CAUSE_TIMEOUT = 0.1
 
 
@@ -80,20 +80,20 @@ class LinkCallbacks:
     geometry: Callable[[DhTable], None]
     #: The robot reported the limits of its joints; called before the robot is accepted.
     limits: Callable[[JointLimits], None]
-    #: A log level and a line for the log.
+    #: A line for the log: its level and its text.
     log: Callable[[int, str], None]
     #: Inputs, outputs or tool changed.
     signals: Callable[[Signals], None] = lambda _: None
 
 
 class RobotLink:
-    """The only owner of the driver's sockets; used from one event loop."""
+    """Owns all sockets of the driver to the robot; use it from one event loop."""
 
     def __init__(
         self, settings: LinkSettings, callbacks: LinkCallbacks, *, may_upload: bool = True
     ) -> None:
         """
-        Prepare; :meth:`run` connects.
+        Create the interfaces; :meth:`run` connects them.
 
         :param may_upload: whether the first connection may start the robot program. The driver
             passes True in its first robot loop, and in a later loop if the program ran when the
@@ -169,7 +169,7 @@ class RobotLink:
             tasks.create_task(self._stay_connected())
 
     def close(self) -> None:
-        """Close all ports; the robot program stops the arm, at the latest as its sockets close."""
+        """Close all ports; the robot program then loses its sockets and stops the arm."""
         self._cancel_explanation()
         self.program.close()
 
@@ -299,8 +299,8 @@ class RobotLink:
         before, self.robot = self.robot, robot
         self._callbacks.state(robot)
         changes = () if before is None else mode_changes(before, robot)
-        # The goal gets the packet first, because it may have to cancel at once. If a mode has
-        # changed, the status changes first.
+        # The goal gets the state before all else, because it may have to cancel at once. Only if a
+        # mode has changed, the status changes first.
         status_may_change = before is None or bool(changes)
         if not status_may_change:
             self._callbacks.event(StateReceived(state=robot))
@@ -318,7 +318,7 @@ class RobotLink:
             self._callbacks.event(StateReceived(state=robot))
 
     def check_age(self) -> None:
-        """Accept goals only while the newest state is young enough; called often."""
+        """Accept goals only while the newest state is young enough; to be called regularly."""
         now = asyncio.get_running_loop().time()
         if self._stale.update(now - self._state_time, now):
             self._review_state()
@@ -417,7 +417,7 @@ class RobotLink:
         )
         before, self.robot, self.signals = self.robot, None, None
         self._state_time = inf
-        # Whether it is paused is not known now; too many keepalives are better than none.
+        # It is unknown now whether the program is paused and needs no keepalives: send them.
         self.program.is_paused = False
         self.control.tracker.robot_lost()
         self._status.apply(

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The node, which creates and connects its components, and the command that runs it."""
+"""The ROS node, which creates and connects its components, and the command that runs it."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ from ur_cartesian_driver.ros.ur_driver_names.names_settings import NamesSettings
 
 #: Longest period of the heartbeat, which reports that the node's executor is alive [s].
 HEARTBEAT_PERIOD = 0.5
-#: Time for the discovery of other nodes [s].
+#: Time after which other nodes have been discovered, and their names are checked [s].
 DISCOVERY_TIME = 2.0
-#: How long :func:`main` waits for the arm to stop and the results to be sent [s].
+#: Longest time that :func:`main` waits for the arm to stop and the results to be sent [s].
 SHUTDOWN_TIMEOUT = 5.0
 #: Arrays of at least this size give their memory back to the system when they are freed [bytes].
 LARGE_ARRAY = 2**20
-#: The option of :func:`main` that starts the node with the UR driver's names.
+#: The option with which :func:`main` also offers topics and services of the UR ROS 2 driver.
 UR_DRIVER_NAMES = '--ur-driver-names'
 _USAGE = (
     f'Usage: ur-cartesian-driver [{UR_DRIVER_NAMES}] [--ros-args [-p NAME:=VALUE] '
@@ -192,8 +192,8 @@ class _LogBridge(logging.Handler):
     """
     Passes the log records of one driver to the logger of its node.
 
-    Records that belong to no driver, such as that of a failed callback, go to the oldest node of
-    the process.
+    Records that belong to no driver, such as a report of a failed callback, go to the oldest node
+    of the process.
     """
 
     _bridges: ClassVar[list[_LogBridge]] = []
@@ -243,8 +243,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Run the node until SIGINT or SIGTERM.
 
     The first signal stops the arm, and the node waits until running goals have ended with a
-    result; a second signal ends this wait. With ``--ur-driver-names`` another process serves the
-    names of the UR ROS 2 driver.
+    result; a second signal ends this wait. With ``--ur-driver-names`` another process offers the
+    topics and services of the UR ROS 2 driver under their names.
     """
     given = list(sys.argv if arguments is None else arguments)
     own_arguments = [argument for argument in given if argument != UR_DRIVER_NAMES]
@@ -293,7 +293,7 @@ def _check_arguments(arguments: Sequence[str]) -> None:
     """
     Exit if help is requested, or if ROS does not take an argument.
 
-    If an argument were ignored, another arm might move.
+    Ignoring a misspelt argument could connect the node to another arm.
     """
     if arguments:
         rclpy.shutdown()

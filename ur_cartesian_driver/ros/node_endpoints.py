@@ -17,7 +17,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 
-#: Reliable, so that subscribers of either reliability get the topics.
+#: Reliable, because then subscribers of either reliability get the messages.
 STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 #: Late subscribers get the last value at once.
 LATCHED_QOS = QoSProfile(
@@ -58,9 +58,9 @@ def newest_subscription(
 
 def feedback_publishers(node: Node, action: str) -> Endpoints:
     """
-    Return the publishers of an action's feedback.
+    Return the ids of the publishers of an action's feedback.
 
-    A server that was started again has the same names, but other endpoints.
+    They tell a restarted server from the one before it: names are equal, ids are not.
     """
     found = node.get_publishers_info_by_topic(f'{action}/_action/feedback')
     return frozenset(tuple(each.endpoint_gid) for each in found)

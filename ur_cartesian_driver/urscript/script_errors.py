@@ -12,7 +12,7 @@ from __future__ import annotations
 
 class CompileError(Exception):
     """
-    The text is not a program that can start; nothing has run.
+    The text is no program that the controller can start; nothing of it has run.
 
     :param line: 1-based line in the text that was parsed.
     :param column: 1-based column of the offending token.
@@ -35,8 +35,8 @@ class RuntimeException(Exception):
     """
     The program did something that the controller cannot do, and ended.
 
-    Values and builtins raise it without a position; the interpreter adds the position with `at`.
-    Line 0 means that the position is not known yet.
+    Builtins and operations on values raise it without a position; the interpreter adds the
+    position with `at`. Line 0 means that the position is not known yet.
     """
 
     def __init__(self, text: str, line: int = 0, column: int = 0) -> None:
@@ -57,7 +57,7 @@ def name_not_found(kind: str, name: str, line: int, column: int) -> CompileError
     """
     Return the error for a name that is unknown in its scope.
 
-    :param kind: variable, function or thread.
+    :param kind: 'variable', 'function' or 'thread'.
     """
     text = f'compile_error_name_not_found:{name}:'
     return CompileError(line, column, text, f'there is no {kind} {name!r}')

@@ -1,15 +1,16 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The robot loop: one asyncio loop that owns the sockets and the machine of the running goal.
+The robot loop: the asyncio loop that owns the sockets to the robot and runs the current goal.
 
-The loop never imports ROS. In a process of its own, it sends the robot its messages on time while
-the owner receives a goal of 100,000 points, which holds Python's interpreter lock for seconds. The
-loop can also run in a thread. A pipe for messages and shared memory for the newest robot state
-connect the loop to its owner, see :mod:`~ur_cartesian_driver.driver.loop.loop_host`.
+Its owner is the driver that started it. The loop normally has a process of its own, and never
+imports ROS: receiving a goal of 100,000 points holds the owner's interpreter lock for seconds, and
+the robot must get its messages on time meanwhile. The loop can also run in a thread of the owner.
+A pipe for messages and shared memory for the newest robot state connect it to the owner, see
+:mod:`~ur_cartesian_driver.driver.loop.loop_host`.
 
 When the pipe closes, the loop closes its sockets, and the robot program stops the arm and ends.
-When the owner is silent for too long, the loop stops the arm.
+When the owner has sent nothing for ``node_timeout``, the loop cancels the running goal.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ from ur_cartesian_driver.robot.services.dashboard_service import DashboardPorts
 from ur_cartesian_driver.robot.services.service_calls import DashboardCall
 from ur_cartesian_driver.robot.services.service_dispatcher import ServiceDispatcher
 
-#: Period of the ticks that tell the machine that time has passed [s].
+#: Period of the ticks, at which the machine of the running goal checks its deadlines [s].
 TICK_PERIOD = 0.02
 #: Period of the heartbeats to the owner [s].
 HEARTBEAT_PERIOD = 0.5
@@ -71,7 +72,12 @@ class RobotLoop:
     def __init__(
         self, configure: Configure, memory: StateMemory, notify: asyncio.StreamWriter
     ) -> None:
-        """Make the parts of the loop; :meth:`run` runs them."""
+        """
+        Create the parts of the loop; :meth:`run` connects to the robot.
+
+        :param memory: the memory in which the owner reads the newest robot state.
+        :param notify: the pipe, for notifications to the owner.
+        """
         self._config = config = configure.config
         self._newest = NewestState(memory, lambda state: self._motion.record_state(state))
         self._pipe = OwnerPipe(notify, self._newest.publish)
@@ -131,7 +137,7 @@ class RobotLoop:
         finally:
             self._link.close()
             self._newest.clear()
-            self._motion.close_recorder()  # last, because the arm must not wait for a disk
+            self._motion.close_recorder()  # last: the arm must not wait for a disk
 
     # ---- the owner ----------------------------------------------------------------------------
 
@@ -158,7 +164,7 @@ class RobotLoop:
                 self._refuse(refusal_of(request, text), f'{type(request).__name__}: {text}')
 
     def _refuse(self, refusal: Notification | None, line: str) -> None:
-        """Log why a request was not carried out, and refuse it if it needs an answer."""
+        """Log a line; send the owner a refusal, unless it is None (no answer is expected)."""
         self._pipe.log(logging.ERROR, line)
         if refusal is not None:
             self._pipe.send(refusal)
@@ -191,7 +197,7 @@ class RobotLoop:
                 )
 
     async def _tick(self) -> None:
-        """Send ticks to the machine and heartbeats to the owner, and monitor the owner."""
+        """Send ticks and heartbeats; stop the arm if the owner is silent."""
         last_heartbeat = self._now()
         while True:
             await asyncio.sleep(TICK_PERIOD)
@@ -262,7 +268,7 @@ async def serve(pipe: socket.socket, descriptor: int) -> None:
     Run a robot loop until its owner ends it.
 
     :param pipe: our end of the pair of sockets; the first message on it is the configuration.
-    :param descriptor: descriptor of the shared memory.
+    :param descriptor: file descriptor of the memory that both ends share.
     """
     reader, writer = await asyncio.open_connection(sock=pipe)
     memory = StateMemory(descriptor)

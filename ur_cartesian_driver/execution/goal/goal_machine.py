@@ -9,7 +9,8 @@ the returned commands, until one of them is :class:`~.goal_commands.Finish`.
 
 An event becomes a signal or has no effect. The signal selects a transition in the table of
 :mod:`~.goal_transitions`, and entering the new state yields commands. :mod:`~.goal_monitor`
-compares the packets of the robot with the plan; a :class:`~.feeder.Feeder` sends the motion.
+compares each packet (the robot's state, as RTDE reports it) with the plan; a
+:class:`~.feeder.Feeder` sends the motion to the robot program.
 """
 
 from __future__ import annotations
@@ -60,12 +61,12 @@ from ur_cartesian_driver.motion.goal.goal import DEFAULT_GOAL_TIME_TOLERANCE
 from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.state_age import explain_age
 
-#: The events that carry a packet of the robot's registers.
+#: The events in which the robot program reports through registers.
 _REGISTERS = (events.ServoReceived, events.OffsetReceived)
 
 
 class MotionStatus(NamedTuple):
-    """The progress of a motion, for its recording; NaN = unknown."""
+    """The progress of a motion, recorded with each robot state; NaN = unknown."""
 
     #: The number of the point to which the arm moves.
     waypoint: int
@@ -76,7 +77,7 @@ class MotionStatus(NamedTuple):
 
 
 class GoalMachine:
-    """Takes one goal through the table of transitions."""
+    """Runs one goal: answers events with commands, by the table of transitions."""
 
     def __init__(
         self,
@@ -182,7 +183,11 @@ class GoalMachine:
         return commands
 
     def _seen(self, packet: RobotState) -> RobotState:
-        """Return a packet with the poses and rates of the tool in the frame of the path."""
+        """
+        Return a packet with the poses and rates of the tool in the frame of the path.
+
+        This frame is the robot's base, or moves with a part that the arm holds.
+        """
         frame = self.job.moving_frame
         return packet if frame is None else frame.seen(packet)
 
@@ -191,11 +196,11 @@ class GoalMachine:
         return MotionStatus(self._monitor.waypoint(), self.feeder.buffered, self.can.streaming.lag)
 
     def end_time_of(self, records: int) -> float:
-        """Return the planned end of the first ``records`` records [s]."""
+        """Return the planned end of the first ``records`` instructions sent to the robot [s]."""
         return self._monitor.records.end_time(records)
 
     def _observe(self, packet: RobotState, now: float) -> list[GoalCommand]:
-        """Process a packet; return the commands for its outputs, and the report of pulses."""
+        """Take in a packet; return the commands for safe outputs, and a report of new pulses."""
         self._packet, self._packet_time = packet, now - packet.state_age
         if self.temporary_tcp is not None:
             self.temporary_tcp.observe(packet, now)
@@ -208,7 +213,8 @@ class GoalMachine:
             applied_offset=self.can.displacement.applied_offset(packet),
             feed=self.can.overriding.observe_feed(packet, now),
         )
-        if self.state is GoalState.SETTLING:  # its deadlines run on the controller's clock
+        # The deadlines of SETTLING stand still in a pause, and run slower with the speed slider.
+        if self.state is GoalState.SETTLING:
             self._deadline += self._monitor.held_time
             self._arrival_due += self._monitor.held_time
         commands = self._guard.observe(packet, goes_on=self.state in INTERRUPTIBLE_STATES)
@@ -225,7 +231,7 @@ class GoalMachine:
     # ---- from events to signals ---------------------------------------------------------------
 
     def _interpret(self, event: events.Event, now: float) -> Meaning:
-        """Return the signal of an event, with a clause for the outcome's text."""
+        """Return the signal of an event (None = none), and a clause for the outcome's text."""
         meaning = self.can.interpretation.interpret(event, self.state)
         if meaning is not None:
             return meaning
@@ -278,7 +284,7 @@ class GoalMachine:
         return GoalSignal.STALE, explain_age(age, self._max_state_age).rstrip('.')
 
     def _check_outputs(self) -> Meaning | None:
-        """Return the signal if a pause changed outputs that must not be restored, else None."""
+        """Return the signal if a pause changed safe outputs without ``restore``, else None."""
         fault = self._guard.fault()
         if not fault or self.state not in INTERRUPTIBLE_STATES:
             return None
@@ -342,7 +348,7 @@ class GoalMachine:
         return self.state in RUNNING_STATES and self._monitor.awaits_count()
 
     def _check_deadline(self, now: float) -> Meaning:
-        """Return the signal if the deadline of the present state has passed, else none."""
+        """Return the signal if the deadline of the present state has passed, else NO_MEANING."""
         if now < self._deadline:
             return NO_MEANING
         if self.state not in RUNNING_STATES:
@@ -368,8 +374,8 @@ class GoalMachine:
             self.outcome.decide(transition.code, text, signal, before)
         if self.state is before:
             return []
-        # If the program left the servo while the safe outputs are armed, it would set them. So
-        # after a success they are disarmed first, and the feeder makes it leave in ENDED.
+        # If the program stopped following set-points while the safe outputs are armed, it would
+        # set them. So after a success they are disarmed first, and the feeder stops it in ENDED.
         succeeds = self.outcome.succeeds
         disarms_first = self.state is GoalState.RESTORING and succeeds and self._guard
         commands = [] if disarms_first else self.feeder.enter(self.state, self._packet)

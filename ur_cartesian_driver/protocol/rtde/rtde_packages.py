@@ -21,7 +21,8 @@ U 85  data                u8 recipe id, values                        v2: u8 rec
 M 77  text message        v2: u8 length, text, u8 length, source, u8 level;  v1: u8 level, text
 ====  ==================  ==========================================  ===========================
 
-Names and types are texts separated by commas. Instead of a type the controller writes
+A recipe lists the fields of a data package in their order: O or I gives their names, the reply
+their types. Names and types are texts separated by commas. Instead of a type the controller writes
 ``NOT_FOUND`` for a field that it lacks, or ``IN_USE`` for an input that another client already
 writes; then the recipe id is 0.
 
@@ -44,7 +45,7 @@ from ur_cartesian_driver.protocol.framing import decode_text, FrameBuffer, hex_t
 
 
 class PackageType(IntEnum):
-    """The type byte: the letters of the table."""
+    """The type byte of a frame: a letter of the table above."""
 
     REQUEST_PROTOCOL_VERSION = ord('V')
     GET_URCONTROL_VERSION = ord('v')
@@ -108,7 +109,7 @@ class GetControllerVersion(_Package):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetupOutputs(_Package):
-    """Client: requests these outputs; the frequency [Hz] is None in version 1."""
+    """Client: requests outputs by name, at a frequency [Hz], which is None in version 1."""
 
     type: ClassVar = PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS
     names: tuple[str, ...]
@@ -122,7 +123,7 @@ class SetupOutputs(_Package):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetupInputs(_Package):
-    """Client: announces the inputs that it will write."""
+    """Client: names the inputs of the controller that it will write."""
 
     type: ClassVar = PackageType.CONTROL_PACKAGE_SETUP_INPUTS
     names: tuple[str, ...]
@@ -134,14 +135,14 @@ class SetupInputs(_Package):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartStreaming(_Package):
-    """Client: starts the data."""
+    """Client: starts the data packages of the controller."""
 
     type: ClassVar = PackageType.CONTROL_PACKAGE_START
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PauseStreaming(_Package):
-    """Client: pauses the data."""
+    """Client: pauses the data packages of the controller."""
 
     type: ClassVar = PackageType.CONTROL_PACKAGE_PAUSE
 
@@ -240,7 +241,7 @@ class ControllerVersion(_Package):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetupOutputsReply(_Package):
-    """Controller: types of the outputs as text; the recipe id is None in version 1."""
+    """Controller: types of the requested outputs; the recipe id is None in version 1."""
 
     type: ClassVar = PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS
     types: tuple[str, ...]
@@ -254,7 +255,7 @@ class SetupOutputsReply(_Package):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetupInputsReply(_Package):
-    """Controller: types of the inputs as text."""
+    """Controller: types of the named inputs."""
 
     type: ClassVar = PackageType.CONTROL_PACKAGE_SETUP_INPUTS
     types: tuple[str, ...]
@@ -309,7 +310,7 @@ def _pack_checked(layout: str, *values: float) -> bytes:
 
 def encode_names(names: Sequence[str]) -> bytes:
     """
-    Return names as bytes for the wire.
+    Return names as bytes, separated by commas.
 
     :raises LocalProtocolError: a name is empty or contains a comma.
     """
@@ -407,7 +408,7 @@ def _require_min_size(data: bytes, payload: bytes, size: int) -> bytes:
 
 
 def _text_message(data: bytes, payload: bytes, version: int) -> RtdeTextMessage:
-    """Return a text; it has the format of version 1 if its lengths do not fit version 2."""
+    """Return the text message; if its lengths do not fit version 2, it is read as version 1."""
     _require_min_size(data, payload, 1)
     end = 1 + payload[0]
     source_end = end + 1 + payload[end] if end < len(payload) else len(payload)

@@ -22,19 +22,19 @@ from ur_cartesian_driver.motion.goal.output_names import OUTPUTS
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol.dashboard import DashboardRequest
 
-#: Timeout of a script: the default [s]; the largest [s].
+#: Default and largest timeout of a script [s].
 SCRIPT_TIMEOUT, MAX_SCRIPT_TIMEOUT = 30.0, 600.0
-#: Length [characters] above which a script must be a mistake.
+#: Longest accepted script [characters]; a longer one must be a mistake.
 MAX_SCRIPT_LENGTH = 200_000
-#: Longest program [characters].
+#: Longest accepted program [characters].
 MAX_PROGRAM_LENGTH = 2_000_000
-#: Longest text for the dashboard [characters]; its UTF-8 bytes fit into a line of the server.
+#: Longest text for the dashboard [characters]; in UTF-8, it fits into a line of the server.
 MAX_TEXT_LENGTH = 1000
-#: A length that no tool has [m]; a mass that no payload has [kg].
+#: Upper bounds: of coordinates of a TCP or centre of gravity [m], of the payload's mass [kg].
 MAX_TOOL_OFFSET, MAX_PAYLOAD_MASS = 5.0, 100.0
-#: An acceleration that no mounting on earth has [m/s^2].
+#: Upper bound of gravity [m/s^2], about twice its value on earth.
 MAX_GRAVITY = 20.0
-#: Tolerance for the length of a unit quaternion.
+#: Largest difference of a quaternion's length from 1.
 UNIT_TOLERANCE = 1e-3
 
 
@@ -43,7 +43,7 @@ class ServiceAnswer:
     """
     The outcome of a call.
 
-    :param ok: the call was carried out; an effect that the robot can report has been reported.
+    :param ok: whether the call was carried out, and the robot has reported the effect if it can.
     :param text: a sentence, or the requested value.
     """
 
@@ -106,7 +106,7 @@ class UploadProgramCall(_CheckedCall):
     Send a program to the robot; PolyScope X only.
 
     :param program: the content of a `.urpx` file, which also names the program.
-    :param replaces: the program replaces one on the robot; else it is a new one.
+    :param replaces: whether the program replaces one on the robot; if not, it is a new one.
     """
 
     program: str
@@ -125,7 +125,7 @@ class UploadProgramCall(_CheckedCall):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DownloadProgramCall(_CheckedCall):
-    """Ask for a program of the robot, the content of a `.urpx` file; PolyScope X only."""
+    """Ask for a program on the robot, as the content of a `.urpx` file; PolyScope X only."""
 
     program_name: str
 
@@ -164,7 +164,7 @@ class SetPayloadCall(_CheckedCall):
 
     :param mass: [kg].
     :param cog: centre of gravity in the flange frame [m].
-    :param inertia: xx, yy, zz, xy, xz, yz about that point, along the axes of the flange
+    :param inertia: xx, yy, zz, xy, xz, yz about ``cog``, along the axes of the flange
         [kg m^2]; empty = a point mass.
     :param transition_time: time over which the controller changes to this payload [s].
     """
@@ -225,7 +225,7 @@ class SetOutputCall(_CheckedCall):
     Set an output.
 
     :param value: 0 or 1 for a digital output, a fraction of the range for an analog output.
-    :param domain: domain of an analog output; ignored for a digital output.
+    :param domain: current or voltage for an analog output; ignored for a digital output.
     """
 
     kind: OutputKind
@@ -294,7 +294,10 @@ class HandBackCall:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunScriptCall(_CheckedCall):
     """
-    Run a script: a secondary program, or in headless mode a primary one.
+    Run a script: a secondary program, or a primary one.
+
+    A secondary program runs beside the robot program. A primary program replaces it, and needs
+    headless mode.
 
     :param timeout: longest duration of a primary program [s].
     """
@@ -326,7 +329,7 @@ class RecoverCall(_CheckedCall):
     unlock_protective_stop: bool = False
 
 
-#: The calls that change the assumptions of a planned goal.
+#: The calls that change settings on which the plan of a goal relies.
 SettingCall: TypeAlias = SetTcpCall | SetPayloadCall | SetGravityCall
 
 

@@ -6,7 +6,8 @@ Runs one program, a controller cycle (frame) at a time.
 In each frame all live threads run, in the order in which they were started. Each thread runs until
 it ends or takes time: in a builtin that yields, in `join`, or in `pause`. A new thread runs in the
 same frame, after the threads that were started before it. Nothing else switches threads. A thread
-that evaluates more nodes than its budget in one frame ends the program with an error.
+that evaluates more nodes of the syntax tree in one frame than its budget allows ends the program
+with an error.
 
 The manual does not guarantee this order. For tests of programs that must not depend on it, two
 settings change the order. With `thread_delay` a new thread begins some frames later. With
@@ -78,7 +79,7 @@ class _Thread:
     in_critical_section: bool = False
     #: Frames until the thread begins.
     delay: int = 0
-    #: Number of nodes that the thread may still evaluate in this frame.
+    #: Number of nodes of the syntax tree that the thread may still evaluate in this frame.
     fuel: int = 0
     #: Whether the thread took time in this frame.
     took_time: bool = False
@@ -193,7 +194,7 @@ class ScriptInterpreter:
         }
 
     def begin(self, code: GeneratedCode) -> ScriptSteps:
-        """Add the code of the program or of a line; return the steps of its main thread."""
+        """Add code of the program or of one of its ``lines``; return a generator that runs it."""
         for function in code.code:
             self._names |= function.constants
             for unit in function.units:
@@ -201,11 +202,11 @@ class ScriptInterpreter:
         return _steps(self._names.pop(code.main.name))
 
     def forget(self, variables: Iterable[str]) -> None:
-        """Forget global variables."""
+        """Remove the global variables of these names."""
         self.drop(map(global_name, variables))
 
     def drop(self, constants: Iterable[str]) -> None:
-        """Drop constants that no code uses any more."""
+        """Remove constants that no code uses any more."""
         for name in constants:
             self._names.pop(name, None)
 
@@ -364,7 +365,7 @@ class ScriptInterpreter:
             raise _ThreadKilled
 
     def kill_since(self, number: int) -> None:
-        """End the current thread's children with at least this number, and their children."""
+        """End the current thread's children from ``number`` on, and their descendants."""
         for thread in tuple(self._threads):
             if thread.parent is self._current and thread.number >= number:
                 self.kill(ThreadHandle(thread.number))
@@ -388,7 +389,7 @@ def _compile(
 
 
 def _steps(function: ThreadFunction) -> ScriptSteps:
-    """Return the steps of a thread, whether its function can take time or not."""
+    """Return a generator that runs a thread, even if its function is a plain function."""
     if inspect.isgeneratorfunction(function):
         steps: ScriptSteps = function(0)
         return steps
