@@ -32,7 +32,7 @@ _COMPARED_SAMPLES = 500
 
 @dataclass(frozen=True, slots=True)
 class _Link:
-    """The constant values of one DH row."""
+    """The constants of one row of the DH table."""
 
     theta: float
     d: float
@@ -138,8 +138,8 @@ class Arm:
         """
         Return the Jacobian of the TCP in base axes.
 
-        :returns: (6, 6), by which joint velocities [rad/s] give linear [m/s] and angular [rad/s]
-            velocity.
+        :returns: (6, 6), which maps joint velocities [rad/s] to the linear [m/s] and angular
+            [rad/s] velocity of the TCP.
         """
         frames = self.frames(q)
         if T_flange_tcp == IDENTITY:
@@ -167,7 +167,12 @@ class Arm:
         )
 
     def _frames(self, turns: list[tuple[N, N]], zero: N, one: N) -> ChainFramesOf[N]:
-        """Chain the links, given cosine and sine of each joint angle."""
+        """
+        Return the frames of the joints and the flange.
+
+        :param turns: cosine and sine of each joint's angle, as floats or as arrays.
+        :param zero: 0.0, or an array of zeros; ``one`` likewise.
+        """
         px = py = pz = zero
         xx, xy, xz = one, zero, zero
         yx, yy, yz = zero, one, zero
@@ -225,10 +230,10 @@ def pose_error(
     frames: ChainFramesOf[N], position: tuple[N, N, N], rotation: tuple[N, ...]
 ) -> tuple[list[N], N]:
     """
-    Return translation [m] and sine of the turn from the flange to a pose, and 1 + 2 cos(turn).
+    Return the displacement from the flange to a pose, and 1 + 2 cos(angle of its turn).
 
-    Translation and sine are vectors in base axes. The last value is positive up to a third of a
-    turn; beyond that the sine is misleading.
+    The displacement is a translation [m], and a turn as its axis times the sine of its angle, both
+    in base axes. The last value is positive up to 120 degrees; beyond, the sine is misleading.
 
     :param rotation: rotation matrix of the pose, nine numbers by rows.
     """

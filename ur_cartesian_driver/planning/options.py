@@ -133,11 +133,11 @@ class PlanningOptions:
     path_offset_known: Detected[bool] = True
     #: Whether the robot's software has payloads with inertia (PolyScope 5.10, PolyScope X).
     target_payload_known: Detected[bool] = True
-    #: The motion version of the robot's movej and movel; 0 = unknown.
+    #: Version of the robot's movej and movel: 1, or 2 from PolyScope 5.22 on; 0 = unknown.
     robot_motion_version: Detected[int] = 1
     #: Whether the robot reports TCP accelerations; if not, tolerances on them are refused.
     acceleration_known: Detected[bool] = True
-    #: The wire dialect of the robot program.
+    #: The format of the messages that the robot program understands.
     dialect: Detected[Dialect] = NEWEST_DIALECT
     #: The user's functions that the robot program contains.
     prelude: Detected[Prelude] = NO_PRELUDE
@@ -233,7 +233,7 @@ class PlanningOptions:
     max_joint_acceleration: Annotated[float, Range(0.1, 1000.0)] = 40.0
     #: Largest jerk of the tool on paths with rounded corners [m/s^3].
     max_linear_jerk: Annotated[float, Range(1.0, 10_000.0)] = 50.0
-    # The least tolerance is the resolution of the joint positions on the wire.
+    # The smallest tolerance is the resolution of joint positions in messages to the robot.
     #: Largest distance of the tool from the curve through the points of SPLINE and SERVO goals
     #: [m]; the orientation error [rad] times 0.1 m has the same limit. A smaller value needs more
     #: pieces on the wire.
@@ -251,8 +251,8 @@ class PlanningOptions:
         check_parameters(self)
         parse_planes(self.workspace_planes)
         parse_safe_outputs(self.safe_outputs)
-        # replace() comes here, too. So a file is read again only if its name has changed, and not
-        # at all if its values were given in code.
+        # dataclasses.replace() runs this, too. So a file is read again only if its name has
+        # changed, and not at all if its values were given in code.
         lead_file, twin_file, cell_file = self.read_files
         if self.lead_file != lead_file and (lead_file or not self.leads):
             object.__setattr__(self, 'leads', _read_leads(self.lead_file))
@@ -267,7 +267,7 @@ class PlanningOptions:
 
     @property
     def twin_problem(self) -> str:
-        """The difference between the twin's arm and the robot, a clause; '' = none, or no twin."""
+        """A clause on how the twin's arm differs from the robot; '' = not at all, or no twin."""
         return '' if self.twin is None else self.twin.arm.differences(self.robot)
 
     @property
@@ -278,10 +278,10 @@ class PlanningOptions:
     @property
     def laws(self) -> MotionLaws:
         """
-        The laws of :attr:`used_twin`, or the assumed ones.
+        The numbers that describe the controller's motions: of :attr:`used_twin`, or assumed.
 
-        The beginning and the speed of a blend were measured for one curve of the blend. If the
-        twin does not know this curve, both are assumed, too.
+        The measured beginning and speed of a blend hold for one shape of its curve only. If the
+        twin does not know the shape, the assumed beginning and speed apply.
         """
         laws = laws_of(self.used_twin, self.turn_ratio)
         if laws.blend_shape != 'unknown':
@@ -294,9 +294,9 @@ class PlanningOptions:
 
     def lead_times(self, commands: Sequence[IOCommand]) -> tuple[IOCommand, ...]:
         """
-        Return output commands, each earlier by the dead time of its named lead.
+        Return output commands, each earlier by the dead time of the valve that it names.
 
-        :raises InvalidGoal: a name is unknown, or its lead belongs to another output.
+        :raises InvalidGoal: a name is unknown, or this valve is at another output.
         """
         return with_lead_times(commands, self.leads, self.lead_file)
 
@@ -324,7 +324,7 @@ class PlanningOptions:
 
 def _read_leads(path: str) -> tuple[Lead, ...]:
     """
-    Return the leads in a file; '' = none.
+    Return the leads in a file; the path '' gives none.
 
     :raises ValueError: the file cannot be read, or has no leads.
     """
@@ -338,7 +338,7 @@ def _read_leads(path: str) -> tuple[Lead, ...]:
 
 def _read_twin(path: str) -> Twin | None:
     """
-    Return the twin in a file; '' = none.
+    Return the twin in a file; the path '' gives None.
 
     :raises ValueError: the file cannot be read, or is no twin of a known model.
     """
@@ -360,7 +360,7 @@ def _read_twin(path: str) -> Twin | None:
 
 def _read_cell(path: str) -> Cell:
     """
-    Return the bodies in a file; '' = none.
+    Return the bodies in a file; the path '' gives the empty cell.
 
     :raises ValueError: the file cannot be read, or is no cell.
     """

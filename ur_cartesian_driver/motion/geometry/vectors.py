@@ -4,7 +4,7 @@
 Vectors of three and six plain floats: immutable, comparable, and cheap within a 2 ms cycle.
 
 :data:`Vector3` is a position or a direction. :data:`Vector6` is six joints, a twist, an
-acceleration or a wrench. Rows of many vectors are numpy arrays.
+acceleration, a wrench or a pose. Many vectors together are the rows of a numpy array.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from math import hypot
 from typing import TypeAlias
 
 Vector3: TypeAlias = tuple[float, float, float]
-#: Six floats: joint positions [rad], a twist [m/s, rad/s] or a pose ``x y z rx ry rz`` [m, rad].
+#: Six floats: one for each joint, a twist [m/s, rad/s], or a pose ``x y z rx ry rz`` with a
+#: rotation vector [m, rad].
 Vector6: TypeAlias = tuple[float, float, float, float, float, float]
 #: Joint positions [rad].
 Joints: TypeAlias = Vector6

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A goal as the client sent it, in its own frame: the one table of its fields.
+A goal as the client sent it, in the frame that it names: the only list of its fields.
 
 Many parts of the driver handle the fields of a goal: messages, YAML files, flat arrays, columns,
 checks, the builder of paths, the resumption after a stop. When each part listed the fields
@@ -22,9 +22,9 @@ field, and its flat array in messages. Rules that concern more than one field ar
 To add a number to segments, declare it in MotionSegment.msg and PackedPoints.msg, in ``Segment``
 and ``SegmentColumns``, and use it where the motion is planned. Paths accept it by name, as in
 ``Path.at(name=...)``. A number that belongs to the whole goal is declared in the action instead of
-both messages, and needs no column. ``test/ros/test_goal_files.py`` compares table and messages.
-Decide also on its meaning in a spline and in a goal with times, and refuse it where it would have
-no effect: the table cannot know.
+both messages, and needs no column. ``test/ros/test_goal_files.py`` compares these declarations
+with the messages. Decide also on its meaning in a spline and in a goal with times, and refuse it
+where it would have no effect, because the declaration does not tell.
 
 There are two drawbacks. Each column is declared in addition to its field, because type checkers
 would not know it otherwise. And files list a few fields in another order than messages
@@ -96,7 +96,7 @@ class OnPathTolerance(IntEnum):
     STALL = 1
 
 
-#: Smallest number of spline pieces within the replace horizon.
+#: Smallest number of spline pieces within the time ``Goal.replace_horizon``.
 PIECES_PER_HORIZON = 3
 #: How long the motion waits for an arm that is off its path, unless the goal specifies it [s].
 DEFAULT_STALL_TIMEOUT = 10.0
@@ -173,13 +173,13 @@ DEFAULT_CORNER_ANGLE = 0.02
 
 #: The longest dwell and timeout at a point [s]; longer ones must be mistakes.
 MAX_STOP_TIME = 600.0
-#: The longest time between a point and an output that it switches [s].
+#: The longest time from passing a point until its output is switched [s].
 MAX_OUTPUT_OFFSET = 60.0
 #: The longest time by which an output is switched ahead of its place [s].
 MAX_OUTPUT_LEAD = 1.0
 #: The longest way between a point and the place where an output is switched [m].
 MAX_OUTPUT_DISTANCE = 10.0
-#: The longest distance between two pulses [m], the longest pulse [s], and the most in one train.
+#: Of a pulse train: the longest way between two pulses [m], the longest pulse [s], most pulses.
 MAX_PULSE_DISTANCE, MAX_PULSE_WIDTH, MAX_PULSE_COUNT = 2.0, 1.0, 1_000_000
 
 FINITE, NOT_NEGATIVE = Range(), Range(0.0)
@@ -221,6 +221,7 @@ class Waypoint:
     twist: Annotated[Vector6, RATE] = ZERO6
     #: Linear [m/s^2] and angular [rad/s^2] acceleration at the point.
     acceleration: Annotated[Vector6, RATE] = ZERO6
+    #: Linear [m/s^3] and angular [rad/s^3] jerk at the point.
     jerk: Annotated[Vector6, FINITE] = ZERO6
     posture: Posture = Posture()
 
@@ -249,12 +250,12 @@ class Segment:
     The motion that ends at the waypoint of the same index; its blend lies around that waypoint.
 
     Units of velocity and acceleration, by type: LINEAR, CIRCULAR, PROCESS m/s and m/s^2 of the
-    tool (rad/s and rad/s^2 for a pure rotation); JOINT rad/s and rad/s^2 of the leading axis;
-    OPTIMIZED_* fractions in (0, 1].
+    tool (rad/s and rad/s^2 for a pure rotation); JOINT rad/s and rad/s^2 of the leading axis, the
+    joint with the longest way; OPTIMIZED_* fractions in (0, 1].
     """
 
     type: SegmentType = SegmentType.AUTO
-    #: Distance from the waypoint at which both segments are left [m].
+    #: Distance from the waypoint at which the blend begins and ends [m].
     blend_radius: Annotated[float, NOT_NEGATIVE, Mark.OF_POINT] = 0.0
     #: How long the arm rests at the waypoint [s].
     dwell: Annotated[float, NOT_NEGATIVE, Mark.OF_POINT] = 0.0
@@ -271,9 +272,9 @@ class Segment:
     free_axis: Annotated[FreeAxis, Mark.OF_POINT] = FreeAxis.NONE
     free_min: Annotated[float, FINITE, Mark.OF_POINT] = 0.0
     free_max: Annotated[float, FINITE, Mark.OF_POINT] = 0.0
-    #: Largest distance of the path from the segments at this corner [m]; 0 = the goal's bound.
+    #: Largest distance of the path from the segments at this corner [m]; 0 = the goal's value.
     corner_deviation: Annotated[float, CORNER_DEVIATION, Mark.OF_POINT] = 0.0
-    #: Largest turn of the tool from its programmed orientation here [rad]; 0 = the goal's bound.
+    #: Largest turn of the tool from its programmed orientation here [rad]; 0 = the goal's value.
     corner_angle: Annotated[float, CORNER_ANGLE, Mark.OF_POINT] = 0.0
 
 
@@ -327,12 +328,12 @@ class IOCommand:
     domain: Annotated[AnalogDomain, DOMAIN] = AnalogDomain.CURRENT
     #: Way along the path from the waypoint to the place [m]; negative = before the waypoint.
     distance: Annotated[float, DISTANCE] = 0.0
-    #: The same as a fraction of a segment's length: if negative, of the segment that ends at the
+    #: This way as a fraction of a segment's length: if negative, of the segment that ends at the
     #: waypoint; if positive, of the segment that begins there.
     fraction: Annotated[float, Range(-1.0, 1.0)] = 0.0
-    #: Name of a lead, by whose dead time the command comes earlier, see ``lead_file``; '' = none.
+    #: Name of a valve in ``lead_file``, by whose dead time the command comes earlier; '' = none.
     lead: str = ''
-    #: The name of the lead whose dead time ``offset`` contains; '' = none.
+    #: The name of the valve whose dead time ``offset`` contains already; '' = none.
     lead_name: Annotated[str, Mark.NOT_SENT] = field(default='', compare=False)
 
 
@@ -359,7 +360,7 @@ class ScriptCall:
 
     waypoint: Annotated[int, POINT]
     function: str
-    #: The wire format carries no larger numbers.
+    #: Messages to the robot program cannot carry larger numbers.
     arguments: Annotated[tuple[float, ...], Range(-2147.0, 2147.0)] = ()
     #: Longest time until the function returns [s].
     timeout: Annotated[float, ALWAYS, TIMEOUT] = 10.0
@@ -392,10 +393,10 @@ class PartAction(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartChange:
-    """Take or put down a body of the cell at a waypoint, where the arm stops; for the checks."""
+    """Tell the collision checks that the tool takes or releases a body at a stop."""
 
     waypoint: Annotated[int, POINT]
-    #: Name of the body.
+    #: Name of a body of the cell.
     body: str
     action: Annotated[PartAction, ALWAYS] = PartAction.ATTACH
 
@@ -473,6 +474,7 @@ class Press:
     max_yield: Annotated[float, ALWAYS, Range(0.0, 0.5)] = 0.0
     #: How far the tool may give way about compliant axes [rad]; 0 = the default.
     max_yield_angle: Annotated[float, ALWAYS, Range(0.0, 1.5)] = 0.0
+    #: The settings ``damping`` and ``gain_scaling`` of the controller's force mode.
     damping: Annotated[float, ALWAYS, FRACTION] = 0.005
     gain_scaling: Annotated[float, ALWAYS, Range(0.0, 2.0)] = 1.0
     #: Whether the force sensor is zeroed before the press begins.
@@ -552,14 +554,14 @@ class Goal:
 
     frame_id: Annotated[str, Sent(name='trajectory.header.frame_id')] = ''
     waypoints: Annotated[Sequence[Waypoint], Sent(name='trajectory.points', always=False)]
-    #: Name of the controlled frame; '' = the frame has only a pose, or is the active TCP.
+    #: Name of the controlled frame; '' = it is given only by its pose, or is the active TCP.
     controlled_frame: Annotated[str, Sent(name='trajectory.controlled_frame')] = ''
     #: Pose of the controlled frame in the flange; None = the frame is the robot's active TCP.
     T_flange_controlled: Annotated[Pose | None, Mark.NOT_SENT] = None
-    #: The frame of the goal in the robot's base.
+    #: Pose of the goal's frame in the robot's base.
     T_base_frame: Annotated[Pose, Mark.NOT_SENT] = IDENTITY
-    #: The motion of the frame, if it is on a part that the flange carries; poses are then in this
-    #: frame, and ``T_base_frame`` is the identity. None = the frame is fixed in the base.
+    #: Set if the goal's frame is on a part that the flange carries; poses are then in this frame,
+    #: and ``T_base_frame`` is the identity. None = the frame is fixed in the base.
     moving_frame: Annotated[MovingFrame | None, Mark.NOT_SENT] = None
     #: Age of the goal's stamp on receipt [s]; None = no stamp.
     age: Annotated[float | None, Mark.NOT_SENT] = None
@@ -577,7 +579,7 @@ class Goal:
     presses: tuple[Press, ...] = ()
     execution: ExecutionMode = ExecutionMode.AUTO
     keep_open: bool = False
-    #: Time ahead of the arm within which points are fixed [s]; later points can be replaced.
+    #: Points due within this time [s] are fixed, and later ones can be replaced; 0 = none can.
     replace_horizon: Annotated[
         float, Range(0.05, 1.0, 's', 'set it to 0.15', zero='nothing is replaced')
     ] = 0.0

@@ -50,9 +50,9 @@ class MovingFrame:
 
     def seen(self, state: RobotState) -> RobotState:
         """
-        Return the state as seen from the frame: poses and rates of the tool, in the frame.
+        Return the state with the tool's poses and rates in the frame, not the TCP's in base.
 
-        Joints and TCP offset stay as they are, and the wrench stays in base.
+        Joints and ``T_flange_tcp`` stay as they are, and the wrench stays in base.
         """
         T_flange_tcp = state.T_flange_tcp
         actual, actual_twist, actual_acceleration = self._motion(
@@ -95,9 +95,10 @@ class MovingFrame:
 
 def _as_seen(acceleration: Vector6, twist: Vector6) -> Vector6:
     """
-    Return a - 2 w x v: the acceleration of a body at a fixed point, less the Coriolis term.
+    Return a - 2 w x v: the negative acceleration of a fixed point, as seen from a moving body.
 
-    Seen from the body, which turns with w, the fixed point moves with -v.
+    At the point, the body has the velocity v and the acceleration a, and it turns at w. Seen from
+    the body, the point moves with -v; 2 w x v is the Coriolis term.
     """
     a, v, w = acceleration[:3], twist[:3], twist[3:]
     return (*subtract(a, scale(cross(w, v), 2.0)), *acceleration[3:])

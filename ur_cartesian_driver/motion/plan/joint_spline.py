@@ -4,8 +4,8 @@
 Joint positions over time, as the polynomials that the robot evaluates too.
 
 Each piece is fixed by positions, velocities and accelerations at its two ends (quintic), or by
-positions and velocities (cubic). So one and the same curve is planned, sent, streamed as
-set-points and drawn.
+positions and velocities (cubic). So one and the same curve is planned, sent as pieces, streamed
+as set-points, and drawn.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ SAME_TIME = 5e-7
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointSpline:
-    """Consecutive pieces; the joints are at rest before the first piece and after the last one."""
+    """Consecutive pieces; before the first and after the last one, the joints are at rest."""
 
     #: (n + 1,) times at which pieces begin or end [s], increasing.
     times: Floats
@@ -74,7 +74,7 @@ class JointSpline:
 
     @classmethod
     def through(cls, times: Floats, rows: MotionRows, *, quintic: bool) -> JointSpline:
-        """Return the spline that has the states in rows (n + 1, 6) at times (n + 1,) [s]."""
+        """Return the spline that has the states ``rows`` (n + 1, 6) at ``times`` (n + 1,) [s]."""
         before, after = (
             MotionRows(*(column[k] for column in rows)) for k in (slice(None, -1), slice(1, None))
         )

@@ -1,11 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The motion primitives of the trajectory point interface.
+The instructions of the trajectory point interface, by which the robot program gets a trajectory.
 
-There is one class for each URScript motion. A target is either a :class:`Pose` (of the TCP, in the
-robot's base) or six joint positions [rad]; an arc may have one of each as target and via. The
-motion type on the wire follows from the class and the kinds of its targets.
+Each instruction is sent as one record. There is one class for each URScript motion; others switch
+outputs, act at a stop, or give parameters to the next instruction. The target of a motion is
+either a :class:`Pose` (of the TCP, in the robot's base) or six joint positions [rad]; an arc may
+have one of each as target and via. The type number in the record of a motion follows from the
+class and the kinds of its targets.
 """
 
 from __future__ import annotations
@@ -21,15 +23,15 @@ from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 Target: TypeAlias = Pose | Joints
 
-#: Defaults of the trajectory point interface, for the leading axis [rad/s], [rad/s^2] or the tool
-#: [m/s], [m/s^2].
+#: Default speed and acceleration of the interface: [rad/s], [rad/s^2] of the leading axis (the
+#: joint with the longest way), or [m/s], [m/s^2] of the tool.
 DEFAULT_VELOCITY = 1.04
 DEFAULT_ACCELERATION = 1.4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Move:
-    """The common part of all motions to a target."""
+    """The common fields of all motions to a target; the blend radius is in [m]."""
 
     target: Target
     velocity: float = DEFAULT_VELOCITY
@@ -115,7 +117,7 @@ class Spline:
 
 
 def still_spline(before: Spline, duration: float) -> Spline:
-    """Return the piece in which the joints rest at the end of another piece for a time [s]."""
+    """Return a piece that holds the joints at the end of ``before`` for a time [s]."""
     return Spline(
         target=before.target,
         velocities=ZERO6,
@@ -129,7 +131,7 @@ class SwitchOutput:
     """
     Not a motion: the robot program switches an output as the tool passes the trigger pose.
 
-    The record follows the motion during or after which the output switches, and takes no time.
+    Its record comes after the motion during or after which the output switches; it takes no time.
     """
 
     output: OutputKind
@@ -140,7 +142,8 @@ class SwitchOutput:
     #: Pose of the TCP in base at which to switch; None = when the preceding motion has ended.
     trigger_pose: Pose | None = None
     #: Unit direction of the motion at the trigger pose, linear or angular, in the axes of this
-    #: pose. The output switches when the tool crosses, in this direction, the plane through it.
+    #: pose. The output switches when the tool crosses, in this direction, the plane through the
+    #: trigger pose that is normal to the direction.
     trigger_direction: Vector6 = ZERO6
     #: Whether the tool is already past the plane when the record is read; the output then waits
     #: until the tool has gone back through the plane and crosses it anew.
@@ -148,7 +151,7 @@ class SwitchOutput:
     #: Delay after the end of the preceding motion [s].
     delay: float = 0.0
     #: Whether an analog output follows the speed, by the :class:`SpeedLaw` before this record,
-    #: until the next record switches it.
+    #: until the next record that switches this output.
     follows_speed: bool = False
     #: Whether pulses begin, by the :class:`PulseLaw` before this record.
     begins_pulses: bool = False
@@ -157,7 +160,7 @@ class SwitchOutput:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedLaw:
     """
-    Not a motion: the law of the next analog output that follows the speed.
+    Not a motion: how the next analog output with ``follows_speed`` depends on the speed.
 
     The fraction of the range is offset + gain * speed of the tool [m/s], within the bounds;
     ``filter_time`` is the time constant with which the speed is filtered [s].
@@ -170,7 +173,7 @@ class SpeedLaw:
     filter_time: float = 0.0
 
 
-#: Number of pieces, equal in time, into which a :class:`LeadLaw` divides its way.
+#: Number of pieces, equal in time, into which a :class:`LeadLaw` divides its ``distance``.
 LEAD_PIECES = 11
 
 
@@ -179,16 +182,17 @@ class LeadLaw:
     """
     Not a motion: the lead of the next output, and the planned motion to the place of that output.
 
-    At full speed, the tool passes the trigger pose one lead before the place. A slower tool
-    switches nearer to the place.
+    The lead is the time by which the output switches before the tool is at the place. With the
+    speed slider at 100 %, the tool passes the trigger pose one lead before the place. A slower
+    tool switches nearer to the place.
     """
 
-    #: How much ahead of its place the output switches, in real time [s].
+    #: The lead, in real time [s].
     lead: float
     #: Way of the tool from the trigger pose to the place [m]; its turn [rad] if it only turns.
     distance: float
-    #: Speeds of the tool [m/s or rad/s] at full speed, from the place back to the trigger pose,
-    #: evenly spaced in time. The acceleration between them is constant.
+    #: Planned speeds of the tool [m/s or rad/s], from the place back to the trigger pose, evenly
+    #: spaced in time. The acceleration between them is constant.
     speeds: tuple[float, ...]
     #: Whether way and speeds are angular.
     turns: bool = False
@@ -197,12 +201,13 @@ class LeadLaw:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PulseLaw:
     """
-    Not a motion: the law of the pulses that begin with the next output.
+    Not a motion: the parameters of the pulses that the next :class:`SwitchOutput` begins.
 
     :param slot: index of the output's pulse counter in the robot program.
     :param distance: way of the tool from pulse to pulse [m].
     :param phase: way from the place of the next output to the first pulse [m].
     :param width: duration of a pulse [s].
+    :param count: number of pulses.
     :param goes_on: whether the train continues on appended points; pulses that remain at the end
         of the trajectory are then dropped.
     """

@@ -36,7 +36,7 @@ class DigitalChannels:
 
     @classmethod
     def from_bits(cls, bits: int) -> DigitalChannels:
-        """Return the channels in the bits of an RTDE value: standard, configurable, tool."""
+        """Return the channels in an RTDE value; from bit 0: 8 standard, 8 configurable, 2 tool."""
         flags = tuple(bool(bits >> i & 1) for i in range(18))
         return cls(standard=flags[:8], configurable=flags[8:16], tool=flags[16:])
 
@@ -54,7 +54,7 @@ class Signals:
     tool_voltage: int = 0
     #: Measured current of the tool's supply [A].
     tool_current: float = 0.0
-    #: [degrees Celsius].
+    #: Temperature of the tool [degrees Celsius].
     tool_temperature: float = 0.0
     #: Mode of the tool, as the controller numbers it.
     tool_mode: int = 0

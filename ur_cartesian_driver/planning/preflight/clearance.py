@@ -3,8 +3,9 @@
 """
 Check the clearance of the arm from itself, the workspace planes and the cell along its path.
 
-In every row of joint positions, cylinders that contain the links are measured. Where cylinders
-come close, meshes are measured, if the model has them
+For every row (a sample of the joint positions), the distances of pairs are measured: link to link,
+or link to plane, between cylinders that contain the links. Where links come close to each other,
+their meshes are measured, if the model has them
 (:mod:`~ur_cartesian_driver.kinematics.collision_meshes`). Whether a distance below `min_clearance`
 is refused or only reported depends on `self_collision` and the model, never on whether meshes are
 installed. An arm that starts too close can move away: a pair that is too close at the start is
@@ -66,9 +67,9 @@ class Violation:
 
     #: The row, as an index of the checked configurations.
     row: int
-    #: A clause: the pair that is too close, its distance, and the bound.
+    #: A clause with the pair that is too close, its distance and the bound.
     text: str
-    #: A clause: how to avoid the violation.
+    #: A clause that tells how to avoid the violation.
     remedy: str
     #: The names of the two bodies, if the violation is in the cell.
     bodies: tuple[str, ...] = ()
@@ -83,7 +84,7 @@ class ClosestInCell(NamedTuple):
     row: int
     #: The names of both bodies.
     bodies: tuple[str, str]
-    #: [m]
+    #: Distance of both bodies [m].
     distance: float
     #: Lower bound of the distances of all pairs but neighbouring links on the whole path [m].
     at_least: float
@@ -189,7 +190,7 @@ class Clearance:
         :param q_start: the start configuration; pairs that are too close there may separate.
         :param closest: whether to search for the closest pair in the cell, which takes longer.
         """
-        #: By ``checker.refuses``: the first violation that is refused, and the first warning.
+        #: The first violation, by ``checker.refuses``: True = refused, False = only warned of.
         found: dict[bool, Violation] = {}
         margin, description = inf, ''
         start = np.array([q_start])
@@ -344,6 +345,8 @@ def clearances(
     """
     Yield the clearance of each stretch of a path with each tool tip, and its report lines.
 
+    A stretch ends where the tool takes or puts down a body.
+
     :param tool_tips: the tips in the flange frame, the active TCP first.
     :param part_changes: the bodies that the tool takes or puts down along the path.
     :param displaced: (n, 6) joints displaced by an offset [rad], to check in place of ``path.q``.
@@ -370,7 +373,7 @@ def clearances(
 
 
 class _InitialViolations:
-    """The pairs that were too close at the start and are not clear yet; a column for each pair."""
+    """The pairs that were too close at the start and are not clear yet."""
 
     def __init__(self, checker: _SelfCollisionChecker | _PlaneChecker, start: Floats) -> None:
         lower, distances = checker.measure(start, np.ones(len(checker.bounds), dtype=np.bool_))
@@ -381,12 +384,12 @@ class _InitialViolations:
 
     def refused(self, lower: Floats, distances: Floats) -> Flags:
         """
-        Return whether each pair is too close in each row (rows, columns), and not separating.
+        Return for each row and pair (rows, pairs) whether it is too close and not separating.
 
         Call it with consecutive rows, because it follows the separating pairs.
 
-        :param lower: the distances between cylinders; where meshes touch, they tell whether the
-            links separate.
+        :param lower: the distances between cylinders; they tell whether the links separate where
+            meshes touch, whose distance is 0.
         :param distances: the distances to compare with the bounds.
         """
         near = distances < self._bounds
@@ -403,7 +406,9 @@ class _InitialViolations:
 
 def _is_receding(values: Floats, reached: Floats) -> tuple[Floats, Flags]:
     """
-    Return each column's largest value, and whether each value is at least all before it.
+    Return each column's largest value, and whether each value is at least as large as all before.
+
+    A value that is smaller only by rounding counts as equal.
 
     :param reached: the largest values before the first row.
     """
@@ -448,11 +453,11 @@ class _SelfCollisionChecker:
 
     def measure(self, q: Floats, pending: Flags) -> tuple[Floats, Floats]:
         """
-        Return the cylinders' distances, and distances to compare with the bounds, (n, columns).
+        Return the cylinders' distances, and distances to compare with the bounds, (n, pairs).
 
-        :param pending: whether each column needs exact distances. In the other columns, if this
-            check refuses, a distance below the bound may be returned as 0, and a larger one as a
-            lower bound, which is faster.
+        :param pending: (pairs,) whether the distances of a pair have to be exact. For other pairs,
+            if this check refuses, a distance below the bound may be returned as 0, and a lower
+            bound in place of a larger distance, which is faster.
         """
         lower = self._bodies.distances(q, inf if pending.any() else self._bound)
         close = np.flatnonzero((lower < self._bound).any(axis=0))
@@ -494,7 +499,7 @@ def refuses_self_collision(name: str, options: PlanningOptions) -> bool:
 
 
 def self_collision_remark(name: str, options: PlanningOptions) -> str:
-    """Return a sentence about missing meshes of a model and the effect; '' = none is missing."""
+    """Return a sentence about missing meshes of a model; '' = there is nothing to tell."""
     missing, refuses = missing_meshes(name), refuses_self_collision(name, options)
     if not missing or options.self_collision == 'off':
         return ''
@@ -533,7 +538,7 @@ class _PlaneChecker:
 
     def measure(self, q: Floats, pending: Flags) -> tuple[Floats, Floats]:
         """
-        Return the heights (n, columns) of links and TCP above the planes [m].
+        Return the heights of links and TCP above the planes [m], a column for each pair.
 
         They are returned twice, as both results of :meth:`_SelfCollisionChecker.measure`.
         """

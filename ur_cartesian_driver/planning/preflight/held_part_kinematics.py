@@ -41,7 +41,7 @@ from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 
 class HeldPartKinematics(TcpKinematics):
     """
-    The kinematics of a path in a frame that the flange carries.
+    The kinematics of a path in a frame on a part that the flange carries.
 
     :param T_flange_tcp: the active TCP, whose speed in base is limited, too.
     :param frame: the frame on the part, in the flange frame, and the pose of the tool in base.
@@ -85,7 +85,11 @@ class HeldPartKinematics(TcpKinematics):
         return inverse_rows(transform_rows(self._T_tool_base, T_base_frame))
 
     def tool_rates(self, q: Floats, qd: Floats, qdd: Floats) -> tuple[Floats, Floats]:
-        """Return twist and acceleration (n, 6) of the tool in the frame on the part."""
+        """
+        Return twist and acceleration (n, 6) of the tool in the frame on the part.
+
+        The arguments are joint positions, velocities and accelerations, (n, 6) each.
+        """
         twist, acceleration = tool_rates(self.arm, self._point, q, qd, qdd)
         acceleration[:, :3] -= _twice_turned(twist)
         to_frame = conjugate_rows(self._orientations(q))
@@ -105,7 +109,8 @@ class HeldPartKinematics(TcpKinematics):
         Return bounds of the joint velocities and accelerations (n, 6).
 
         :param rates: bounds on the linear and angular velocity of the tool in the frame on the
-            part [m/s], [rad/s]; ``accelerations`` likewise.
+            part [m/s], [rad/s].
+        :param accelerations: bounds on its accelerations [m/s^2], [rad/s^2].
         """
         linear, angular = accelerations
         changed = linear + 2.0 * rates[0] * rates[1], angular
@@ -118,7 +123,7 @@ class HeldPartKinematics(TcpKinematics):
 
     @property
     def reach(self) -> float:
-        """Upper bound of the distance of the tool from the frame on the part [m]."""
+        """Upper bound of the distance between the tool and the frame on the part [m]."""
         lever = hypot(*self._frame.T_flange_frame.position)
         return self.arm.model.max_reach + hypot(*self._frame.T_base_tool.position) + lever
 

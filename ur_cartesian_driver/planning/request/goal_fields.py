@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The names of goal fields in refusals, and properties of goals and segment types."""
+"""Names of goal fields for error messages, and properties of goals and segment types."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def type_table(types: Collection[SegmentType]) -> Flags:
     """
     Return an array to be indexed with segment types: True for ``types``.
 
-    This is faster than np.isin, and faster than comparing an array with a member.
+    This is faster than np.isin, and faster than comparing an array with an enumeration member.
     """
     return np.array([kind in types for kind in SegmentType])
 
@@ -36,8 +36,8 @@ IS_STRAIGHT = ~(IS_JOINT_MOVE | IS_ARC)
 IS_OPTIMIZED = type_table(_OPTIMIZED)
 #: Segment types whose velocity is the speed of the tool.
 TAKES_TOOL_SPEED = ~type_table((SegmentType.JOINT, *_OPTIMIZED))
-#: Segment types after which a blend follows the measured laws of blends. The blends of PROCESS are
-#: documented, those of OPTIMIZED types have not been measured.
+#: Segment types whose blends ``MotionLaws`` describes. The manual describes the blends of PROCESS,
+#: and the blends of OPTIMIZED types have not been measured.
 FOLLOWS_BLEND_LAWS = type_table((SegmentType.LINEAR, SegmentType.JOINT, SegmentType.CIRCULAR))
 
 
@@ -54,7 +54,7 @@ def segment_field(index: int, field: str = '') -> str:
 def late_point_error(
     index: int, times: Floats | Sequence[float], remedy: str = 'increase it'
 ) -> InvalidGoal:
-    """Return the refusal of a point whose time is negative, or not later than the point before."""
+    """Return the error for a point whose time is negative or not after the point before."""
     than = 'less than the 0 s'
     if index > 0:
         than = f'not later than the {times[index - 1]:g} s of points[{index - 1}]'
@@ -64,7 +64,7 @@ def late_point_error(
 
 
 def short_segment_error(index: int, duration: float, least: float) -> InvalidGoal:
-    """Return the refusal of a time that is too short for a piece of a spline."""
+    """Return the error for a time that is too short for a piece of a spline."""
     return InvalidGoal(
         point_field(index, 'time_from_start'),
         f'gives the segment {duration:g} s, less than the {least:g} s that a piece of a spline '
@@ -74,7 +74,7 @@ def short_segment_error(index: int, duration: float, least: float) -> InvalidGoa
 
 
 def long_segment_error(index: int, duration: float, most: float) -> InvalidGoal:
-    """Return the refusal of a time that is longer than max_segment_time."""
+    """Return the error for a time that is longer than max_segment_time."""
     return InvalidGoal(
         point_field(index, 'time_from_start'),
         f'gives the segment {duration:g} s, more than max_segment_time = {most:.0f} s',

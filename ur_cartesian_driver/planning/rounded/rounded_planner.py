@@ -3,9 +3,10 @@
 """
 Plan joint spline pieces for lines and arcs with rounded corners.
 
-The steps: programmed path -> rounded path -> time law -> tool spline, with knots at least
-:data:`MIN_PIECE_TIME` apart -> the arm along this spline and the joint polynomials, as for any
-spline (:mod:`~ur_cartesian_driver.planning.spline.spline_path`).
+The steps: programmed path -> rounded path -> time law (the way along the path over time) -> tool
+spline, with knots (the ends of its pieces) at least :data:`MIN_PIECE_TIME` apart -> joint
+positions along this spline, and joint polynomials, as for any spline
+(:mod:`~ur_cartesian_driver.planning.spline.spline_path`).
 """
 
 from __future__ import annotations
@@ -59,13 +60,13 @@ from ur_cartesian_driver.planning.spline.spline_path import (
 
 #: Greatest deviation of the pieces from the rounded path [m].
 PIECE_TOLERANCE = 1e-5
-#: This deviation is also at most this fraction of the smallest corner_deviation of the goal.
+#: Upper bound of this deviation, as a fraction of the smallest corner_deviation of the goal.
 _PIECE_PART = 0.2
-#: Fraction of this deviation that the tool spline may use; the joint polynomials get the
+#: Fraction of the allowed deviation that the tool spline may use; the joint polynomials get the
 #: remainder. They need less, because pieces are short compared with the arm.
 _TOOL_PART = 0.6
-#: Fraction of the jerk limit at which the time law aims, because the pieces have a little more
-#: jerk.
+#: Fraction of the jerk limit that the time law may use, because the pieces have a little more
+#: jerk than the law.
 _JERK_PART = 0.97
 #: The width of a corner is at most the distance that the tool travels in this time [s].
 _WIDTH_TIME = 0.25
@@ -79,8 +80,8 @@ _NO_TRAVEL, _NO_TURN = 1e-6, 1e-6
 #: near the quarters.
 _SAMPLES_INSIDE = 3
 #: Accelerations inside a piece are measured if they may exceed those of the tool spline by more
-#: than the fraction _MORE_ACCELERATION of their limit, and inside all pieces if a joint exceeds
-#: the fraction _FAST of its limit anywhere.
+#: than the fraction _MORE_ACCELERATION of their limit, and inside all pieces if a joint anywhere
+#: exceeds the fraction _FAST of its speed or acceleration limit.
 _MORE_ACCELERATION, _FAST = 0.002, 0.5
 
 
@@ -88,6 +89,7 @@ _MORE_ACCELERATION, _FAST = 0.002, 0.5
 class RoundedMotion:
     """The motion along a rounded path, as joint polynomials."""
 
+    #: The time laws of the sections; a section runs from one stop of the arm to the next.
     laws: Sequence[SectionLaw]
     limits: ToolLimits
     kinematics: TcpKinematics
@@ -104,7 +106,7 @@ class RoundedMotion:
 
     @cached_property
     def reference(self) -> ReferencePath:
-        """The path of the tool; each row has the number of its segment in the goal."""
+        """Samples of the tool's path, each with the number of its segment in the goal."""
         path = self.path
         pieces = spline_pieces(path.spline, self.sample_count, 0, self.places)
         piece, t = sample_parameters(pieces)
@@ -137,12 +139,14 @@ def plan_rounded_path(
     """
     Return the motion along a goal's lines and arcs with rounded corners.
 
-    :param targets: (n, 7) the poses of the goal's points in the frame of the path.
+    :param targets: (n, 7) the poses of the goal's points in the frame of the path: the robot's
+        base, or a frame on a part that the arm holds.
     :param start: pose of the tool in this frame at the beginning, where the arm is at rest.
     :param q_start: joint positions at the beginning [rad].
-    :param stops: points at which the arm stops in addition to those without corner_deviation.
+    :param stops: indices of points at which the arm stops; it also stops at points without
+        corner_deviation.
     :raises GoalRefused: the arm does not move at all, cannot follow the path, cannot follow it
-        closely enough by pieces, or misses a posture.
+        closely enough by pieces, or passes a point in another posture than asked for.
     """
     bounds = corner_bounds(goal)
     given = bounds[bounds[:, 0] > 0.0, 0]
@@ -224,7 +228,7 @@ def _fit(
     options: PlanningOptions,
     tolerance: float,
 ) -> RoundedMotion:
-    # This slows the laws where pieces are too coarse, so durations are read afterwards.
+    # tool_knots() slows the laws where pieces are too coarse, so durations are read afterwards.
     knots = [tool_knots(law, _TOOL_PART * tolerance) for law in laws]
     durations = np.array([law.duration for law in laws])
     begins = np.cumsum(durations) - durations
@@ -345,7 +349,7 @@ def _may_exceed(motion: RoundedMotion, options: PlanningOptions) -> Flags:
 
 def _limit_excess(motion: RoundedMotion, options: PlanningOptions, rows: Indices) -> Floats:
     """
-    Return the greatest ratio, inside some pieces (k,), of a quantity to its limit.
+    Return the greatest ratio of a quantity to its limit inside each piece of ``rows``, (k,).
 
     The quantities are the accelerations of the tool, and the speeds and accelerations of the
     joints.

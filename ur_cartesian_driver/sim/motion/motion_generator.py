@@ -1,11 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Turns motion calls into one target per control cycle.
+Turn motion calls into one target of the arm per control cycle.
 
 A call (``movel`` ...) returns a :class:`Move` at once; ``step`` does one cycle of the motion. To
-find out when the script function can return, the caller polls ``Move.returned``. If the next call
-comes in the cycle in which ``returned`` becomes true, the motion continues without an idle cycle.
+find out when the URScript function can return, the caller polls ``Move.returned``. If the next
+call comes in the cycle in which ``returned`` becomes true, the motion continues without an idle
+cycle.
 
 Speed scaling and the limits of the arm stretch the time and never change the path. Tool motions
 are solved by inverse kinematics in each cycle, starting from the previous solution. If a path
@@ -73,10 +74,11 @@ class MotionGenerator:
 
     ``warnings`` collects reports until the controller takes them. After a ``fault`` the arm stands
     still until ``clear_fault``. Only joint stops can exceed ``max_tool_speed`` [m/s]. A path move
-    with an impossible parameter raises :class:`MotionError`.
+    (``movej`` to ``optimovel``) with an impossible parameter raises :class:`MotionError`.
 
     :param cycle: duration of a cycle [s].
     :param q: joint positions at the start [rad].
+    :param laws: the numbers that describe the controller's motions, assumed or measured.
     """
 
     def __init__(
@@ -85,10 +87,9 @@ class MotionGenerator:
         """Begin at rest at ``q`` with the flange as TCP."""
         self.arm = arm
         self.cycle = cycle
-        #: The laws of the robot's motion, assumed or measured.
         self.laws = laws
         self.max_tool_speed = MAX_TOOL_SPEED
-        #: The motion version of movej and movel, 1 or 2; and the laws of version 2.
+        #: The controller's version of movej and movel, 1 or 2, and the numbers of version 2.
         self.motion_version = 1
         self.second_version = SecondMotionVersion()
         #: The target of the motion, without the path offset.
@@ -137,7 +138,7 @@ class MotionGenerator:
 
     @property
     def T_flange_tcp(self) -> Pose:
-        """The TCP. A change takes effect with the next call; a running call keeps its TCP."""
+        """Pose of the TCP in the flange; a change applies from the next call on."""
         return self._target.T_flange_tcp
 
     @T_flange_tcp.setter
@@ -191,14 +192,26 @@ class MotionGenerator:
         t: float = 0.0,
         r: float = 0.0,
     ) -> Move:
-        """Move straight in joint space; a [rad/s^2], v [rad/s] of the fastest joint; r [m]."""
+        """
+        Move straight in joint space.
+
+        :param a: acceleration of the leading axis, the joint with the longest way [rad/s^2].
+        :param v: speed of the leading axis [rad/s].
+        :param t: duration [s]; 0 = it follows from ``a`` and ``v``.
+        :param r: blend radius [m].
+        """
         parameters = ProfileParameters(acceleration=a, speed=v, time=t)
         return self._start_path('movej', self._joint_path('movej', q), parameters, r)
 
     def movel(
         self, T_base_tcp: Pose, a: float = 1.2, v: float = 0.25, t: float = 0.0, r: float = 0.0
     ) -> Move:
-        """Move the tool straight; a [m/s^2], v [m/s]; for turns, times ``turn_ratio`` [rad/m]."""
+        """
+        Move the tool straight; ``t`` and ``r`` as in :meth:`movej`.
+
+        :param a: acceleration [m/s^2]; times ``turn_ratio`` [rad/m], the angular one of a turn.
+        :param v: speed [m/s]; times ``turn_ratio``, the angular speed of a turn.
+        """
         parameters = ProfileParameters(acceleration=a, speed=v, time=t)
         ratio = self.laws.turn_ratio
         return self._start_path(
@@ -223,7 +236,7 @@ class MotionGenerator:
         Move on a circular arc; mode 1 keeps the orientation fixed relative to the tangent.
 
         :raises MotionError: the three points do not lie on a circle. If the arm has to stop before
-            the arc begins, this causes a fault instead.
+            the arc begins, they are checked only then, and cause a fault instead.
         """
         return self._start_path(
             'movec',
@@ -435,7 +448,7 @@ class MotionGenerator:
                 active.move.returned = True
 
     def _next_start_rate(self) -> float:
-        """Increase the rate of a starting path, except in a pause, and return it."""
+        """Return the rate of a path's time, which grows at a start, except in a pause."""
         if self._active.scale <= 0.0 or self._start_rate == 1.0:
             return 1.0
         self._start_rate = min(1.0, self._start_rate + self.cycle / self.laws.start_time)
