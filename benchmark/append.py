@@ -3,8 +3,8 @@
 """
 An appendable goal of any length: points per second, memory, starvation.
 
-Producer, planner, robot loop, robot program and simulated controller run in one process on a clock
-that jumps, so the figure is the computing time of all of them, without waiting for the arm.
+Producer, planner, robot loop, robot program and simulated controller run in one process on a
+virtual clock that skips all waiting, so the figure is the computing time of all of them.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 
-#: Time between points, a cycle of the controller [s]; points of one request; time left at which
-#: the next one is sent [s].
+#: Time between points, which is a cycle of the controller [s]; points of one request; remaining
+#: time of the motion at which the next request is sent [s].
 STEP, CHUNK, LEAD_TIME = 0.008, 500, 2.5
 #: The circle: radius [m], time for one round [s], time of acceleration at its start [s].
 RADIUS, ROUND_TIME, RAMP = 0.05, 4.0, 1.0
@@ -32,7 +32,7 @@ SAMPLE_PERIOD = 20
 
 
 def point(home: Pose, number: int, last: bool) -> Waypoint:
-    """Return a point of a circle beside the tool, with its time and twist."""
+    """Return a point of a circle that starts at ``home``; the arm rests at the last point."""
     t, rate = STEP * number, 2.0 * pi / ROUND_TIME
     angle, turn = (
         (0.5 * rate / RAMP * t * t, rate / RAMP * t)
@@ -93,7 +93,7 @@ async def run_goal(cell: Any, points: int) -> dict[str, Any]:
         await motion.append(chunk(motion.points + 1, count), last=motion.points + count == points)
         planning += perf_counter() - at
         number += 1
-        del motion.motion.progress[:-1]  # the owner of a real one keeps the newest only
+        del motion.motion.progress[:-1]  # outside of tests, only the newest is kept
         clear_network_log(cell)
         if number % SAMPLE_PERIOD == 0:
             seen['memory'].append(resident())
@@ -116,7 +116,7 @@ async def run_goal(cell: Any, points: int) -> dict[str, Any]:
 
 
 def run(quick: bool, points: int = 50_000) -> Iterator[Figure]:
-    """Run an appendable goal with a spline piece in each cycle."""
+    """Measure an appendable spline goal with a point in each cycle."""
     sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'support'))
     from robot_cell import run_cell
 

@@ -22,15 +22,15 @@ from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.preflight.cell_clearance import CellClearance
 
-#: Blend radius [m], and how far the plate is below the path [m].
+#: Blend radius [m], and distance of the plate below the path [m].
 RADIUS, BELOW = 0.002, 0.025
-#: Cells of the plate along x and y, each of two triangles; its size [m].
+#: Number of cells of the plate along x and along y, each of two triangles; its size [m].
 CELLS, SIZE = 100, 0.4
-#: Plain bodies, in turn boxes, cylinders and spheres, at this distance from the base [m].
+#: Number of boxes, cylinders and spheres (in turn), and their distance from the base [m].
 BODIES, AWAY = 20, 0.75
-#: The best of so many runs counts.
+#: Number of runs, of which the fastest counts.
 REPEAT = 5
-#: Of how many rows brute force is measured.
+#: Number of rows in which brute force is measured.
 ROWS = 20
 
 
@@ -93,7 +93,7 @@ def _cell(points: int) -> Cell:
 
 
 def _plate(draw: np.random.Generator) -> Mesh:
-    """Return a plate of 20,000 triangles, with bumps of 2 mm below z = 0."""
+    """Return a plate of 20,000 triangles, with random heights between z = -2 mm and 0."""
     sides = np.linspace(-SIZE / 2, SIZE / 2, CELLS + 1)
     x, y = np.meshgrid(sides, sides)
     points = np.stack([x, y, draw.uniform(-0.002, 0.0, x.shape)], axis=-1).reshape(-1, 3)

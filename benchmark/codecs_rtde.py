@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Time to pack and unpack an RTDE package, and to make a robot state of it."""
+"""Time to pack and unpack an RTDE package, and to convert it to a robot state."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NAME = 'RTDE, per package of the driver'
 
 
 def run(quick: bool) -> Iterator[Figure]:
-    """Pack and unpack the driver's own recipe."""
+    """Measure with the driver's own recipe."""
     budget = 0.1 if quick else 0.5
     recipe = Recipe(STATE_FIELDS, [OUTPUT_TYPES[name] for name in STATE_FIELDS])
     values = recipe.zeros()

@@ -56,7 +56,7 @@ def _line(figure: Figure) -> str:
 
 
 def _short(value: float) -> str:
-    """Return three significant digits, never an exponent."""
+    """Return a value with three significant digits and without exponent; - for NaN."""
     if isnan(value):
         return '-'
     if value == 0.0:
@@ -89,7 +89,7 @@ def machine() -> dict[str, object]:
 
 
 def percentile(values: Sequence[float], percent: float) -> float:
-    """Return the value that ``percent`` of all do not exceed (nearest rank); NaN of none."""
+    """Return the value that follows ``percent`` % of the sorted values; NaN if there are none."""
     ordered = sorted(values)
     if not ordered:
         return float('nan')
@@ -97,14 +97,14 @@ def percentile(values: Sequence[float], percent: float) -> float:
 
 
 def median(values: Sequence[float]) -> float:
-    """Return the middle value; NaN of none."""
+    """Return the middle value, or the upper one of two; NaN if there are none."""
     return percentile(values, 50.0)
 
 
 def seconds(
     function: Callable[[], object], repeat: int = 5, clock: Callable[[], float] = perf_counter
 ) -> float:
-    """Return the shortest time of some calls [s]: other processes can only make it longer."""
+    """Return the shortest time of some calls [s], because other processes only lengthen it."""
     times = []
     for _ in range(repeat):
         start = clock()
@@ -119,7 +119,7 @@ def processor_seconds(function: Callable[[], object], repeat: int = 5) -> float:
 
 
 def memory_of(function: Callable[[], object]) -> tuple[int, int]:
-    """Return the peak memory of a call, and what its result keeps [bytes]; by tracemalloc."""
+    """Return the peak memory of a call, and the memory of its result [bytes], by tracemalloc."""
     function()  # what is imported or cached once is not counted
     gc.collect()
     tracemalloc.start()
@@ -134,9 +134,10 @@ def memory_of(function: Callable[[], object]) -> tuple[int, int]:
 
 def seconds_each(function: Callable[[], object], budget: float = 0.2) -> float:
     """
-    Return the time of a short call [s], as part of a loop of about ``budget`` [s].
+    Return the time of a short call [s], from the fastest of five loops.
 
-    The collector is off, so that the objects of one benchmark are not counted in another.
+    The loops take about ``budget`` [s] together. The garbage collector is off, so that it does not
+    spend time on the objects of other benchmarks.
     """
     once = max(seconds(function, 3), 1e-9)
     number = max(1, int(budget / 5 / once))

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Time to plan a goal whose rotation about an axis is free, beside a plain search for it."""
+"""Time to plan a goal with a free rotation about an axis, compared with a plain search."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def _plain_figure(points: WaypointRows, arm: Arm) -> Figure:
 
 
 def _turns(q: object) -> float:
-    """Return how far all joints turn along configurations [rad]."""
+    """Return the sum of the turns of all joints along configurations (n, 6) [rad]."""
     return float(np.abs(np.diff(np.array(q), axis=0)).sum())
 
 
@@ -97,8 +97,8 @@ def plain_search(arm: Arm, points: WaypointRows, q_start: Joints) -> Floats:
     Return the configurations (n, 6) [rad] of the shortest path through a ladder of solutions.
 
     Each point has a rung of all solutions for 72 rotations about z, one pose after the other, and
-    all steps from rung to rung are compared. It knows no limits, margins, speeds or collisions,
-    and nothing between points.
+    all steps from rung to rung are compared. The search ignores limits, margins, speeds,
+    collisions, and the motion between points.
     """
     turns = [
         Pose((0.0,) * 3, quaternion_from_rotation_vector((0.0, 0.0, tau * k / ROTATIONS)))

@@ -3,7 +3,7 @@
 """
 Reaction times of the driver: from goal to first byte, from cancel request to CANCEL on the wire.
 
-Simulator, relay and driver node are processes of their own, the client is here.
+Simulator, relay and driver node are processes of their own; the client is in this process.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
 from ur_cartesian_driver.ros.messages.packed_points import in_flat_arrays
 
 POINTS = 1_000
-#: The most that a goal may have.
+#: The largest number of points that a goal may have.
 MANY = 100_000
 #: How long each goal moves before it is cancelled [s].
 MOVING = 0.3
@@ -49,7 +49,7 @@ class Times:
 
 
 def run(quick: bool) -> Iterator[Figure]:
-    """Send the same goal a few times and cancel it each time."""
+    """Send a plain, a packed and a huge goal a few times each, and cancel each of them."""
     with (
         simulator() as robot,
         wire_tap() as (tap, parameters),
@@ -65,7 +65,7 @@ def run(quick: bool) -> Iterator[Figure]:
             for _ in range(1 if quick else 5)
         ]
         peak = peak_memory(driver)
-    # The first goal finds everything cold (imports, caches): reported separately.
+    # The first goal is reported separately, because nothing was imported or cached before it.
     yield from _goal_figures(goals)
     yield from _whole_way(goals[1:], packed, huge)
     yield Figure(
@@ -120,7 +120,7 @@ def _goal_figures(goals: Sequence[Times]) -> Iterator[Figure]:
 def _whole_way(
     plain: Sequence[Times], packed: Sequence[Times], huge: Sequence[Times]
 ) -> Iterator[Figure]:
-    """Report the time from the client's call to the first point, of both forms."""
+    """Report the time from the client's call to the first point, for plain and packed goals."""
     before = median([_ms(g.sent, g.first_point) for g in plain])
     for points, form, goals in (
         (POINTS, 'plain', plain),
@@ -139,7 +139,7 @@ def _whole_way(
 
 
 def _breakdown(totals: Sequence[float]) -> Iterator[Figure]:
-    """Time the steps of the same goal here; the rest is threads, pipe and network."""
+    """Time the steps of the goal in this process; the rest of its time is threads and transfer."""
     name, total = 'its parts, timed one by one', median(totals)
     message, frames = goal_message(POINTS), Frames()
     arm = Arm(robot_model(paths.MODEL))

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Time to make goals of files of other programs."""
+"""Time to import files of other programs as goals."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ def run(quick: bool) -> Iterator[Figure]:
 
 
 def convert(file: Path, options: ImportOptions) -> str:
-    """Return the goal file."""
+    """Return the text of the goal file for an imported file."""
     return goal_text(fields_of_goal(import_file(file, options).goal, packed=True))
 
 
 def spiral(lines: int) -> list[list[float]]:
-    """Return the points, a line each [mm]."""
+    """Return ``lines`` points of a spiral [mm]."""
     t = np.linspace(0.0, 0.006 * np.pi * lines, lines)
     points: list[list[float]] = np.stack(
         (50.0 * np.cos(t), 50.0 * np.sin(t), 0.02 * t), axis=1
@@ -69,7 +69,7 @@ def spiral(lines: int) -> list[list[float]]:
 
 
 def record_spiral(folder: Path, packets: int) -> None:
-    """Write a recording of the driver."""
+    """Write a recording of an arm that follows the spiral."""
     sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'support'))
     from synthetic_recording import packet, record
 
@@ -86,7 +86,7 @@ def record_spiral(folder: Path, packets: int) -> None:
 
 
 def texts(lines: int) -> dict[str, str]:
-    """Return the files, by their names."""
+    """Return the texts of files with the spiral, of about ``lines`` lines each, by file name."""
     points = spiral(lines)
     found = {
         'spiral.csv': 'x [mm],y [mm],z [mm],nx,ny,nz\n'

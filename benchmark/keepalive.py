@@ -3,10 +3,10 @@
 """
 Gaps between keepalive messages while the node is busy with a huge goal.
 
-The robot program halts when it has waited for longer than ``robot_receive_timeout`` (200 ms). The
-gaps between messages on the reverse socket are taken from the call that sends the goal until it
-has moved for a while: receiving, conversion and planning hold the node's interpreter, and the
-plan goes to the same loop that sends the messages.
+The robot program halts if it waits for a message longer than ``robot_receive_timeout`` (200 ms).
+The gaps between messages on the reverse socket are measured from the call that sends the goal
+until the arm has moved for a while. In this time, receiving, conversion and planning hold the
+node's interpreter, and the plan goes to the same robot loop that sends the messages.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 TIMEOUT = 120.0
 #: How long the goal moves before it is cancelled [s].
 AFTERWARDS = 1.0
-#: Of the robot program, the driver's default [ms].
+#: The default ``robot_receive_timeout`` [ms].
 READ_TIMEOUT = 200.0
 PERCENTILES = (('p50', 50.0), ('p99', 99.0), ('p99.9', 99.9), ('longest', 100.0))
 
 
 def run(quick: bool) -> Iterator[Figure]:
-    """Listen to the idle driver, then to the busy one."""
+    """Record the messages of the idle driver, then of the busy one."""
     points, idle_time = (10_000, 3.0) if quick else (100_000, 20.0)
     message = goal_message(points)
     with (
@@ -105,7 +105,7 @@ class Busy:
 
     @property
     def start(self) -> int:
-        """The last message before the one that starts the motion."""
+        """The time of the last message before the motion starts."""
         return max(
             m.time for m in self.marks if m.port == 'reverse_port' and not m.is_trajectory_action
         )
@@ -120,7 +120,7 @@ def _busy(client: TimedClient, tap: Child, message: object) -> Busy:
     first_point = next(m.time for m in marks if m.port == 'trajectory_port')
     client.spin(AFTERWARDS)
     marks += tap.call('marks')
-    # Not `cancelled`: a robot program that halted is a figure here.
+    # Not client.cancelled(), which raises if the robot program halted: that is a figure here.
     client.wait(handle.cancel_goal_async())
     client.wait(handle.get_result_async())
     return Busy(
@@ -132,6 +132,6 @@ def _busy(client: TimedClient, tap: Child, message: object) -> Busy:
 
 
 def _gaps(marks: Sequence[Mark], begin: float = -inf, end: float = inf) -> list[float]:
-    """Return the times between messages on the reverse socket [ms]; those that end in a window."""
+    """Return the gaps between messages on the reverse socket [ms] that end in (begin, end]."""
     times = [m.time for m in marks if m.port == 'reverse_port']
     return [1e-6 * (after - before) for before, after in pairwise(times) if begin < after <= end]

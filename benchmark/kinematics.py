@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Forward and inverse kinematics per pose, beside pinocchio's iteration from the same seeds."""
+"""Forward and inverse kinematics per pose, compared with pinocchio's iteration."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector6
 
 #: Distance of each seed from the solution, in each joint [rad].
 OFF = 0.1
-#: Of pinocchio's iteration: accepted error [m, rad], damping, maximum of steps.
+#: Parameters of pinocchio's iteration: accepted error [m, rad], damping, number of steps.
 ACCEPTED, DAMPING, STEPS = 1e-8, 1e-12, 100
 NAME = 'kinematics, per pose'
 
 
 def run(quick: bool) -> Iterator[Figure]:
-    """Solve random poses of a UR5e."""
+    """Measure on random poses of a UR5e."""
     arm = Arm(robot_model('ur5e'))
     draw = random.Random(1)
     joints = [_drawn(draw, 2.5) for _ in range(100 if quick else 500)]
@@ -100,7 +100,7 @@ def _difference(a: float, b: float) -> float:
 
 
 class Pinocchio:
-    """The same arm in pinocchio, with the iteration of its own inverse kinematics example."""
+    """An arm in pinocchio, with the iteration of pinocchio's example of inverse kinematics."""
 
     def __init__(self, library: Any, arm: Arm) -> None:
         """Build the model."""
@@ -116,7 +116,7 @@ class Pinocchio:
         return self._data.oMf[self._frame]
 
     def inverse(self, pose: Pose, seed: Vector6) -> Any:
-        """Return the joints to which the iteration comes from the seed, None if it does not."""
+        """Return the joints to which the iteration converges from the seed; None = it does not."""
         pin = self._pin
         wanted = pin.XYZQUATToSE3(np.array(pose.row()))
         q = np.array(seed)
@@ -147,6 +147,6 @@ def _drawn(draw: random.Random, bound: float) -> Vector6:
 
 
 def _moved(q: Vector6, draw: random.Random) -> Vector6:
-    """Return joints that are shifted by the same amount each, to either side."""
+    """Return joint positions, each shifted by OFF in a random direction."""
     a, b, c, d, e, f = (angle + draw.choice((-OFF, OFF)) for angle in q)
     return (a, b, c, d, e, f)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Inverse kinematics along a path: all rows at once, beside pinocchio from row to row."""
+"""Inverse kinematics along a path, all rows at once; compared with pinocchio, row by row."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector6
 NAME = 'kinematics, poses of a path per second'
 START: Vector6 = (0.3, -1.6, 1.9, -1.8, -1.5, 0.4)
 PATH_LENGTH = (0.8, 0.4, -0.6, 0.5, 0.3, 1.0)
-#: Of pinocchio fewer rows are timed.
+#: Number of rows, and the smaller number on which pinocchio is timed.
 ROWS, ROWS_ONE_BY_ONE = 40_000, 2_000
 Rows = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ def run(quick: bool) -> Iterator[Figure]:
     joints = np.array(START) + np.linspace(0.0, 1.0, rows)[:, None] * np.array(PATH_LENGTH)
     for name, arm in ('nominal', Arm(robot_model('ur5e'))), ('calibrated', paths.calibrated_arm()):
         poses = arm.forward_rows(joints)
-        solve_path(arm, poses[:1], START)  # the fit of the ideal arm is made once for each arm
+        solve_path(arm, poses[:1], START)  # fits the ideal arm, once for each arm
         yield from _path_figure(name, arm, poses, joints)
 
 

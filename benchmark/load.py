@@ -23,14 +23,14 @@ POINTS = 1_000
 class Sample:
     """Measurements of some seconds in one situation."""
 
-    #: By process: part of one core.
+    #: Processor time of each process, as a fraction of one core.
     cpu: Mapping[str, float]
-    #: Of each cycle [ms].
+    #: Lateness of each cycle [ms].
     late: list[float]
 
 
 def run(quick: bool) -> Iterator[Figure]:
-    """Measure the empty loop, everything at rest, everything in motion."""
+    """Measure the empty loop, then simulator and driver at rest, then both in motion."""
     duration = 2.0 if quick else 6.0
     with empty_loop() as loop:
         empty = _sample(loop, {'empty loop': loop.pid}, duration)
@@ -56,7 +56,7 @@ def run(quick: bool) -> Iterator[Figure]:
 
 
 def _sample(cycles: Child, pids: Mapping[str, int], duration: float) -> Sample:
-    """Measure processes for some time; ``cycles`` is the one whose cycles count."""
+    """Measure processes for ``duration`` [s]; ``cycles`` is the process whose cycles are timed."""
     cycles.call('begin')
     begin = time.monotonic()
     used = {name: -cpu_seconds(pid) for name, pid in pids.items()}

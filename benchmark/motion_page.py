@@ -17,7 +17,7 @@ from ur_cartesian_driver.preview import motion_page, table
 
 
 def run(quick: bool) -> Iterator[Figure]:
-    """Write the pages of paths of 5 mm steps; beside it the table of the same plan."""
+    """Write the pages of paths with steps of 5 mm; the baseline is the table of the same plan."""
     arm = Arm(robot_model(paths.MODEL))
     for points in (100,) if quick else (100, 10_000):
         made = plan(paths.goal(points), paths.at_home(arm), arm, PlanningOptions())

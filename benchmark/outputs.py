@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""When outputs by place, with leads, and pulses come; and what they cost."""
+"""Timing errors of outputs by place and of pulses, and the computing time that they need."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.sim.simulator_config import HOME
 
 NAME = 'outputs'
-#: Random goals that are run; points of the goal that is planned.
+#: Number of random goals that run; number of points of the goal that is planned.
 GOALS, POINTS = 60, 1000
 OPTIONS = PlanningOptions(self_collision='off')
 
 
 def run(quick: bool) -> Iterator[Figure]:
-    """Judge the edges of random goals, then measure what outputs cost."""
+    """Measure the timing of edges in random goals, then the computing time for outputs."""
     sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'support'))
     yield from _edges(6 if quick else GOALS)
     yield from _cycles()
@@ -40,7 +40,7 @@ def run(quick: bool) -> Iterator[Figure]:
 
 
 def _edges(goals: int) -> Iterator[Figure]:
-    """Yield how late or early edges are, with the judge of the tests."""
+    """Yield the timing errors of edges, as the judge of the tests finds them."""
     # The modules of the tests have no types.
     support: Any = import_module('random_outputs')
     resolution: float = import_module('output_judge').RESOLUTION
@@ -67,7 +67,7 @@ def _edges(goals: int) -> Iterator[Figure]:
 
 
 def _cycles() -> Iterator[Figure]:
-    """Yield the time of a cycle in which pulses are given and leads run."""
+    """Yield the time of a cycle with outputs, compared with a cycle without."""
     robot: Any = import_module('robot_in_memory').RobotInMemory(paths.MODEL)
     times = []
     for goal in _with_and_without(40, leads=8):
@@ -89,7 +89,7 @@ def _cycles() -> Iterator[Figure]:
 
 
 def _planning(points: int) -> Iterator[Figure]:
-    """Yield the time in which a goal with outputs is planned."""
+    """Yield the time to plan a goal with outputs, compared with the goal without."""
     state = state_at_rest(_arm(), HOME)
     times = [
         processor_seconds(partial(plan, goal, state, _arm(), OPTIONS), 3)
@@ -106,7 +106,7 @@ def _planning(points: int) -> Iterator[Figure]:
 
 
 def _with_and_without(points: int, leads: int) -> tuple[GoalTable, GoalTable]:
-    """Return a goal with a lead to each of its last points and pulses all along, and without."""
+    """Return a goal with pulses and with outputs 50 mm before its last points, and without."""
     plain = paths.goal(points, blend_radius=0.002)
     commands = tuple(
         IOCommand(

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Goals of any number of points, all well within the reach of a UR5e in its home position."""
+"""Goals with any number of points, all around the home position of a UR5e."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.sim.simulator_config import HOME
 
 MODEL = 'ur5e'
-#: Distance of two points [m]; points of a block along x and along y.
+#: Distance between two points [m]; number of points of a block along x, and along y.
 STEP = 0.005
 ALONG = 41
 
@@ -48,7 +48,7 @@ def meander(points: int) -> Iterator[Pose]:
 
 
 def goal(points: int, blend_radius: float = 0.0) -> GoalTable:
-    """Return a goal through the meander, to a stop at its end; the speeds are the driver's own."""
+    """Return a goal through the meander that stops at its end; the speeds are the driver's own."""
     segments = [Segment(blend_radius=blend_radius)] * (points - 1) + [Segment()]
     return goal_table(
         Goal(

@@ -22,7 +22,7 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 
 #: Blend radius [m]; two blends fit between points that are 5 mm apart.
 RADIUS = 0.002
-#: How far rounded corners may be beside the path [m].
+#: Largest distance of rounded corners from the path [m].
 DEVIATION = 0.0002
 #: Time between timed points, and to the first one [s].
 PERIOD = 0.1
@@ -30,7 +30,7 @@ LEAD = 3.0
 
 
 def run(quick: bool) -> Iterator[Figure]:
-    """Plan straight lines of 5 mm, which is what a scanned or sliced path looks like."""
+    """Plan straight lines of 5 mm, as in a scanned or sliced path."""
     arms = {'nominal': Arm(robot_model(paths.MODEL)), 'calibrated': paths.calibrated_arm()}
     corners = {'stops': 0.0, 'blends': RADIUS}
     for points in (1_000,) if quick else (1_000, 10_000, 100_000):
@@ -74,7 +74,7 @@ def _figures(name: str, goal: Goal, arm: Arm, repeat: int = 5) -> Iterator[Figur
 
 
 def _report_figure(points: int, arm: Arm) -> Figure:
-    """Make the report of a plan, which is made while the arm moves."""
+    """Time the report of a plan, which the driver makes while the arm moves."""
     made = plan(paths.goal(points, RADIUS), paths.at_home(arm), arm, PlanningOptions())
     taken = 1e3 * seconds(lambda: made.report, repeat=1)
     return Figure(
@@ -87,7 +87,7 @@ def _report_figure(points: int, arm: Arm) -> Figure:
 
 
 def _timed(goal: Goal) -> Goal:
-    """Return a goal that passes its points every 0.1 s, at the speed of their neighbours."""
+    """Return a goal that passes its points every 0.1 s, with twists from neighbouring points."""
     places = np.array([point.pose.position for point in goal.waypoints])
     speeds = np.zeros((len(places), 6))
     speeds[1:-1, :3] = (places[2:] - places[:-2]) / (2.0 * PERIOD)

@@ -3,9 +3,9 @@
 """
 Points that the driver encodes and sends per second.
 
-Sending is measured through all of the driver (pipe, robot loop, window of points in flight, TCP)
-to a reader in place of a robot program that runs every point at once: it connects to the driver's
-ports, reads, and reports the points begun through the register of the simulated robot.
+Sending is measured through all of the driver (pipe, robot loop, limit on the points in flight,
+TCP). A reader replaces the robot program: it connects to the driver's ports, reads points, and
+reports each one at once as begun, through the output register of the simulated robot.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ from ur_cartesian_driver.protocol.program.trajectory_points import (
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 NAME = 'points a second'
-#: The driver sends at most 500 points that the robot has not begun; each of 500 RTDE packages a
-#: second reports the points begun.
+#: Highest possible rate: at most 500 points are in flight, and each of the 500 RTDE packages per
+#: second can report all of them as begun.
 MAX_RATE = 500 * 500
-#: Runs while the reader replaces the robot program.
+#: The program of the simulated robot, while the reader replaces the robot program.
 IDLE_PROGRAM = 'def stand_in():\n  while True:\n    sync()\n  end\nend\n'
 
 
 def run(quick: bool) -> Iterator[Figure]:
-    """Encode, then send."""
+    """Measure encoding, then sending."""
     yield _encoding(10_000 if quick else 100_000)
     yield from _sending(4_000 if quick else 20_000)
 
@@ -169,7 +169,7 @@ class FakeRobotProgram:
     """Reads points in place of the robot program."""
 
     def __init__(self, robot: SimulatedRobot, sockets: ExitStack) -> None:
-        """Take the robot for which it reports."""
+        """Report for ``robot``; ``sockets`` closes the connections."""
         self._robot = robot
         self._sockets = sockets
         self._arrived = 0
@@ -201,7 +201,7 @@ class FakeRobotProgram:
                 if counts:
                     self._count(len(data))
         except OSError:
-            pass  # the block was left
+            pass  # ``sockets`` has closed it
 
     def _count(self, size: int) -> None:
         self._last = time.monotonic()

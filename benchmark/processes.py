@@ -3,9 +3,9 @@
 """
 The processes of a measurement: simulated robot, wire tap, empty loop, driver node.
 
-They are children of ours, use loopback only, and end with their block. All of
-them read the same clock (``time.monotonic_ns`` is one clock for the whole machine), so times from
-different processes can be subtracted.
+They are child processes, use loopback only, and end with the ``with`` block that starts them. All
+of them read the same clock (``time.monotonic_ns`` is one clock for the whole machine), so times
+from different processes can be subtracted.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Child:
         """
         Call a function of the child and wait for its result.
 
-        :raises TimeoutError: no answer.
+        :raises TimeoutError: there is no answer within START_TIMEOUT.
         """
         self._connection.send((name, arguments))
         return self.answer()
@@ -89,12 +89,12 @@ def child(target: Callable[..., None], *arguments: Any) -> Iterator[Child]:
 # ---- simulated robot --------------------------------------------------------------------------
 
 
-#: Additional calls of a simulated robot.
+#: Returns additional calls that the process of a simulated robot answers.
 Calls: TypeAlias = Callable[[SimulatedRobot], Mapping[str, Callable[..., Any]]]
 
 
 def no_calls(_: SimulatedRobot) -> Mapping[str, Callable[..., Any]]:
-    """Return none."""
+    """Return no additional calls."""
     return {}
 
 
@@ -103,8 +103,8 @@ def simulator(calls: Calls = no_calls, **settings: Any) -> Iterator[Child]:
     """
     Run a simulated robot; calls: ``ports``, ``state``, ``inject``, ``begin``, ...
 
-    :param calls: a function of a module that adds calls.
-    :param settings: fields of its configuration.
+    :param calls: a function at the top level of a module; it returns additional calls.
+    :param settings: fields of the robot's SimulatorConfig.
     """
     with child(_simulate, calls, settings) as robot:
         yield robot
@@ -133,7 +133,7 @@ def _simulate(connection: Connection, calls: Calls, settings: dict[str, Any]) ->
 
 
 def note_cycles(robot: SimulatedRobot) -> list[float]:
-    """Return a list to which each controller cycle adds the time of its beginning [s]."""
+    """Return a list to which each controller cycle adds its start time [s]."""
     beginnings: list[float] = []
     step = robot.controller.step
 
@@ -173,9 +173,9 @@ def _loop(connection: Connection) -> None:
 
 def lateness(beginnings: list[float]) -> list[float]:
     """
-    Return how late each cycle began [s], measured from a grid of 2 ms.
+    Return the lateness of each cycle [s], measured from a grid of 2 ms.
 
-    The grid is the earliest one that fits: no cycle begins before its time.
+    The grid is the latest one for which no cycle begins before its time.
     """
     offsets = [time - i * PERIOD for i, time in enumerate(beginnings)]
     earliest = min(offsets, default=0.0)
@@ -187,7 +187,7 @@ def lateness(beginnings: list[float]) -> list[float]:
 
 @contextmanager
 def node(robot: Child, **parameters: object) -> Iterator[int]:
-    """Run the driver node for a simulated robot until its program runs; yield the node's id."""
+    """Run the driver node for a simulated robot; yield its process id once the program runs."""
     ports = robot.call('ports')
     parameters = {
         'robot_ip': HOST,
@@ -228,7 +228,7 @@ def _wait_for_program(robot: Child, process: subprocess.Popen[bytes]) -> None:
         if process.poll() is not None or time.monotonic() > deadline:
             raise RuntimeError('The driver node did not start the robot program.')
         time.sleep(0.1)
-    time.sleep(0.5)  # the program connects
+    time.sleep(0.5)  # for the program to connect
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
@@ -250,7 +250,7 @@ def cpu_seconds(pid: int) -> float:
 
 
 def peak_memory(pid: int) -> float:
-    """Return the most memory that a process has had [MB]."""
+    """Return the peak resident memory of a process [MB]."""
     for line in Path(f'/proc/{pid}/status').read_text().splitlines():
         if line.startswith('VmHWM:'):
             return int(line.split()[1]) / 1024.0
@@ -271,5 +271,5 @@ def children_of(pid: int) -> list[int]:
 
 
 def _stat(pid: int) -> list[str]:
-    """Return the fields of a process's stat behind its name, which may hold anything."""
+    """Return the fields of ``/proc/PID/stat`` after the name, which can contain any character."""
     return Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()

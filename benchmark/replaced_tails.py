@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A tail that is replaced while the arm moves: from the call to the changed motion, and how smooth.
+Replacing the tail of a motion: the time from the call to the changed motion, and its smoothness.
 
-The arm goes round and round; again and again a new tail leads it 2 mm up or down. Measured by the
-cycles of the simulated controller, a process of its own that shares its clock with this process.
+The arm follows a circle, and from time to time a new tail leads it 2 mm up or down. The changes
+are found in the cycles of the simulated controller, whose process has the same clock as this one.
 """
 
 from __future__ import annotations
@@ -29,21 +29,22 @@ from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 
 NAME = 'replaced tails'
-#: The circle: radius [m], period [s]; the height of a step, and where it counts as begun [m].
+#: Radius [m] and period [s] of the circle; height of a step, and height at which it has begun [m].
 RADIUS, PERIOD, HEIGHT, BEGUN = 0.05, 4.0, 0.002, 0.00005
-#: Time between points; from the cut to the first of them, at least; how far they reach [s].
+#: Time between points; least time from the cut to the first new point; time from the first new
+#: point to the last [s].
 STEP, GAP, AHEAD = 0.05, 0.08, 0.8
 HORIZON = 0.15
-#: Time from the client's latest state of the motion to the cut: at first, and the addition where
-#: that was too late [s].
+#: Time from the latest reported progress to the cut: its first value, and the addition after a cut
+#: that came too late [s].
 FIRST_LEAD, MORE = 0.1, 0.01
-#: Between two steps [s].
+#: Time between two steps [s].
 REST = 0.5
 ARM = Arm(robot_model('ur5e'))
 
 
 def note_targets(robot: Any) -> Mapping[str, Callable[..., Any]]:
-    """Return a call that returns both times and the joints of the cycles since the last call."""
+    """Return a call for the rows since the last call: both times, joint positions and speeds."""
     rows: list[tuple[float, ...]] = []
     step = robot.controller.step
 
@@ -62,7 +63,7 @@ def note_targets(robot: Any) -> Mapping[str, Callable[..., Any]]:
 
 
 class Client:
-    """Leads the arm around, and up or down."""
+    """Leads the arm around the circle, and up or down."""
 
     def __init__(self, robot: Child, driver: Driver, mode: ExecutionMode) -> None:
         state = driver.state
@@ -75,7 +76,7 @@ class Client:
         self.moved: list[float] = []
 
     def chunk(self, since: float, *, ahead: float = AHEAD, last: bool = False) -> list[Waypoint]:
-        """Return points behind a time [s]."""
+        """Return the points that follow the time ``since`` of the motion [s]."""
         first, count = ceil((since + GAP) / STEP - 1e-9), round(ahead / STEP)
         points = []
         for k in range(first, first + count):
@@ -96,7 +97,7 @@ class Client:
         return Goal(waypoints=points, execution=self._mode, **changes)
 
     def replace_tails(self, count: int) -> NDArray[np.float64]:
-        """Replace the tail so often; return the rows of the controller."""
+        """Replace the tail ``count`` times; return all rows of note_targets()."""
         motion = self._start(self.goal(keep_open=True, replace_horizon=HORIZON))
         self._keep_on(motion, 1.5)
         rows = self._robot.call('targets')
@@ -121,7 +122,7 @@ class Client:
         return np.array(rows)
 
     def send_new_goals(self, count: int) -> None:
-        """Send another goal in the place of the one that runs, so often."""
+        """Replace the running goal by another one ``count`` times."""
         motion = self._start(self.goal(3.0))
         while len(self.moved) < count:
             time.sleep(1.2)
@@ -151,7 +152,7 @@ class Client:
         motion.append(self.chunk(since), replace_from_time=since)
 
     def _keep_on(self, motion: MotionHandle, seconds: float) -> None:
-        """Plan the same anew ten times a second."""
+        """Replace the tail by an equal one ten times a second."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             time.sleep(0.1)
@@ -161,7 +162,7 @@ class Client:
 
 
 def first_change(rows: list[tuple[float, ...]], begin: float) -> float:
-    """Return when the tool is beside its old height, after a time [s]."""
+    """Return the first time after ``begin`` at which the tool has left its old height [s]."""
     times = np.array([row[0] for row in rows])
     heights = ARM.forward_rows(np.array([row[2:8] for row in rows]))[:, 2]
     before = heights[times < begin][-1] if (times < begin).any() else heights[0]

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A client of the action that records the time of every step."""
+"""A client of the trajectory action that records the time of every step."""
 
 from __future__ import annotations
 
@@ -72,9 +72,9 @@ class TimedClient:
 
     def cancelled(self, handle: Any) -> int:
         """
-        Cancel a goal and wait for its end; return when the request was made [ns].
+        Cancel a goal and wait for its end; return the time of the request [ns].
 
-        :raises RuntimeError: it ended otherwise.
+        :raises RuntimeError: the goal ended otherwise.
         """
         now = time.monotonic_ns()
         request = handle.cancel_goal_async()

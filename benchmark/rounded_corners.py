@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Processor time and memory of planning goals with rounded corners, beside plain splines."""
+"""Processor time and memory to plan rounded corners, compared with plain splines."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ from ur_cartesian_driver.motion.goal.goal_columns import goal_table, GoalTable
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.simulator_config import HOME
 
-#: Where the origin of the files is in the base [m].
+#: Pose of the origin of the files in the base.
 ORIGIN = Pose((-0.5, -0.2, 0.25), (0.0, 0.0, 0.0, 1.0))
-#: Names of the prints, and the corner_deviation of each [m]; the bead has its own in the file.
+#: Prints, each with its corner_deviation [m]; the file of the bead sets another one.
 PRINTS = {'vase': 5e-5, 'part': 1e-4, 'bead': 2e-4}
 LINES_DEVIATION, INFILL_DEVIATION = 2e-4, 1e-4
-#: Lines of infill [m], their speed [m/s].
+#: Length of the infill lines, and gap between them [m]; speed [m/s].
 SIDE, GAP, INFILL_SPEED = 0.02, 0.0007, 0.06
-#: The spline has as much time for a segment as this speed needs [m/s], and a while [s]; and for
-#: the way to the first point [s].
+#: A segment of the spline takes the time at this speed [m/s] plus this time [s]; the way to the
+#: first point takes a third time [s].
 MEAN_SPEED, WHILE, LEAD = 0.05, 0.02, 20.0
 #: The collision check of each arm.
 CHOICES: dict[str, Literal['off', 'auto']] = {'nominal': 'off', 'calibrated': 'auto'}
@@ -75,7 +75,7 @@ def run(quick: bool) -> Iterator[Figure]:
 
 
 def _memory_figures(name: str, goal: GoalTable, plain: GoalTable, arm: Arm) -> Iterator[Figure]:
-    """Measure what is allocated while a plan is made, and what the plan keeps."""
+    """Measure the peak memory of planning, and the memory that the plan keeps."""
     state, options = paths.at_home(arm), PlanningOptions(self_collision='off', on_too_fast='slow')
     rounded, spline = (
         [
@@ -109,7 +109,7 @@ def _print(name: str) -> GoalTable:
 
 
 def _infill(points: int) -> GoalTable:
-    """Return long lines side by side."""
+    """Return a goal with parallel lines of 20 mm."""
     home = Arm(robot_model(paths.MODEL)).forward(HOME)
     k = np.arange(points)
     side = np.where(k % 4 % 3 == 0, -1.0, 1.0)

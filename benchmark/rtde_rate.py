@@ -3,8 +3,8 @@
 """
 Packages of an RTDE client in real time: completeness, rate and lateness.
 
-The arm moves all the time. An empty loop at 500 Hz runs in parallel, which separates delays of the
-machine from delays of the simulator.
+The arm moves all the time. An empty loop at 500 Hz runs in parallel and shows the delays of the
+machine, as opposed to delays of the simulator.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def _listen(packages: Iterator[tuple[float, float]], duration: float) -> Receive
 
 
 def _rate(received: Received) -> Iterator[Figure]:
-    """Compare the two clocks."""
+    """Compare the timestamps of the controller with the arrival times."""
     stamps, arrivals = received.stamps, received.arrivals
     taken = arrivals[-1] - arrivals[0]
     rate = (len(arrivals) - 1) / taken
@@ -131,7 +131,7 @@ def _rate(received: Received) -> Iterator[Figure]:
 
 
 def _drift(received: Received) -> float:
-    """Return the drift [s]: growth of the earliest lateness from the first tenth to the last."""
+    """Return the growth of the smallest delay from the first tenth to the last tenth [s]."""
     behind = [b - a for a, b in zip(received.stamps, received.arrivals, strict=True)]
     tenth = max(1, len(behind) // 10)
     return min(behind[-tenth:]) - min(behind[:tenth])

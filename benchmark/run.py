@@ -22,9 +22,9 @@ import time
 
 from figures import as_json, Figure, machine, table
 
-#: Benchmarks whose size is an option; soak and append are no part of a usual run.
+#: Benchmarks whose size is an option; soak and append only run if --only names them.
 RTDE_RATE, SOAK, APPEND = 'rtde_rate', 'soak', 'append'
-#: In the order of the table: those with many processes first.
+#: In the order of the table: benchmarks with many processes come first.
 MODULES = (
     'goal_on_wire',
     'violation_to_cancel',
@@ -51,7 +51,7 @@ MODULES = (
 
 
 def main() -> int:
-    """Run the benchmarks; return 1 when one of them failed to run."""
+    """Run the benchmarks; return 1 if one of them failed to run."""
     arguments = _parser().parse_args()
     _keep_to_ourselves()
     # SIGTERM has to end the child processes too, like Ctrl-C.

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Set-points at 500 Hz: SERVO beside the servoJ loop of ``ur-rtde``, on one simulated controller.
+Set-points at 500 Hz: SERVO compared with the servoJ loop of ``ur-rtde``, on one simulated robot.
 
 Both stream the same joint path, with the same gain and lookahead, one after the other in one run;
 the set-points that ``servoj`` gets in each cycle are compared. Each has a known time on the path,
@@ -49,14 +49,14 @@ PORTS = {
 STEP = 0.002
 GAIN, LOOKAHEAD = 2000.0, 0.03
 OTHER = 'ur-rtde'
-#: The part of the path in the middle that counts.
+#: Fractions of the path between which it is evaluated.
 FIRST, LAST = 0.2, 0.8
 PERCENTILES = (('p50', 50.0), ('p99', 99.0), ('most', 100.0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetpointStream:
-    """Set-points of servoj: cycle and time on the path of each [s]; lags of the arm [s]."""
+    """Set-points of servoj: cycle number and time on the path [s] of each; lag of the arm [s]."""
 
     cycles: NDArray[np.float64]
     path_times: NDArray[np.float64]
@@ -69,7 +69,7 @@ class SetpointStream:
         return list(1e3 * np.abs(off - np.median(off)))
 
     def share(self, low: float, high: float) -> float:
-        """Return the share of cycles with a step between two bounds [%]."""
+        """Return the share of steps between set-points [%] that are in (low, high] cycles."""
         steps = np.diff(self.path_times) / (STEP * np.diff(self.cycles))
         return float(100.0 * np.mean((steps > low) & (steps <= high)))
 
@@ -114,7 +114,7 @@ def run(quick: bool) -> Iterator[Figure]:
 
 
 def count_servoj(robot: SimulatedRobot) -> Mapping[str, Callable[..., Any]]:
-    """Return a call that returns the set-points of servoj since the call before."""
+    """Return a call for the cycles and set-points of servoj since the last call."""
     motion, received = robot.controller.motion, list[tuple[int, tuple[float, ...]]]()
     carry_out = motion.servoj
 
@@ -170,7 +170,7 @@ def _goal(here: Pose, seconds: float) -> Goal:
 
 
 def spline_of(plan: Plan) -> JointSpline:
-    """Return the joints over time that a plan streams."""
+    """Return the joint spline that a plan streams."""
     return JointSpline.of(
         plan.start,
         [segment.primitive for segment in plan.segments if isinstance(segment.primitive, Spline)],
@@ -178,7 +178,7 @@ def spline_of(plan: Plan) -> JointSpline:
 
 
 def _ur_rtde(robot: Child, spline: JointSpline) -> SetpointStream:
-    """Stream the path in a process with the other library."""
+    """Stream the path with ``ur-rtde``, in a process of its own."""
     rows = spline.rows(np.arange(0.0, spline.duration + STEP, STEP))[0]
     robot.call('servoj_calls')
     with tempfile.TemporaryDirectory() as folder:
@@ -209,7 +209,7 @@ def _measured_stream(robot: Child, spline: JointSpline, lag: float) -> SetpointS
 
 
 def _path_time(spline: JointSpline, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the times of joints on the path, by the joint that moves most and monotonically."""
+    """Return the times of joints (n, 6) on the path, by the joint that moves most."""
     times = np.arange(0.0, spline.duration, 0.5 * STEP)
     rows = spline.rows(times)[0]
     joint = int(np.argmax(np.abs(rows[-1] - rows[0])))

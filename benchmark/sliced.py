@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Time to plan what slicers and plotters write: thousands of short lines and arcs with blends."""
+"""Time to plan goals from slicers and plotters: thousands of short lines and arcs."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ from ur_cartesian_driver.motion.goal.goal_columns import (
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.simulator_config import HOME
 
-#: Speed [m/s], and the blend radius [m] as far as it fits; radii below the minimum are 0.
+#: Speed [m/s]; largest blend radius [m]; radius below which there is no blend [m].
 SPEED = 0.04
 RADIUS = 0.0005
 MIN_RADIUS = 0.0001
 #: Part of a move that each of its two blends may take.
 PART = 0.4
-#: The walk turns back at this distance from its middle [m].
+#: The walk turns back at this distance from its start [m].
 REACH = 0.08
 #: Rounds, in each of which all goals are planned in turn.
 ROUNDS = 3
 
 
 def run(quick: bool) -> Iterator[Figure]:
-    """Plan each goal, in processor time, beside straight lines of one length."""
+    """Measure the processor time to plan each goal, compared with equal straight lines."""
     share = 10 if quick else 1
     lines = paths.goal(10_000 // share, 0.002)
     goals = {
@@ -75,7 +75,9 @@ def walk(moves: int, lines_per_arc: int, moves_per_stroke: int = 0) -> tuple[Goa
     """
     Return a walk of lines of 1 to 6 mm and arcs of 0.3 to 3 mm, without and with blends.
 
-    :param moves_per_stroke: after so many moves the pen goes up, on, and down; 0 = never.
+    :param lines_per_arc: number of lines between two arcs.
+    :param moves_per_stroke: the first two of this number of moves are made with the pen lifted;
+        0 = the pen is never lifted.
     """
     draw = np.random.default_rng(7)
     places, vias, heading, x, y = [(0.0, 0.0, 0.0)], [(0.0, 0.0, 0.0)], 0.0, 0.0, 0.0

@@ -31,14 +31,15 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 
 NAME = 'soak'
-#: Time after which an ended goal is forgotten, and a little more [s].
+#: A little more than the time for which the server keeps an ended goal [s].
 WARM = 70.0
-#: Longest time to a result [s]: the goal, a slider at 0 for a while, a stop, a lost connection.
+#: Longest time to a result [s], even with a slider at 0, a stop or a lost connection.
 RESULT_TIMEOUT = 30.0
 RECOVERY_TIMEOUT = 60.0
 SAMPLE_PERIOD = 2.0
 NOT_READY = ErrorCode.ROBOT_NOT_READY.name
-#: Faults of the simulator, and the number of goals per fault; empty = none.
+#: Events during a goal, with their relative frequency; empty = none. All but cancel and
+#: preempted are faults of the simulator.
 EVENTS: tuple[tuple[str, int], ...] = (
     ('', 60),
     ('cancel', 15),
@@ -56,7 +57,7 @@ EVENTS: tuple[tuple[str, int], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class Footprint:
-    """Memory, threads and descriptors of a process."""
+    """Resident memory [MB]; numbers of threads, file descriptors and shared memory files."""
 
     memory: float
     threads: float
@@ -65,7 +66,7 @@ class Footprint:
 
     @classmethod
     def of(cls, pid: int) -> Footprint:
-        """Read the footprint of a process (proc(5)); resident memory [MB]."""
+        """Read the footprint of a process (proc(5))."""
         root = Path(f'/proc/{pid}')
         pages = int((root / 'statm').read_text().split()[1])
         mapped = (root / 'maps').read_text()
@@ -83,7 +84,7 @@ class Footprint:
 
 
 class Soak:
-    """One run."""
+    """A run of goals, with its outcomes and samples."""
 
     def __init__(
         self,
@@ -94,7 +95,7 @@ class Soak:
         seed: int = 1,
     ) -> None:
         """
-        Prepare; :meth:`run` does it.
+        Prepare; :meth:`run` sends the goals.
 
         :param undisturbed: no faults, and goals as short as possible.
         """
@@ -106,12 +107,12 @@ class Soak:
         self.outcomes: Counter[str] = Counter()
         self.missing = 0
         self.longest = 0.0
-        #: By process: time [s] and footprint.
+        #: For each process: times since the start [s] and footprints.
         self.samples: dict[str, list[tuple[float, Footprint]]] = {name: [] for name in pids}
         self._due = 0.0
 
     def run(self, seconds: float, goals: int) -> None:
-        """Send goals for a time, or a number of them."""
+        """Send goals until a time has passed [s], or a number of goals has ended."""
         begin = time.monotonic()
         while time.monotonic() - begin < seconds and self.outcomes.total() < goals:
             self._sample(time.monotonic() - begin)
@@ -157,7 +158,7 @@ class Soak:
         if event not in ('', 'cancel', 'preempted'):
             self._robot.call('inject', 'slider 1')
             self._bring_back()
-        elif self.outcomes[NOT_READY] > before:  # a machine too busy for its deadlines
+        elif self.outcomes[NOT_READY] > before:  # the machine was too busy for a deadline
             self._bring_back()
 
     def _message(self) -> FollowCartesianTrajectory.Goal:
@@ -183,7 +184,7 @@ class Soak:
         """
         Call recover until the driver takes goals.
 
-        :raises TimeoutError: it does not.
+        :raises TimeoutError: it does not within RECOVERY_TIMEOUT.
         """
         deadline = time.monotonic() + RECOVERY_TIMEOUT
         answer: Any = None

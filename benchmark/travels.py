@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Time to find ways through the air, among bodies that stand around the arm."""
+"""Time to find transfers among bodies that stand around the arm."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.travel.arm_space import ArmSpace
 from ur_cartesian_driver.planning.travel.transfer import find_transfer, TransferSettings
 
-#: Bodies, at this distance from the base [m], and transfers among them that are not straight.
+#: Number of bodies; their least and greatest distance from the base [m]; number of transfers.
 BODIES, AWAY, TRANSFERS = 20, (0.45, 0.9), 20
 SETTINGS = TransferSettings(retract=0.0, approach=0.0, max_samples=1000)
 
 
 def run(quick: bool) -> Iterator[Figure]:
-    """Find transfers between random configurations whose straight way is not free."""
+    """Find transfers between random configurations whose straight connection is not free."""
     space = ArmSpace(
         TcpKinematics(Arm(robot_model('ur5e')), Pose((0.0, 0.0, 0.12))),
         PlanningOptions(cell=_cell(), tool_radius=0.03),
@@ -51,7 +51,7 @@ def run(quick: bool) -> Iterator[Figure]:
 
 
 def _find(space: ArmSpace, a: Floats, b: Floats, found: list[int]) -> None:
-    """Find a transfer, and note the number of its samples."""
+    """Find a transfer, and append the number of its samples to ``found``."""
     start, goal = vector6(a.tolist()), vector6(b.tolist())
     try:
         found.append(find_transfer(space, start, [goal], SETTINGS, 'The travel').samples)

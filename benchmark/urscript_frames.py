@@ -47,7 +47,7 @@ def squares():
   end
 end
 """
-#: Cycles of moves: some rounds of the squares.
+#: Number of measured cycles: some rounds of the squares.
 CYCLES = 10_000
 
 
@@ -112,7 +112,7 @@ def _cycle(program: str, budget: float) -> float:
 
 
 def _moving(radius: float, ahead: bool = True) -> float:
-    """Return the time of a cycle of moves; ``ahead``: solved together, as they are."""
+    """Return the time of a cycle of moves [s]; ``ahead``: solve many cycles at once, as usual."""
     controller = assemble(SimulatorConfig()).controller
     controller.programs.submit(SQUARES.format(radius=radius))
     with nullcontext() if ahead else patch.object(CycleBatch, 'next', return_value=None):

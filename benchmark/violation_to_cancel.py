@@ -1,21 +1,22 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Time from a violated tolerance to CANCEL, compared with an echo of the same process.
+Time from a violated tolerance to CANCEL, compared with an echo in the same process.
 
 Simulator, relay and robot loop are processes of their own. All packets of the robot's state pass
-through the relay, which records when the first one with a violation leaves for the robot loop, and
-when CANCEL comes back. In two of three trials it holds that packet back and sends it over
-another connection first, to an echo that lives in the robot loop's process, on its event loop
-(:mod:`robot_loop_with_echo`), and answers with as many bytes as CANCEL has: alternately at once,
-and after reading the packet. So all times are between the same two processes, of the same packets,
-at the same moment of a motion: they differ by the work of the driver.
+through the relay. It records the time at which the first packet with a violation leaves for the
+robot loop, and the time at which CANCEL comes back. In two of three trials it holds this packet
+back and first sends it to an echo, over another connection. The echo runs on the event loop of the
+robot loop's process (:mod:`robot_loop_with_echo`) and answers with as many bytes as CANCEL has,
+alternately at once and after reading the packet. So the times of driver and echo are between the
+same two processes, for the same packets, at the same moment of a motion. They differ only by the
+work of the driver.
 
-That is the driver's part. A violation begins on the other side, in the cycle of the controller in
-which the arm is out of its tolerance, and no answer is possible before that cycle is computed and
-its packet made. So the simulator records this time for each cycle, and both times are also given
-from the beginning of the cycle: the time that the robot waits for an answer. Neither contains the
-transfer from simulator to relay, which does not exist with a real robot.
+For the robot, a violation begins earlier: in the cycle of the controller in which the arm is out
+of its tolerance. No answer is possible before this cycle is computed and its packet is made. The
+simulator records the time for this, and both times are also given from the beginning of the cycle,
+which is the time that the robot waits for an answer. No time contains the transfer from simulator
+to relay, which does not exist with a real robot.
 """
 
 from __future__ import annotations
@@ -52,12 +53,12 @@ from ur_cartesian_driver.sim import SimulatedRobot
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
 
 NAME = 'violated tolerance'
-#: Push of the tool, and its tolerance [m].
+#: Displacement of the tool by a push, and the path tolerance [m].
 PUSH, BOUND = 0.004, 0.002
 #: Number of violations of each kind.
 TRIALS = 100
 TIMEOUT = 10.0
-#: The robot loop's own.
+#: The RTDE recipe of the robot loop.
 RECIPE = Recipe(STATE_FIELDS, [OUTPUT_TYPES[name] for name in STATE_FIELDS])
 FRAME_SIZE = len(RECIPE.pack(RECIPE.zeros()))
 TIMESTAMP = struct.Struct('>d')
@@ -68,11 +69,11 @@ ACTUAL, TARGET = STATE_FIELDS.index('actual_TCP_pose'), STATE_FIELDS.index('targ
 class Reaction:
     """Answer to a packet with a violation."""
 
-    #: The controller's clock in the cycle of the packet [s].
+    #: The controller time of the packet [s].
     cycle: float
-    #: From the packet to the answer, both at the relay [ms].
+    #: Time from the packet to the answer, both at the relay [ms].
     taken: float
-    #: Whether the packet was read for it.
+    #: Whether the packet was decoded before the answer.
     reads: bool = True
 
 
@@ -93,7 +94,7 @@ def run(quick: bool) -> Iterator[Figure]:
         state = driver.state
         assert state is not None
         home = state.actual_tcp_pose
-        _violate(driver, robot, home, 0)  # nothing is measured cold
+        _violate(driver, robot, home, 0)  # not measured, because nothing is cached yet
         for trial in range(1, 1 + 3 * (3 if quick else TRIALS)):
             kind = cancels if trial % 3 == 0 else echoes
             relay.call('marks')
@@ -111,7 +112,7 @@ def _compare(
     echoes: Sequence[Reaction],
     making: Mapping[float, float],
 ) -> Iterator[Figure]:
-    """Yield the times of driver and echo, first without, then with making the packet."""
+    """Yield the times of driver and echo from the packet, then from the start of its cycle."""
     note = f'{len(cancels)} violations, {len(echoes)} echoes'
     for name, begun in (
         ('packet -> CANCEL on the wire', lambda _: 0.0),
@@ -146,9 +147,9 @@ def _in_time(times: Sequence[float]) -> float:
 
 def _violate(driver: Driver, robot: Child, home: Pose, trial: int) -> None:
     """
-    Run a goal back and forth until a push ends it.
+    Run a goal to one side (to the other in the next trial) until a push ends it.
 
-    :raises RuntimeError: it ended otherwise.
+    :raises RuntimeError: the goal ended otherwise.
     """
     x, y, z = home.position
     there = Pose((x, y + (0.1 if trial % 2 == 0 else -0.1), z), home.quaternion)
@@ -243,7 +244,7 @@ def _run_relay(connection: Connection, rtde_port: int) -> None:
 
 @contextmanager
 def _echo(relay: Child) -> Iterator[None]:
-    """Let drivers that start meanwhile run a robot loop with an echo."""
+    """Make drivers that start in the block run a robot loop with an echo."""
     module, host.MODULE = host.MODULE, robot_loop_with_echo.__name__
     os.environ[robot_loop_with_echo.PORT] = str(relay.call('echo_port'))
     try:
@@ -253,13 +254,13 @@ def _echo(relay: Child) -> Iterator[None]:
 
 
 class RelayWithEcho(Relay):
-    """Forwards the robot's packets too; sends a violation to the echo first."""
+    """A relay for the robot's packets, too; it can send a violation to the echo first."""
 
     def __init__(self, rtde_port: int) -> None:
         """
         Listen.
 
-        :param rtde_port: the robot's own.
+        :param rtde_port: the RTDE port of the robot.
         """
         super().__init__()
         self._rtde_port = rtde_port
@@ -269,18 +270,18 @@ class RelayWithEcho(Relay):
         self._echo: socket.socket | None = None
         #: Cycle [s] and time [ns] of the first packet with a push; None = not come yet.
         self.pushed: tuple[float, int] | None = None
-        #: How the echo answered it.
+        #: The answer of the echo to this packet; None = not come yet.
         self.echoed: Reaction | None = None
         self._asks_echo = False
-        #: What waits for the echo, and where it goes then.
+        #: The packet that waits for the echo's answer, and the socket to which it goes afterwards.
         self._held: tuple[bytes, socket.socket] | None = None
 
     def await_push(self, asks_echo: bool) -> None:
-        """Wait for a packet with a push; it may be for the echo first."""
+        """Expect the first packet with a push; ``asks_echo``: send it to the echo first."""
         self._asks_echo, self.echoed, self.pushed = asks_echo, None, None
 
     def directions(self, name: str) -> tuple[int, str, str]:
-        """Connect to the robot for each client of its port; the echo has connected before."""
+        """Accept the echo before the first RTDE client; return port and names as in Relay."""
         if name != 'rtde_port':
             return super().directions(name)
         if self._echo is None:
@@ -332,12 +333,12 @@ class RelayWithEcho(Relay):
 
 
 def cycle_of(data: bytes) -> float:
-    """Return the controller's clock in the cycle of a packet [s]."""
-    (timestamp,) = TIMESTAMP.unpack_from(data, 4)  # behind size, type and recipe
+    """Return the controller time of a packet [s]."""
+    (timestamp,) = TIMESTAMP.unpack_from(data, 4)  # after size, type and recipe
     return float(timestamp)
 
 
 def is_pushed(data: bytes) -> bool:
-    """Tell whether the tool is pushed aside in a packet."""
+    """Return whether the tool is pushed aside in a packet."""
     values: Any = RECIPE.unpack(data[3:])
     return bool(abs(values[ACTUAL][0] - values[TARGET][0]) > BOUND)

@@ -35,7 +35,7 @@ _WORDS = struct.Struct('>8i')
 class Mark:
     """Bytes that came from the driver."""
 
-    #: Of ``time.monotonic_ns``.
+    #: Arrival, by ``time.monotonic_ns``.
     time: int
     port: str
     size: int
@@ -45,7 +45,7 @@ class Mark:
 
     @property
     def is_trajectory_action(self) -> bool:
-        """Tell whether it is a message of a running trajectory."""
+        """Return whether it is a message of a running trajectory."""
         return self.port == 'reverse_port' and self.mode == ControlMode.FORWARD
 
 
@@ -62,7 +62,7 @@ def marks_until_first_point(
     """
     Wait for a point on the wire and return all marks until then.
 
-    :param spin: waits [s].
+    :param spin: waits for a time [s].
     :raises TimeoutError: none came within ``timeout`` [s].
     """
     marks: list[Mark] = []
@@ -98,13 +98,13 @@ class Relay:
             self.listen(TAP_HOST, name)
 
     def listen(self, host: str, name: str) -> None:
-        """Listen on a free port with a name."""
+        """Listen on a free port, which becomes ``ports[name]``."""
         listener = socket.create_server((host, 0))
         self.ports[name] = listener.getsockname()[1]
         self._selector.register(listener, selectors.EVENT_READ, name)
 
     def directions(self, name: str) -> tuple[int, str, str]:
-        """Return the port to connect to for a client, and the names of both directions."""
+        """Return the port for a client, and the names of both directions ('' = without marks)."""
         return self.ports[name], '', name
 
     def take(self) -> list[Mark]:
@@ -162,7 +162,7 @@ class RelayDirection:
         self._messages = RecordDecoder(MESSAGE_SIZE, 'reverse message', _WORDS.unpack)
 
     def add_marks(self, marks: list[Mark], now: int, data: bytes) -> None:
-        """Add what came from the driver to the marks."""
+        """Add marks for bytes that came from the driver."""
         if self.port_name == 'reverse_port':
             marks += [
                 Mark(now, self.port_name, len(data), mode=words[7], action=words[1])
