@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Print the requirements of the build, a line for each: pip and uv read no list of them alone."""
+"""Print the build requirements, one a line, because pip and uv cannot install only these."""
 
 from pathlib import Path
 import sys

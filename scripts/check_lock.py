@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Refuse an environment that has what requirements.lock does not name, or another version of it.
+Refuse an environment with a package or a version that requirements.lock does not name.
 
 Run it with the Python of that environment: ``.venv/bin/python scripts/check_lock.py``.
 """
@@ -22,7 +22,7 @@ def normalized(name: str) -> str:
 
 
 def locked() -> set[tuple[str, str]]:
-    """Return names and versions; a package has several where they depend on the Python."""
+    """Return names and versions; a package can have several, for different versions of Python."""
     return set(re.findall(r'^([\w.-]+)==(\S+)', LOCK.read_text(encoding='utf-8'), re.MULTILINE))
 
 
@@ -31,7 +31,7 @@ def main() -> None:
     installed = {
         (normalized(found.name), found.version)
         for found in distributions()
-        if found.read_text('RECORD')  # the wheels of ROS bring distributions that have none
+        if found.read_text('RECORD')  # some distributions in the wheels of ROS have none
     }
     others = sorted(
         f'{name} {version}' for name, version in installed - locked() if name not in OWN

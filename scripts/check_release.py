@@ -71,7 +71,7 @@ def repository_problems(package: ElementTree.Element, root: Path) -> list[str]:
 
 
 def contact_problems(root: Path) -> list[str]:
-    """Return the placeholders in what people read who want to report something."""
+    """Return the errors of the files that tell people how to report something."""
     found = []
     if not (root / 'SECURITY.md').is_file():
         found.append('SECURITY.md is missing; say in it how to report a vulnerability.')
@@ -94,7 +94,7 @@ def version_problems(package: ElementTree.Element, root: Path) -> list[str]:
     project = tomllib.loads(text_of(root / 'pyproject.toml')).get('project', {})
     named = {
         'CMakeLists.txt': cmake[1] if cmake else 'none',
-        # The call that reads package.xml.
+        # setup.py reads the version of package.xml by text('version').
         'setup.py': setup[1].replace("text('version')", version).strip('\'"') if setup else 'none',
         'pyproject.toml': project.get('version', version),
     }
@@ -123,7 +123,7 @@ def changelog_problems(package: ElementTree.Element, root: Path) -> list[str]:
 
 
 def numbers(version: str) -> list[int]:
-    """Return the parts of a version, to compare."""
+    """Return the numbers of a version, which can be compared."""
     return [int(part) for part in re.findall(r'\d+', version)]
 
 
@@ -133,7 +133,7 @@ def text_of(path: Path) -> str:
 
 
 def main() -> None:
-    """Print what stands in the way of a release and exit with 1, or exit with 0."""
+    """Print what prevents a release and exit with 1; exit with 0 if nothing does."""
     if found := problems(ROOT):
         sys.exit('\n'.join(['Not ready for a release:', *(f'  {problem}' for problem in found)]))
 

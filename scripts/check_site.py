@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Find broken links inside of a built site: files and anchors that are not there.
+Find links within a built site that lead to a missing file or anchor.
 
 ::
 
@@ -17,7 +17,7 @@ from urllib.parse import unquote, urlsplit
 
 
 class Page(HTMLParser):
-    """The anchors of a page, and where its links lead."""
+    """The anchors of a page, and the targets of its links."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -26,7 +26,7 @@ class Page(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Take what a tag defines or refers to."""
+        """Collect the anchors and the link targets of a tag."""
         for name, value in attrs:
             if value is None:
                 continue
@@ -37,7 +37,7 @@ class Page(HTMLParser):
 
 
 def broken_links(site: Path) -> list[str]:
-    """Return a sentence for each link of the site that leads nowhere inside of it."""
+    """Return a sentence for each link within the site whose target is missing."""
     pages = {path: Page(path.read_text(encoding='utf-8')) for path in site.rglob('*.html')}
     found = []
     for path, page in pages.items():
@@ -55,7 +55,7 @@ def broken_links(site: Path) -> list[str]:
 
 
 def main() -> int:
-    """Print broken links; return 1 if there are any, or no pages."""
+    """Print broken links; return 1 if there are any, or if the site has no pages."""
     site = Path(sys.argv[1]).resolve()
     found = broken_links(site)
     pages = sum(1 for _ in site.rglob('*.html'))

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Draw the experiments of the servoj guide as our simulated controller and servo side do them.
+Draw the experiments of the servoj guide, run with the simulated controller and this driver.
 
-``test/acceptance/test_servo_experiments.py`` runs the same ones. Needs matplotlib::
+``test/acceptance/test_servo_experiments.py`` runs the same experiments. Needs matplotlib::
 
     python scripts/draw_servo_experiments.py [doc/servo_experiments.png]
 """

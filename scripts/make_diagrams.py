@@ -60,7 +60,7 @@ def connection() -> Table:
 
 
 def goal() -> Table:
-    """Return the table of a goal; the remark is the error code that is decided there."""
+    """Return the table of a goal; the remark is the error code that the transition sets."""
     return {
         state.name: {
             signal.name: (step.state.name, _name(step.code)) for signal, step in row.items()
@@ -78,7 +78,7 @@ def servo() -> Table:
 
 
 def page(title: str, source: str, table: Table, events: Sequence[str]) -> str:
-    """Return a page: the diagram, and the whole table with events that keep the state."""
+    """Return a page with the diagram, and with the table, which also has events without change."""
     return (
         f'# {title}\n\n'
         f'Made by `scripts/make_diagrams.py` from `TRANSITIONS` of\n'

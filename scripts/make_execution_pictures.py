@@ -3,8 +3,8 @@
 """
 Draw the pictures of the pages on goals from recordings of the goals that they show.
 
-Simulated controller and robot loop run in virtual time, so the pictures are the same each time but
-for the date in their titles, which is left out::
+Simulated controller and robot loop run in virtual time, and the date is left out of the titles, so
+that the pictures are the same each time::
 
     python scripts/make_execution_pictures.py [NAME ...]
 """
@@ -25,7 +25,7 @@ from typing import Any
 CHECKOUT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(CHECKOUT / 'test' / 'support'))
 
-#: Of the controller in these cells, and between two samples [s].
+#: Cycle of the simulated controller, and time between two samples [s].
 CYCLE = 0.008
 #: Number of colours: enough for lines, and the file is a quarter as large.
 COLOURS = 64
@@ -33,7 +33,7 @@ COLOURS = 64
 
 @dataclass(frozen=True, kw_only=True)
 class Picture:
-    """A scenario for a cell in virtual time, and the name of its picture."""
+    """A scenario for a cell in virtual time, and the title of its picture."""
 
     title: str
     happens: Callable[[Any], Coroutine[None, None, Any]]
@@ -43,12 +43,12 @@ def a_goal(
     name: str, *faults: str, execution: str = '', input_after: float = nan, arm: Any = None
 ) -> Callable[[Any], Coroutine[None, None, Any]]:
     """
-    Return the execution of an example.
+    Return the scenario that runs an example and returns its outcome.
 
     :param faults: as on the command line of ``ur-cartesian sim``.
-    :param execution: in place of the file's.
-    :param input_after: how long after the start digital inputs come [s].
-    :param arm: for a path that may give way.
+    :param execution: name of the execution mode; empty = as in the file.
+    :param input_after: time from the start until all digital inputs switch on [s]; NaN = never.
+    :param arm: the ArmSetup, which is needed to offset the path.
     """
 
     async def happens(cell: Any) -> Any:
@@ -117,7 +117,7 @@ async def a_late_producer(cell: Any) -> Any:
 
 
 async def a_replanner(cell: Any) -> Any:
-    """Go round and round on tails that are replaced ten times a second."""
+    """Follow a circle on tails that are replaced ten times a second."""
     from append_goals import AppendMotion
     from replanner import Readings, replan, Replanner
 
@@ -132,7 +132,7 @@ async def a_replanner(cell: Any) -> Any:
 
 
 async def a_press(cell: Any) -> list[tuple[float, ...]]:
-    """Grind a part that is lower than the path and has a step; return time, heights, force."""
+    """Grind a part with a step, lower than the path; return rows of time, heights [mm], force."""
     from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
     from ur_cartesian_driver.sim.rtde_output_values import COMPUTED
 
@@ -181,7 +181,7 @@ def draw_press() -> Path:
 
 
 async def a_tracked_seam(cell: Any, execution: str) -> list[tuple[float, ...]]:
-    """Follow a seam that is bent by 5 mm, on the way back by a sensor that jumps."""
+    """Follow a seam that is bent by 5 mm; on the way back, the sensor jumps between two values."""
     from math import pi, sin
 
     from ur_cartesian_driver.driver.ipc.channel import ArmSetup, SetPathOffset
@@ -210,7 +210,7 @@ async def a_tracked_seam(cell: Any, execution: str) -> list[tuple[float, ...]]:
 
 
 def draw_path_offset() -> Path:
-    """Draw what a sensor sees and where the tool is; return the file of the picture."""
+    """Draw the offset from a sensor, and the tool; return the file of the picture."""
     from matplotlib import pyplot
     import numpy as np
     from robot_cell import run_cell
@@ -246,7 +246,7 @@ SHORT_CYCLE = 0.002
 
 
 async def a_zigzag(cell: Any, options: dict[str, Any]) -> list[tuple[float, ...]]:
-    """Follow a zigzag; return the places of the tool from its start [m], one for each cycle."""
+    """Follow a zigzag; return the tool position from its start [m] in each cycle."""
     import example_goals
 
     from ur_cartesian_driver.kinematics.chain import Arm
@@ -314,7 +314,7 @@ async def a_photo_seam(cell: Any) -> tuple[list[tuple[float, ...]], list[tuple[f
 
 
 def draw_pulses() -> Path:
-    """Draw where the pulses of a seam come, and how fast the tool is; return the picture."""
+    """Draw the places of pulses on a seam, and the tool speed; return the file of the picture."""
     from matplotlib import pyplot
     import numpy as np
     from robot_cell import run_cell
@@ -339,7 +339,7 @@ def draw_pulses() -> Path:
 
 
 def draw_beads() -> Path:
-    """Draw where beads begin and end without and with the lead of a valve; return the picture."""
+    """Draw the errors of the ends of beads without and with a lead; return the picture's file."""
     from matplotlib import pyplot
     import numpy as np
 
@@ -450,7 +450,7 @@ PICTURES = {
 
 
 def record(picture: Picture, directory: Path) -> Path:
-    """Run the scenario and return the recording."""
+    """Run the scenario; return the file of its recording."""
     from example_goals import PRELUDE
     from robot_cell import run_cell
 
@@ -467,7 +467,7 @@ def record(picture: Picture, directory: Path) -> Path:
 
 
 def draw(name: str) -> Path:
-    """Record and draw; return the file of the picture."""
+    """Record a scenario and draw it; return the file of the picture."""
     from ur_cartesian_driver.cli.plots import recording_plot as plot
     from ur_cartesian_driver.driver.recordings.recording import Recording
 
@@ -480,7 +480,7 @@ def draw(name: str) -> Path:
 
 
 def compress(drawing: Path) -> None:
-    """Write a picture again with a few colours."""
+    """Reduce the colours of a picture, so that its file is smaller."""
     from PIL import Image
 
     with Image.open(drawing) as image:

@@ -3,8 +3,8 @@
 """
 Write doc/faults.md from the table of the fault matrix tests.
 
-So the page states exactly what the tests check. A test compares page and table; after a change of
-the table, run::
+The table is the source, so that the page states exactly what the tests check. A test compares page
+and table; after a change of the table, run::
 
     python scripts/make_faults.py
 """

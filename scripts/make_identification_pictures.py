@@ -33,7 +33,7 @@ GREY, RED, BLUE = '#bbbbbb', '#c83c32', '#1e6edc'
 
 
 def draw_move(recording: Path) -> Figure:
-    """Draw the speed of a recorded line, that of the fitted profile, and the difference in way."""
+    """Draw the speeds of a recorded line and of its fitted profile, and the residual travel."""
     (move,) = find_moves(read_samples(recording))
     profile, travel = move.profile, move.leading
     if not isinstance(profile, Profile) or travel is None or move.travel.line is None:
@@ -57,7 +57,7 @@ def draw_move(recording: Path) -> Figure:
 
 
 def draw_arms(number: int) -> Figure:
-    """Draw the share of intervals that contain the true law, of hidden arms."""
+    """Draw the share of intervals that contain the true law, for a number of hidden arms."""
     hidden_arm, hidden_servo, random_cases = map(
         import_module, ('hidden_arm', 'hidden_servo', 'random_cases')
     )
@@ -90,7 +90,7 @@ def draw_arms(number: int) -> Figure:
     axis = figure.subplots()
     axis.axvspan(92.0, 98.0, color=GREY, alpha=0.4, label='92 to 98 %')
     axis.axvline(95.0, color='black', linewidth=0.8)
-    # What chance alone does to the share of so many intervals, with 95 %.
+    # The deviation of a share from 95 % that chance alone exceeds in 5 % of the cases.
     chance = [196.0 * np.sqrt(0.95 * 0.05 / found[name]) for name in names]
     axis.errorbar(shares, names, xerr=chance, fmt='o', color=BLUE, elinewidth=0.8, markersize=4)
     axis.set(
@@ -101,7 +101,7 @@ def draw_arms(number: int) -> Figure:
 
 
 def main(kind: str, argument: str = '100') -> None:
-    """Draw one of the two."""
+    """Draw and save the picture of a move or of hidden arms."""
     figure = draw_move(Path(argument)) if kind == 'move' else draw_arms(int(argument))
     save_vectors(figure, CHECKOUT / 'doc' / f'identify_{kind}.svg')
 

@@ -35,7 +35,7 @@ def table(form: ImportFormat) -> str:
 
 
 def _cell(form: ImportFormat, topic: str, treatment: Treatment) -> str:
-    """Return the terms of a cell; those with the same reason stand together before it."""
+    """Return the terms of a cell; terms with the same reason are listed together before it."""
     by_reason: dict[str, list[Term]] = {}
     for term in form.terms.values():
         if term.topic == topic and term.treatment is treatment:
@@ -47,7 +47,7 @@ def _cell(form: ImportFormat, topic: str, treatment: Treatment) -> str:
 
 
 def _ranges(names: list[str]) -> Iterator[str]:
-    """Return names as code; three and more that count up, such as M3, M4, M5, as one range."""
+    """Yield names as code, and three or more that count up, such as M3, M4, M5, as one range."""
     count = len(names)
     first = 0
     while first < count:
@@ -69,7 +69,7 @@ def _next(name: str) -> str:
 
 
 def page_with_tables(page: str) -> str:
-    """Return the page with each table between its marks made anew."""
+    """Return the page with a new table between each pair of marks."""
     return _TABLE.sub(lambda found: f'{found[1]}\n\n{table(FORMATS[found[2]])}\n{found[3]}', page)
 
 

@@ -3,8 +3,8 @@
 """
 Bring ``config/driver.yaml`` up to date: each parameter's description, values and default.
 
-The file itself has the sections, and the order of the parameters. So a new parameter is written
-into its section as ``NAME:``, and this script does the rest::
+Only the file has the sections and the order of the parameters. So write a new parameter into its
+section as ``NAME:``, and this script adds the rest::
 
     python scripts/make_parameter_file.py
 
@@ -35,12 +35,12 @@ def text() -> str:
 
 
 def _renewed(line: str) -> Iterator[str]:
-    """Yield a line as it is, or a parameter anew; nothing for the comments of parameters."""
+    """Yield a line as it is, or a parameter with new comments; drop old comments."""
     if _KEPT.match(line):
         yield line
     elif found := _NAME.match(line):
         for each in DECLARATIONS:
-            if each.name == found[1]:  # none, if it is a parameter no longer
+            if each.name == found[1]:  # nothing if the parameter no longer exists
                 yield from _lines(each)
 
 

@@ -33,23 +33,23 @@ from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 DOC = Path(__file__).resolve().parents[1] / 'doc'
 ARM = Arm(robot_model('ur5e'))
 HOME = (0.0, -np.pi / 2, np.pi / 2, -np.pi / 2, -np.pi / 2, 0.0)
-#: Enough for lines, and the file is a third as large.
+#: Number of colours: enough for lines, and the file is a third as large.
 COLOURS = 64
 GREY, RED, BLUE = '#bbbbbb', '#c83c32', '#1e6edc'
 
 
 def robot() -> RobotState:
-    """Return the state of a ur5e at home."""
+    """Return the state of a UR5e at rest in HOME."""
     return state_at_rest(ARM, HOME, IDENTITY)
 
 
 def places(path: ToolPath) -> NDArray[np.float64]:
-    """Return where the tool goes (n, 3) [mm]."""
+    """Return the planned positions of the tool (n, 3) [mm]."""
     return 1e3 * plan(path.goal(), robot(), ARM, PlanningOptions()).reference.poses[:, :3]
 
 
 def draw_free_axis() -> Figure:
-    """Draw the axis x of the tool around a pipe: as given, and as chosen."""
+    """Draw the axis x of the tool around a pipe: as given, and as chosen by the planner."""
     goal = ToolPath.load(goal_file('round_pipe')).goal()
     chosen = plan(goal, robot(), ARM, PlanningOptions()).goal
     figure = Figure(figsize=(10, 4.2), layout='constrained')
@@ -102,7 +102,7 @@ def draw_resumed_seam() -> Figure:
 
 
 def draw_moveit() -> Figure:
-    """Draw a joint through points that have positions only."""
+    """Draw the motion of a joint through points that have positions only."""
     state, times = robot(), (0.8, 1.6, 2.2, 3.0)
     turns = (0.1, 0.16, 0.1, 0.18)
     plan_of_joints = plan_joint_goal(

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Write test/importing/files/rs274.json: what LinuxCNC's interpreter makes of random programs.
+Write test/importing/files/rs274.json: random programs, and their motions by LinuxCNC.
 
 Needs `rs274` of LinuxCNC (Debian: linuxcnc-uspace) and a file with a table of one tool::
 
@@ -98,7 +98,7 @@ def rounded(values: list[float]) -> list[float]:
 
 
 def main() -> None:
-    """Draw programs until enough of them are in the language of the interpreter."""
+    """Write random programs and their motions, until the interpreter has accepted enough."""
     sys.path.insert(0, str(TESTS / 'support'))
     from random_gcode import RandomProgram
 

@@ -46,7 +46,7 @@ PolyScope X also what others report from the manuals of 3.15.4 and 10.x.
 
 """
 
-#: The functions of the script manual of 5.21, with those of its chapter on interpreter mode.
+#: The functions of the script manual of 5.21, with its chapter on interpreter mode.
 MANUAL_5_21 = """
     clear_interpreter end_interpreter interpreter_mode
 
@@ -152,7 +152,7 @@ FIRST = {
     'transpose': ('3.14', '5.9', ''),
 }
 
-#: Functions of manuals that are not simulated, and what they are about.
+#: Functions of manuals that are not simulated, with their subjects.
 NOT_SIMULATED = {
     'add_frame': 'frames of the world model',
     'attach_frame': 'frames of the world model',
@@ -216,7 +216,7 @@ def rows() -> Iterator[tuple[str, ...]]:
 
 
 def versions(name: str) -> tuple[str, str, str]:
-    """Return the cells of the three manuals."""
+    """Return the cells of a function for CB3, e-Series and PolyScope X."""
     cb3, e_series, x = FIRST.get(name, ('', '', ''))
     return (
         cb3 or ('yes' if name in CB3 else ''),

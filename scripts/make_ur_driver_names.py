@@ -22,7 +22,7 @@ PAGE = Path(__file__).resolve().parents[1] / 'doc' / 'coming_from' / 'ur_driver.
 
 
 def names() -> Iterator[str]:
-    """Yield the lines of the table of names; those that are absent come last."""
+    """Yield the lines of the table of names; absent names come last."""
     yield '| name | type | served by |'
     yield '| --- | --- | --- |'
     for row in sorted(NAMES, key=lambda row: isinstance(row, Absent)):
