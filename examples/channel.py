@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A bead along the floor of a channel, whose mesh (STL) and the nozzle are bodies of the cell."""
+"""A bead along the floor of a channel; channel (an STL mesh) and nozzle are bodies of the cell."""
 
 from pathlib import Path as FilePath
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A circle: two arcs, passed into each other by a blend."""
+"""A circle of two arcs with a blend between them."""
 
 from ur_cartesian_driver.path import mm, Path, Pose
 

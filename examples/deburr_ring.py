@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Deburr the edge of a ring in the hand at a fixed brush; wrist 3 needs its rotation free."""
+"""Deburr the edge of a held ring at a fixed brush, free about z for the range of wrist 3."""
 
 from math import cos, sin
 

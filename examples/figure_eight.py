@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A figure eight whose velocities are given at each point, and free accelerations."""
+"""A figure eight with a velocity at each point; the driver chooses the accelerations."""
 
 from math import cos, pi, sin
 

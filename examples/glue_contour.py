@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Glue along a drawn contour of a plate in the hand, under it a nozzle that stands in the cell."""
+"""Glue along a drawn contour of a plate, which the arm moves over a nozzle fixed in the cell."""
 
 from ur_cartesian_driver.path import against, digital, mm, Path, Pose, StaticFrame, X, Y, Z
 

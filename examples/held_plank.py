@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Pick and place: while it is held, the plank is checked like the tool, here over a post."""
+"""Pick and place over a post: the held plank is checked for collisions like the tool."""
 
 from pathlib import Path as FilePath
 

@@ -29,9 +29,13 @@ def run(
     **settings: Any,
 ) -> None:
     """
-    Make a path from where the tool of a robot is, print its plan, and carry it out.
+    Make a path from the present pose of the tool, print its plan, and run it.
 
-    :param air: how the arm travels from path to path; then ``make`` also takes the air travel.
+    With --plan on the command line, the path is not run.
+
+    :param meanwhile: called with the motion and its start pose while the arm moves.
+    :param air: settings for air travel; if they are given, ``make`` also gets the AirTravel.
+    :param settings: fields of the DriverConfig.
     """
     parser = robot_options()
     parser.add_argument('--plan', action='store_true', help='do not move')

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A bead that begins and ends between points, ahead of a slow valve, and a picture every 5 mm."""
+"""A bead that begins and ends between points, with leads for a slow valve; pictures on the way."""
 
 from ur_cartesian_driver.path import digital, mm, Path, Pose
 

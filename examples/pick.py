@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Pick and place with a gripper whose functions are URScript of its own (script_prelude)."""
+"""Pick and place with a gripper that brings its own URScript functions (script_prelude)."""
 
 from pathlib import Path as FilePath
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What is left of a bead of glue that was stopped on the way to its second point."""
+"""The rest of a bead of glue that was stopped on the way to its second point."""
 
 from ur_cartesian_driver.path import digital, mm, Path, PathPlace, Pose
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Once around an upright pipe: with the rotation typed in, wrist 3 runs out of its range."""
+"""Once around an upright pipe, free about z: wrist 3 would leave its range otherwise."""
 
 from math import cos, pi, sin
 
@@ -10,7 +10,7 @@ CENTRE, RADIUS, LEAN = (-0.5, -0.1, 0.3), 0.05, deg(30)
 
 
 def place(angle: float) -> Pose:
-    """Return the tool against the pipe from outside and above, its x along the seam."""
+    """Return the pose of the tool against the pipe from outside and above, x along the seam."""
     x, y, z = CENTRE
     outwards = (cos(angle) * cos(LEAN), sin(angle) * cos(LEAN), sin(LEAN))
     q = against(outwards, x=(-sin(angle), cos(angle), 0.0))

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A square with rounded corners, from where the tool is."""
+"""A square with rounded corners that starts at the tool."""
 
 from ur_cartesian_driver.path import mm, Path, Pose
 

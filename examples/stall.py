@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""By set-points (SERVO), which wait while somebody holds the arm more than 5 mm off its path."""
+"""A motion by set-points (SERVO) that waits while somebody holds the arm over 5 mm off it."""
 
 from ur_cartesian_driver.path import ExecutionMode, mm, Path, Pose, Tolerance
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A bead of glue around a corner that is refused where it would be slower than 95 %."""
+"""A bead of glue around a corner, refused if it would run below 95 % of its speed."""
 
 from ur_cartesian_driver.path import digital, mm, Path, Pose
 

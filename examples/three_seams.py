@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Three seams at the feet of ribs, in the order with the least travel; the ways are found."""
+"""Three seams at the feet of ribs, in the shortest order; the driver finds the ways between."""
 
 from pathlib import Path as FilePath
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Between two paths the pendant's program has the arm: behind its node, External Control."""
+"""Take turns with the pendant's program, which calls the driver by its node External Control."""
 
 from ur_cartesian_driver.driver import Driver, DriverConfig
 from ur_cartesian_driver.path import mm, Path, Pose
@@ -16,7 +16,7 @@ if __name__ == '__main__':
     given = robot_options().parse_args()
     with Driver(DriverConfig(robot_ip=given.robot_ip, ur_type=given.ur_type)) as driver:
         while True:
-            driver.wait_ready(timeout=60.0)  # a person plays the program, or it comes round
+            driver.wait_ready(timeout=60.0)  # until the program reaches External Control
             state = driver.state
             assert state is not None
             print(driver.execute(tool_change(state.actual_tcp_pose)).raise_for_error().text)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A seam whose path gives way to a sensor that sees how far it lies to the side."""
+"""A seam whose path follows a sensor that measures how far the seam lies to the side."""
 
 from time import sleep
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A seam under the elbow with a bent torch: as typed in, the arm would hit itself."""
+"""A seam under the elbow with a bent torch, free about z: the arm would hit itself otherwise."""
 
 from ur_cartesian_driver.path import against, axis_angle, deg, mm, Path, Pose, StaticFrame, X, Y, Z
 
