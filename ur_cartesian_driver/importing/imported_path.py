@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The contents of an imported file, before the options are applied.
+The contents of an imported file, before the options of the import are applied.
 
 Each point keeps its line of the file, so that remarks and errors can name the line.
 """
@@ -41,7 +41,7 @@ _OPTIONAL = {
 MAX_DISTANCE = 20.0
 JOINTS_HAVE_NO_FRAME = 'joint positions have no frame; give no frame, tool, origin or scale'
 UNKNOWN3: Vector3 = (nan, nan, nan)
-#: The types of motions whose speed an option can give.
+#: The types of motions whose speed an option of the import can set.
 TYPES_WITH_SPEED = (SegmentType.LINEAR, SegmentType.CIRCULAR, SegmentType.PROCESS)
 #: Two points are the same if they are less than this distance [m] apart and their orientations
 #: differ by less than this angle [rad].
@@ -65,7 +65,7 @@ class BrokenFile(ValueError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImportNote:
-    """A remark: something in a file was left out, or was taken in another form."""
+    """A remark that something in a file was left out, or was converted to another form."""
 
     #: 1-based lines, in rising order; empty = the note concerns the whole file.
     lines: tuple[int, ...]
@@ -135,7 +135,7 @@ class ImportedPath:
     lines: Int64s
     #: (n,) numbers of :class:`~ur_cartesian_driver.motion.goal.goal.SegmentType`.
     types: Int64s
-    #: (n,) whether the motion is only travel.
+    #: (n,) whether the motion only brings the tool to the point, without work on the way.
     travels: Flags
     #: (n,) whether the tool has to be lifted for the motion.
     lifts: Flags
@@ -147,7 +147,7 @@ class ImportedPath:
     quaternions: Floats
     #: (n, 3) normals of the surface.
     normals: Floats
-    #: (n,) numbers in each of the following columns.
+    #: (n,), like all columns up to ``dwells``.
     speeds: Floats
     accelerations: Floats
     blends: Floats
@@ -180,9 +180,11 @@ class ImportedPath:
 
     def take(self, rows: Int64s) -> ImportedPath:
         """
-        Return some rows, by rising indices, which must include every row with a wait.
+        Return the path with only the given rows.
 
-        Outputs of the other rows move to the row kept before them.
+        Outputs at a removed row move to the last kept row before it.
+
+        :param rows: (m,) rising row indices, which must include every row with a wait.
         """
         new_row = {int(row): i for i, row in enumerate(rows)}
         return replace(
@@ -281,7 +283,7 @@ class PathCollector:
                 self._optional[name].update(enumerate(values.tolist(), row))
 
     def switch(self, output: IOCommand) -> None:
-        """Switch an output at the newest point; before any point, at the first one."""
+        """Switch an output at the newest point; if there is none yet, at the first one."""
         self._outputs.append(replace(output, waypoint=max(0, len(self) - 1)))
 
     def leave_out(self, rows: range, what: str, why: str) -> None:

@@ -1,14 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The registry of execution modes: their numbers, and the traits that other code asks for.
+The registry of execution modes: their numbers, and the traits by which other code handles them.
 
 A new mode needs a member of :class:`ExecutionMode` (its number is a constant ``EXECUTION_...`` of
 the action), a row of traits in :data:`EXECUTION_MODES`, a row in ``PLANNERS`` of
 ``planning/planner.py``, a row in ``FEEDERS`` of ``driver/loop/goal_machine_factory.py``, and a
-module for each new planner or feeder. Planners and feeders belong to higher layers, and so do
-their tables; a test compares the keys of all three tables. ``planning/request/goal_fields.py``
-chooses a mode for AUTO.
+module for each new planner or feeder (which sends the motion to the robot). The tables of planners
+and feeders are not here, because they belong to higher layers; a test compares the keys of all
+three tables. ``planning/request/goal_fields.py`` chooses a mode for AUTO.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ def _names(kind: type[Rows[Any]]) -> tuple[str, ...]:
 
 
 def zeros(n: int, columns: int = 6) -> Floats:
-    """Return an array (n, columns) of zeros that takes no memory."""
+    """Return a read-only array (n, columns) of zeros, a view of a single zero to save memory."""
     return np.broadcast_to(np.zeros(()), (n, columns))
 
 
@@ -92,7 +92,7 @@ class Rows(Sequence[T]):
             yield from zip(*(getattr(self, name)[rows].tolist() for name in names), strict=True)
 
     def take(self: R, rows: slice) -> R:
-        """Return the rows of a slice with a step of 1."""
+        """Return the rows that a slice selects; its step must be 1."""
         first, last, _ = rows.indices(len(self))
         if last - first == len(self):
             return self
@@ -158,12 +158,12 @@ class GoalRows(Rows[T]):
     """Rows whose columns hold the fields of a goal dataclass."""
 
     __slots__: ClassVar[tuple[str, ...]] = ()
-    #: The goal dataclass whose objects the rows are.
+    #: The class of the objects that the rows stand for: Waypoint or Segment.
     kind: ClassVar[type]
 
     @classmethod
     def columns(cls) -> tuple[GoalColumn, ...]:
-        """Return the columns, each with the field that it holds."""
+        """Return the columns, each with the field of ``kind`` whose values it holds."""
         return declared_columns(cls, cls.kind)
 
     @classmethod
@@ -171,7 +171,8 @@ class GoalRows(Rows[T]):
         """
         Return objects as rows; rows are returned unchanged.
 
-        :param name: the name of ``objects`` in an error text; '' = ``waypoints`` or ``segments``.
+        :param name: the name of ``objects`` in error messages; '' = ``waypoints`` or
+            ``segments``.
         :raises WrongType: a value cannot be converted to its type; the text names the field.
         """
         if isinstance(objects, cls):
@@ -326,7 +327,7 @@ def _number_type(each: GoalField) -> type:
 
 
 def _array(each: GoalField, values: Sequence[Any]) -> Any:
-    """Return the column of a field from its values; None if each is the default object itself."""
+    """Return the column of a field; None, for a default column, if all values are the default."""
     if each.form is Form.RECORD:
         return {i: value for i, value in enumerate(values) if value}
     default = IDENTITY if each.form is Form.POSE else each.default
@@ -359,7 +360,7 @@ def _are_plain(each: GoalField, values: Sequence[Any]) -> bool:
     if not _only({each.type}, values):
         return False
     if each.form is Form.RECORD:
-        # Only empty postures are plain. Tuples are tested first, as any() would fail on an array.
+        # Only empty postures are plain. Test for tuples first: any() would fail on arrays in them.
         parts = [part for one in values for part in (one.names, one.values)]
         return _only({tuple}, parts) and not any(parts)
     return each.form is not Form.POSE or (

@@ -1,7 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The frames that a goal may name: the frame of its poses, and the controlled frame.
+The frames that a goal may name: the frame of its poses, and the frame that follows these poses.
+
+The second is called the controlled frame.
 
 The robot receives poses in ``base``, the frame of its own controller. ``base_link`` of the robot
 description has the same origin, rotated by pi about z.
@@ -11,8 +13,8 @@ the axes of REP-103 (x forward): it is tool0 rotated by the inverse of rpy (pi/2
 ``tool0_controller`` is the robot's active TCP. A goal in one of these three frames is relative to
 the pose of the arm at the time of planning.
 
-If the arm carries the frame of the goal, and the controlled frame is fixed in the cell, the arm
-holds a part at a fixed tool; the frame then moves with the arm (:mod:`~.moving_frame`).
+If the frame of the poses moves with the arm, and the controlled frame is fixed in the cell, the
+arm holds a part and leads it along a fixed tool (:mod:`~.moving_frame`).
 
 The parameter ``static_frames`` adds frames fixed to any of these. All other frames are looked up
 in tf2, if it is installed.
@@ -34,9 +36,10 @@ from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 G = TypeVar('G', bound=Goal)
 
-#: ``base_link`` in ``base``.
+#: The pose of ``base_link`` in ``base``.
 T_BASE_BASE_LINK = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
-#: ``flange`` in ``tool0``: the inverse of rpy (pi/2, 0, pi/2), whose quaternion is (1, 1, 1, 1)/2.
+#: The pose of ``flange`` in ``tool0``: the inverse of rpy (pi/2, 0, pi/2), which is the quaternion
+#: (1, 1, 1, 1)/2.
 T_TOOL0_FLANGE = Pose((0.0, 0.0, 0.0), (-0.5, -0.5, -0.5, 0.5))
 
 BASE, BASE_LINK = 'base', 'base_link'
@@ -96,7 +99,7 @@ class ArmSnapshot:
         return cls(state.actual_tcp_pose @ state.T_flange_tcp.inverse(), state.T_flange_tcp)
 
     def tool(self, goal: Goal) -> Pose:
-        """Return the pose of a goal's tool in the frame of the goal."""
+        """Return the pose of a goal's controlled frame in the frame of the goal's poses."""
         if goal.moving_frame is not None:
             return goal.moving_frame.tool(self.T_base_flange)
         T_flange_tool = goal.T_flange_controlled or self.T_flange_tcp
@@ -104,13 +107,17 @@ class ArmSnapshot:
 
 
 class FrameLookup(Protocol):
-    """Looks up the frames of other nodes; ``ros.tf.tf_lookup`` does so in tf2."""
+    """
+    Looks up the frames of other nodes; ``ros.tf.tf_lookup`` does so in tf2.
+
+    ``field`` is the field of the goal that names the source frame, for error messages.
+    """
 
     def T_target_source(self, field: str, target: str, source: str, at: int = 0) -> Pose:
         """Return the pose of the source frame in the target frame at a time [ns]; 0 = newest."""
 
     def T_static(self, field: str, target: str, source: str) -> Pose:
-        """Return the pose of a frame that is fixed to the target frame."""
+        """Return the pose in the target frame of a source frame that is fixed to it."""
 
 
 class Frames:
@@ -135,7 +142,7 @@ class Frames:
             self.tcp: (self.tcp, IDENTITY),
         }
         resolved = _resolve_static_frames(own, static_frames)
-        #: The names that every robot has.
+        #: The names of the robot's own frames, which exist without ``static_frames``.
         self._own_names = frozenset(own)
         self._T_base, self._T_flange, self._T_tcp = (
             {name: T for name, (root, T) in resolved.items() if root == of}
@@ -186,14 +193,14 @@ class Frames:
         self, frame_id: str, controlled_frame: str, snapshot: ArmSnapshot | None = None
     ) -> MovingFrame | None:
         """
-        Return the motion of a goal's frame on a part that the arm holds at a fixed tool.
+        Return the moving frame of a goal whose part the arm holds at a fixed tool, else None.
 
-        None = the frame does not move: the controlled frame is not known to be fixed in the base,
-        or is one of the robot's own frames, where no fixed tool can be.
+        The tool is fixed if the controlled frame is known to be fixed in the base and is none of
+        the robot's own frames (``base`` or ``base_link``), where no tool can be.
 
         :raises InvalidGoal: the controlled frame is fixed in the base, but the frame of the goal
             is fixed there too, or is unknown.
-        :raises RobotNotReady: the frame is fixed to the TCP, which is not known.
+        :raises RobotNotReady: the frame of the goal is fixed to the TCP, which is not known.
         """
         if controlled_frame not in self._T_base or controlled_frame in self._own_names:
             return None
@@ -249,7 +256,7 @@ class Frames:
 
     def T_flange_frame(self, name: str, snapshot: ArmSnapshot | None = None) -> Pose | None:
         """
-        Return the pose of a controlled frame in the flange; None for the robot's active TCP.
+        Return the pose of a controlled frame in the flange; None if it is the robot's active TCP.
 
         :param snapshot: the arm, for frames fixed to its active TCP; None if the TCP is not known.
         :raises InvalidGoal: the frame is unknown, or not fixed to the flange.
@@ -290,7 +297,11 @@ def _require_snapshot(snapshot: ArmSnapshot | None, field: str, name: str) -> Ar
 def _resolve_static_frames(
     known: Mapping[str, tuple[str, Pose]], static_frames: Iterable[StaticFrame]
 ) -> dict[str, tuple[str, Pose]]:
-    """Return each frame's root and its pose in that root; static frames can have any order."""
+    """
+    Return, by name, the root of each frame (base, flange or TCP) and its pose in the root.
+
+    Static frames can have any order.
+    """
     frames = dict(known)
     waiting: dict[str, StaticFrame] = {}
     for frame in static_frames:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from ur_cartesian_driver.motion.goal.goal import OutputKind, PulseTrain, SafeOutput
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
-#: For each kind: its name in a sentence, and the number of pins.
+#: For each kind of output: its name in error messages and reports, and the number of its pins.
 OUTPUTS = {
     OutputKind.STANDARD_DIGITAL: ('standard digital output', 8),
     OutputKind.CONFIGURABLE_DIGITAL: ('configurable digital output', 8),
@@ -19,7 +19,7 @@ OUTPUTS = {
 
 
 def output_name(kind: OutputKind, pin: int) -> str:
-    """Return the name of an output for a sentence."""
+    """Return the name of an output for error messages, such as ``standard digital output 2``."""
     return f'{OUTPUTS[kind][0]} {pin}'
 
 
@@ -48,7 +48,7 @@ def parse_output(text: str) -> tuple[OutputKind, int]:
 
 
 def output_fault(kind: OutputKind, pin: int, value: float) -> tuple[str, str, str] | None:
-    """Return the wrong field of an output, its fault and a remedy; None if nothing is wrong."""
+    """Return the wrong argument's name, its fault and a remedy; None if nothing is wrong."""
     name, pins = OUTPUTS[kind]
     if not 0 <= pin < pins:
         return 'pin', f'is {pin}, but there are {name}s 0 to {pins - 1}', 'name one of these'
@@ -60,12 +60,12 @@ def output_fault(kind: OutputKind, pin: int, value: float) -> tuple[str, str, st
 
 
 def pulse_outputs(trains: Sequence[PulseTrain]) -> tuple[tuple[OutputKind, int], ...]:
-    """Return the outputs that give pulses, in the order in which the robot program counts them."""
+    """Return the outputs of the pulse trains, each once; the robot program numbers them so."""
     return tuple(dict.fromkeys((train.output, train.pin) for train in trains))
 
 
 def repeated_output(outputs: Sequence[SafeOutput]) -> int | None:
-    """Return the index of the first output that repeats an earlier one; None if none does."""
+    """Return the index of the first output that is named before it, too; None if all differ."""
     named = [(output.output, output.pin) for output in outputs]
     return next((i for i, one in enumerate(named) if one in named[:i]), None)
 

@@ -3,7 +3,9 @@
 """
 A plan: primitives, the reference path of the tool, and a report of the planner's choices.
 
-``planning`` makes a plan after all checks have passed. Plans are immutable.
+A primitive is one motion or rest of the robot. Times *at full speed* are expected if the robot's
+speed slider is at 100 %. The package ``planning`` makes a plan after all checks have passed. Plans
+are immutable.
 """
 
 from __future__ import annotations
@@ -43,8 +45,9 @@ class ReferencePath:
     """
     The planned path of the TCP in the robot's base, as samples that are joined by straight lines.
 
-    A straight segment needs only its ends; arcs, joint moves and blends are sampled finely
-    enough that the chords stay within a few micrometres of the curve. Row 0 is the start.
+    If the arm holds a part, it is the path of the fixed tool in the frame of the part. A straight
+    segment needs only its ends; arcs, joint moves and blends are sampled finely enough that the
+    chords stay within a few micrometres of the curve. Row 0 is the start.
     """
 
     #: (m, 7) x y z [m], unit quaternion x y z w.
@@ -53,8 +56,8 @@ class ReferencePath:
     point: Int32s
     #: (m,) expected time from the start of the motion [s] at full speed, not decreasing.
     time: Floats
-    #: (m, 2) largest distance [m] and angle [rad] between the robot's own blend and the sample, 0
-    #: outside blends: UR publishes the size of blends, but not their shape. Empty = 0 everywhere.
+    #: (m, 2) largest distance [m] and angle [rad] of the sample from the robot's actual blend, as
+    #: UR publishes the size of blends but not their shape; 0 outside blends. Empty = 0 everywhere.
     blend_tolerance: Floats = field(default_factory=lambda: np.empty((0, 2)))
     #: (m,) fraction of the segment that lies before the sample, as in :class:`~.events.PathPlace`.
     #: Empty = 0 everywhere.
@@ -76,7 +79,7 @@ class ReferencePath:
             array.setflags(write=False)
 
     def since(self, time: float) -> ReferencePath:
-        """Return copies of the rows from a time [s] on, so that the path itself can be freed."""
+        """Return the path from a time [s] on, as a copy, so that the whole path can be freed."""
         row = max(int(np.searchsorted(self.time, time, side='right')) - 1, 0)
         return ReferencePath(**{k: column[row:].copy() for k, column in self._columns().items()})
 
@@ -97,29 +100,30 @@ class BlendEntry(NamedTuple):
     """
     The state of the controller at the beginning of the blend after a segment.
 
-    Lengths are in units of the blend's parameter, which runs from 0 to 1.
+    The parameter of a blend runs from 0 at its beginning to 1 at its end.
     """
 
     #: The rate of the parameter [1/s].
     rate: float
     #: Time until the arm would come to rest at the segment's point if there were no blend [s].
     remaining: float
-    #: Acceleration of the segment [1/s^2].
+    #: Acceleration of the segment, as an acceleration of the parameter [1/s^2].
     acceleration: float
-    #: Length of the segment, if it is sent with a time.
+    #: Length of the segment in units of the parameter, if it is sent with a time.
     length: float
     #: Time from the beginning of the blend to its middle, where the point is passed [s].
     half: float
 
 
-#: Most segments and slow stretches with a line in a short report; lines made at a time.
+#: Greatest number of segments and slow stretches that have a line in a short report; number of
+#: lines that are made at a time.
 MAX_REPORT_LINES, _LINES_AT_ONCE = 10_000, 1000
 _NO_BLEND = BlendEntry(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlannedSegment:
-    """One primitive and its expected path and time."""
+    """One primitive, with the path and the time that are expected of it."""
 
     primitive: Primitive
     #: Index of the waypoint at the end of the primitive.
@@ -135,9 +139,9 @@ class PlannedSegment:
     #: The line of the report; empty if another piece of the same segment has the line (a SPLINE
     #: can have several pieces between two points).
     report_line: str
-    #: The entry of the blend that follows; None = there is no blend, or it is not known.
+    #: The state at the beginning of the next blend; None = there is no blend, or it is not known.
     blend_entry: BlendEntry | None = None
-    #: The records of outputs that follow the primitive on the wire, in this order.
+    #: The instructions for outputs that are sent to the robot after the primitive, in this order.
     outputs: tuple[OutputRecord, ...] = ()
 
 
@@ -146,10 +150,10 @@ class LateLines(Sequence[str]):
 
     def __init__(self, rows: range, make: Callable[[range], Sequence[str]]) -> None:
         """
-        Keep the function that makes lines.
+        Store the function that makes the lines.
 
-        :param rows: the rows of the lines, one after the other.
-        :param make: returns the lines of some of these rows, one after the other.
+        :param rows: the row of each line.
+        :param make: returns the lines of a part of these rows, in order.
         """
         self._rows, self._make = rows, make
 
@@ -179,7 +183,7 @@ class LateLines(Sequence[str]):
     def __getitem__(self, index: slice) -> LateLines: ...
 
     def __getitem__(self, index: int | slice) -> str | LateLines:
-        """Return a line, or a slice of the lines with a step of 1, not made yet."""
+        """Return a line; or a slice of the lines (with a step of 1), which are not made yet."""
         if isinstance(index, slice):
             return LateLines(self._rows[index], self._make)
         row = self._rows[index]
@@ -188,9 +192,9 @@ class LateLines(Sequence[str]):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class PlannedRows(Rows[PlannedSegment]):
-    """The segments of a plan in columns; units as in a planned segment."""
+    """The segments of a plan in columns, with the units of :class:`PlannedSegment`."""
 
-    #: (n,) each
+    #: (n,), like the next three columns
     waypoints: Int32s
     lengths: Floats
     angles: Floats
@@ -204,7 +208,7 @@ class PlannedRows(Rows[PlannedSegment]):
     report_lines: Sequence[str]
     #: Texts about outputs and stops that are appended to lines of the report, by row.
     notes: Mapping[int, str] = field(default_factory=dict)
-    #: The records of outputs that follow the primitive of a row on the wire, by row.
+    #: The instructions for outputs that are sent after the primitive of a row, by row.
     outputs: Mapping[int, tuple[OutputRecord, ...]] = field(default_factory=dict)
 
     @classmethod
@@ -229,7 +233,7 @@ class PlannedRows(Rows[PlannedSegment]):
 
     @property
     def are_spline(self) -> bool:
-        """Whether the arm moves along splines, not by the controller's own motions."""
+        """Whether the motions are pieces of a spline, not the controller's own motions."""
         moves = (each for each in self.primitives if not isinstance(each, Stop))
         return isinstance(next(moves, None), Spline)
 
@@ -256,7 +260,7 @@ class PlannedRows(Rows[PlannedSegment]):
 
     @property
     def records(self) -> Indices:
-        """The number of records of each row on the wire (n,): its primitive and its outputs."""
+        """(n,) number of instructions that are sent for each row: its primitive and outputs."""
         counts = np.ones(len(self), dtype=np.intp)
         for row, outputs in self.outputs.items():
             counts[row] += len(outputs)
@@ -314,7 +318,8 @@ class Plan:
     T_flange_active: Pose = IDENTITY
     #: The temporary TCP, which the robot has only during the motion; None = the active TCP stays.
     T_flange_tcp: Pose | None = None
-    #: The controlled frame in the TCP of the motion: IDENTITY unless the TCP must not change.
+    #: Pose of the controlled frame in the TCP that the robot has during the motion: IDENTITY,
+    #: unless the TCP must not change.
     T_tcp_controlled: Pose = IDENTITY
     #: The version of the older robot program that the plan is for; '' = the driver's own program.
     older_program: str = ''
@@ -324,8 +329,8 @@ class Plan:
     offset_band: OffsetBand | None = None
     #: The tolerances of a joint goal; None if the goal is Cartesian.
     joint_tolerances: JointTolerances | None = None
-    #: The requested goal, if the plan begins with a travel; it is planned again if the arm has
-    #: been moved before the motion starts.
+    #: The requested goal, if the plan begins with a travel (a motion through the air to the first
+    #: point); it is planned again if the arm has been moved before the motion starts.
     travelled_goal: Goal | None = None
     #: Lines of the report about ignored, slowed or changed requests, or about the whole goal.
     remarks: tuple[str, ...] = field(default=())
@@ -356,7 +361,7 @@ class Plan:
         """
         Return the report, with all remarks; if it is long, the first and last segments only.
 
-        :param limit: number of segments and slow stretches that have lines.
+        :param limit: greatest number of segments and slow stretches that have lines.
         """
         count, stretches = len(self.segments), self.find_slow_stretches()
         if count + len(stretches) <= limit:
@@ -402,7 +407,7 @@ class Plan:
 
     @property
     def instructions(self) -> Iterator[Instruction]:
-        """The primitives and outputs, in the order of the wire."""
+        """The primitives and the instructions for outputs, in the order in which they are sent."""
         rows = self.rows
         for i, primitive in enumerate(rows.primitives):
             yield primitive

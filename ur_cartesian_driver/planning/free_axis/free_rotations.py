@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Choose the rotations of a goal with a free axis.
+Choose the rotations of a goal with a free axis, an axis about which the driver may turn the tool.
 
 The result is a goal with the chosen orientations and without a free axis, which is planned and
-checked like any other goal. So the search here need not be exact: it uses the ideal arm and
-samples of the path, and ignores blends.
+checked like any other goal. So the search here need not be exact: it uses samples of the path and
+the ideal arm that fits the calibrated arm best, and ignores blends.
 """
 
 from __future__ import annotations
@@ -67,18 +67,18 @@ _SAMPLE_LENGTH = 0.02
 _SAMPLE_TILT = pi / 18.0
 #: Greatest number of samples of a segment (at density 1).
 _MAX_SAMPLES = 32
-#: If all rotations are allowed, rotations are chosen at points that are this far apart, by length
-#: [m] or tilt [rad], and interpolated between these points.
+#: If all rotations are allowed, they are chosen only at points (*knots*) that are this far apart,
+#: by length [m] or tilt [rad]; the rotations at the points between knots are interpolated.
 _KNOT_LENGTH = 0.01
 _KNOT_TILT = pi / 36.0
-#: Length [m] that adds as much to the size of a path as a tilt of one radian.
+#: The size of a stretch is its length in units of this [m], plus the tilt of the axis on it [rad].
 _LENGTH_PER_RADIAN = 0.05
 #: Greatest number of searches; each avoids the collisions found by the earlier ones.
 _MAX_SEARCHES = 8
 #: Costs of a small clearance: each key [m] adds its value to the cost of a rotation whose
 #: clearance is below the required clearance plus the key.
 _NEARNESS = {0.0: 1000.0, 0.003: 100.0, 0.01: 20.0}
-#: Number of smoothing passes.
+#: Number of passes that smooth the chosen rotations along the path.
 _SMOOTHING_PASSES = 40
 #: Greatest change of a rotation by all smoothing passes together [rad].
 _MAX_SMOOTHING = pi / 120.0
@@ -94,7 +94,7 @@ _AXES: dict[int, Vector3] = {
 
 
 def as_named(goal: GoalTable) -> GoalTable:
-    """Return a goal without a free axis, with the given or nearest allowed orientations."""
+    """Return a goal without a free axis; poses keep their orientations or the nearest allowed."""
     segments = goal.segments
     return _turned(goal, np.clip(0.0, segments.free_minima, segments.free_maxima))
 
@@ -153,7 +153,12 @@ def choose_rotations(
 
 
 def _search_without_collisions(lattice: RotationLattice, path: _FreePath) -> RotationPath:
-    """Return the best way through the lattice without collisions, or else the last way found."""
+    """
+    Return the best way through the lattice without collisions, or else the last way found.
+
+    The lattice holds the possible rotations along the path. Collisions found on a way add to the
+    cost of the rotations around it, so that the next search avoids them.
+    """
     least = path.options.min_clearance
 
     def too_close(q: Floats, more: float) -> Flags:
@@ -197,8 +202,9 @@ class _FreePath:
         segments = goal.segments
         free = segments.free_axes != FreeAxis.NONE
         first = int(np.argmax(free))
-        #: Whether the controlled frame is or becomes the TCP; any other frame would leave its
-        #: straight line if the tool turned.
+        #: Whether the tool may turn, because the controlled frame is the TCP or will be made the
+        #: TCP. The robot leads the TCP along straight lines, so any other frame would leave its
+        #: line if the tool turned.
         self.can_turn = options.allow_tcp_change or is_same_tcp(T_tcp_controlled, IDENTITY)
         self.tool_tips = tool_tips(goal, state.T_flange_tcp)
         self.q_start = state.actual_q
@@ -215,7 +221,7 @@ class _FreePath:
         seen = state if goal.moving_frame is None else goal.moving_frame.seen(state)
         self.start = seen.actual_tcp_pose @ T_tcp_controlled
         starts = np.concatenate([[self.start.row()], poses[:-1]])
-        # goal_arcs() also turns the poses at the ends of FIXED arcs, in place, as the arcs arrive.
+        # goal_arcs() also changes `poses`: the ends of FIXED arcs get the arcs' orientations.
         self.arc_rows, self.arcs, _ = goal_arcs(goal.segments, goal.T_base_frame, starts, poses)
         self.poses = poses
         self.references, self.rotations = self._references()
@@ -230,7 +236,7 @@ class _FreePath:
 
     def _references(self) -> tuple[Floats, Floats]:
         """
-        Return the reference orientations (n, 4), and the rotations (n,) [rad] from these to poses.
+        Return reference orientations (n, 4), and the rotations (n,) [rad] from them to the poses.
 
         Each reference is the previous one, turned the shortest way so that its free axis has the
         direction of the free axis of the pose.
@@ -249,7 +255,7 @@ class _FreePath:
     # -- the lattice -----------------------------------------------------------------------------
 
     def lattice(self) -> RotationLattice:
-        """Return the lattice of the path, with a layer for each of the ``knots``."""
+        """Return the lattice of rotations along the path; it has a layer for each knot."""
         before = np.concatenate([[self.start.row()], self.poses[:-1]])
         lengths = distance_rows(before, self.poses)
         lengths[self.arc_rows] = self.arcs.radius * self.arcs.sweep
@@ -298,7 +304,7 @@ class _FreePath:
 
     def _layers(self, ends: Indices, whole: Floats, tilts: Floats) -> list[Layer]:
         postures = self.goal.waypoints.postures
-        # Where a rotation has limits, the change that the poses of the goal make must be allowed.
+        # If a rotation has limits, the goal's own change of rotation must remain possible.
         commanded = np.abs(np.diff(self.rotations, prepend=0.0))
         bound = ~self.is_any | np.append(False, ~self.is_any[:-1])
         tilted = tilts * self.sizes  # the axis deviates by tilt x turn / 8
@@ -366,7 +372,7 @@ class _FreePath:
         return np.where(self.free, turns, 0.0)
 
     def _smoothed(self, layers: Sequence[Layer], rotations: Floats) -> Floats:
-        """Return rotations (layers,) smoothed over the discrete steps of the search."""
+        """Return the rotations (layers,), smoothed because the search takes discrete steps."""
         low, high = rotations - _MAX_SMOOTHING, rotations + _MAX_SMOOTHING
         for number, layer in enumerate(layers):
             if not layer.is_any:
@@ -388,7 +394,7 @@ class _FreePath:
     def with_postures(
         self, goal: GoalTable, layers: Sequence[Layer], found: RotationPath
     ) -> GoalTable:
-        """Return the goal with a posture for each joint move to a point of free rotation."""
+        """Return the goal with a posture for each joint move to a point with a free rotation."""
         names = tuple(self.options.tf_prefix + name for name in JOINT_NAMES)
         postures = dict(goal.waypoints.postures)
         for number, row in enumerate(self.knots.tolist()):
@@ -411,7 +417,7 @@ class _FreePath:
         return f'{text}; between points the axis leaves its way by up to {deviation:.1f} degrees'
 
     def _axis_deviation(self, goal: GoalTable) -> float:
-        """Return the greatest deviation [rad] of the axis from the shortest way between points."""
+        """Return the greatest deviation [rad] of the axis, halfway between points."""
         poses = transform_rows(goal.T_base_frame, goal.waypoints.poses)
         counts = self.free[1:] & ~self.is_joint[1:]
         if not counts.any():

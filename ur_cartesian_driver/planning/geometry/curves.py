@@ -3,10 +3,12 @@
 """
 The curves of the robot's motions: lines, arcs and joint lines.
 
-A curve maps ``u`` in [0, 1] to poses of the tool in the frame of the path, which is the robot's
-base or moves with a held part. ``u`` is proportional to the leading quantity of the motion (length
-of a line or an arc, travel of the joints). Each curve leads from waypoint to waypoint.
-:mod:`~.blended_path` holds the curves of a goal in columns, and adds the blends between them.
+A curve leads from waypoint to waypoint. It maps ``u`` in [0, 1] to poses of the tool in the *frame
+of the path*, which is the robot's base or the frame of a held part. ``u`` is the fraction of the
+way: by length on a line or an arc, by joint travel on a joint line. :mod:`~.blended_path` holds
+the curves of a goal in columns, and adds the blends between them.
+
+Poses are sent to the robot with positions rounded to micrometres; here this is *the rounding*.
 """
 
 from __future__ import annotations
@@ -33,29 +35,29 @@ from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
 from ur_cartesian_driver.motion.goal.goal_columns import rows_where, SegmentRows
 
 #: If a line turns the tool by half a turn, give or take this angle [rad], the direction of the
-#: turn depends on rounding on the wire and on the arm's actual pose.
+#: turn depends on the rounding and on the arm's actual pose.
 HALF_TURN = 1e-3
 
-#: Poses that differ by less than the resolution of the wire [m], [rad] are the same.
+#: Poses that differ by no more than this [m], [rad] are the same, because of the rounding.
 SAME_POSITION = 1e-6
 SAME_ANGLE = 1e-6
 #: Three points make a circle only if each distance between two of them, and the height of their
 #: triangle above its longest side, is at least this [m].
 MIN_ARC_HEIGHT = 1e-5
-#: Rounding to micrometres on the wire displaces three points relative to each other by this [m].
+#: Displacement of three points relative to each other by the rounding [m].
 _ROUNDING = 1.5e-6
-#: Largest turn that this rounding may add at the end of a FIXED arc [rad].
+#: A FIXED arc is refused if the rounding may turn the tool at its end by more than this [rad].
 MAX_ARC_TURN_ERROR = 0.005
 #: Arcs through points that are farther apart than this [m] are refused: no arm reaches that far.
 MAX_ARC_SIZE = 1000.0
-#: Largest distance of chords between samples from an arc [m].
+#: Largest distance between an arc and the chords that join its samples [m].
 ARC_CHORD_ERROR = 5e-6
 #: The same for joint lines and for blends that are no arcs [m].
 CURVE_CHORD_ERROR = 20e-6
 #: Largest turn between two samples [rad].
 MAX_TURN_PER_SAMPLE = pi / 18.0
-#: To find where the tool leaves a ball on a joint line, ever shorter intervals of the line are
-#: divided into these numbers of parts.
+#: :meth:`JointLineCurve.trim` divides ever shorter intervals of the line into these numbers of
+#: parts.
 _TRIM_DIVISIONS = (32,) * 6
 
 
@@ -63,14 +65,14 @@ class ArcRows(NamedTuple):
     """
     Circular arcs, one per row.
 
-    Positions turn about the axis through the center. The orientation changes from the start's to
-    the end's by the shortest rotation (UNCONSTRAINED) or turns along with the tangent (FIXED),
-    like the modes of URScript's ``movec``.
+    Positions turn about the axis through the center. Either the orientation changes from the start
+    to the end by the shortest rotation (UNCONSTRAINED), or it turns along with the tangent
+    (FIXED), as in the modes of URScript's ``movec``.
     """
 
     #: (n, 3) [m]
     center: Floats
-    #: (n, 3) vectors from the center to the start, and to the place a quarter turn later [m]
+    #: (n, 3) vectors from the center to the start, and to the position a quarter turn later [m]
     spoke: Floats
     across: Floats
     #: (n, 3) unit vectors
@@ -87,9 +89,9 @@ class ArcRows(NamedTuple):
     @classmethod
     def through(cls, start: Floats, via: Floats, end: Floats, is_fixed: Flags) -> ArcRows:
         """
-        Return the arcs through three positions each (n, 3 or more) [m].
+        Return the arcs through three positions each [m], the first three columns of the arrays.
 
-        Rows with faults (:func:`arc_faults`) contain any numbers.
+        Rows of positions that make no arc (:func:`arc_faults`) contain meaningless numbers.
         """
         ab, ac = via[:, :3] - start[:, :3], end[:, :3] - start[:, :3]
         normal = cross_rows(ab, ac)
@@ -107,7 +109,7 @@ class ArcRows(NamedTuple):
             return cls(center, spoke, across, axis, radius, sweep, to_via / sweep, is_fixed)
 
     def take(self, row: Any) -> ArcRows:
-        """Return the rows of an index."""
+        """Return the arcs that ``row`` (a numpy index) selects."""
         return ArcRows(*[column[row] for column in self])
 
     def turn(self, u: Floats) -> Floats:
@@ -117,9 +119,9 @@ class ArcRows(NamedTuple):
 
     def turn_ends(self, row: Indices, start: Floats, end: Floats) -> None:
         """
-        Set the orientations at the ends of FIXED arcs, and at the starts after them, in place.
+        Set, in place, the orientations at the ends of FIXED arcs and at the next curves' starts.
 
-        :param row: (n,) the rows of the arcs among the curves.
+        :param row: (n,) the rows of the arcs among the m curves of the goal.
         :param start: (m, 7) the poses at which the curves start; ``end``: at which they end.
         """
         turns = self.turn(np.ones(len(row)))
@@ -138,7 +140,8 @@ class ArcRows(NamedTuple):
         """
         Return the poses (n, 7) at ``u`` (n,) of arcs that begin at ``start`` (n, 7).
 
-        :param rows: (n, 7) the poses on the lines between the same ends; changed in place.
+        :param rows: (n, 7) the poses at ``u`` on straight lines between the ends of the arcs, from
+            which UNCONSTRAINED arcs take the orientations; changed in place and returned.
         """
         rows[:, :3] = self.places(u)
         fixed = np.flatnonzero(self.is_fixed)
@@ -148,7 +151,7 @@ class ArcRows(NamedTuple):
         return rows
 
     def trim(self, radius: Floats) -> Floats:
-        """Return the ``u`` (n,) at a distance (n,) [m] from the starts."""
+        """Return the ``u`` (n,) at which arcs are ``radius`` (n,) [m] away from their starts."""
         half = np.arcsin(np.minimum(1.0, 0.5 * radius / self.radius))
         return np.minimum(1.0, 2.0 * half / self.sweep)
 
@@ -173,7 +176,7 @@ class JointLineCurve:
     start: Pose
     end: Pose
     length: float
-    #: Number of chords that follow the path of the tool closely enough.
+    #: Number of chords that follow the path of the tool within CURVE_CHORD_ERROR.
     samples: int
     #: Ratio of the tool's peak speed to its mean speed.
     unevenness: float
@@ -202,7 +205,7 @@ class JointLineCurve:
 
     @property
     def joint_travel(self) -> float:
-        """Travel of the leading joint [rad]."""
+        """Largest turn of a joint [rad]."""
         return max(self.travel)
 
     def joints(self, u: float) -> Joints:
@@ -241,7 +244,7 @@ def tcp_rows(arm: Arm, T_flange_tcp: Pose, q: Floats) -> Floats:
 
 
 def is_same_pose(a: Pose, b: Pose) -> bool:
-    """Return whether two poses are the same within the resolution of the wire."""
+    """Return whether two poses differ by no more than SAME_POSITION and SAME_ANGLE."""
     return a.distance_to(b) <= SAME_POSITION and a.angle_to(b) <= SAME_ANGLE
 
 
@@ -251,7 +254,8 @@ def goal_arcs(
     """
     Return the rows of CIRCULAR segments that make arcs, their arcs, and the faults of the others.
 
-    :param T_base_frame: the frame of the vias, in the frame of the path.
+    :param T_base_frame: the pose, in the frame of the path, of the frame in which the vias are
+        given.
     :param start: (n, 7) the pose in the frame of the path at which each segment begins; ``end``:
         at which it ends. Both are changed in place: ends of FIXED arcs, and starts after them, get
         the orientations in which the arcs arrive.
@@ -274,9 +278,9 @@ def arc_faults(start: Floats, via: Floats, end: Floats, is_fixed: Flags) -> dict
     """
     Return, by row, a clause for each start, via and end (n, 3 or more) [m] that make no arc.
 
-    The rounding of three points on the wire tilts their circle by rounding / height of the
-    triangle. At the end of a FIXED arc this tilt turns the tool by 2 sin(sweep / 2) times as much.
-    With the law of sines, this error follows from the distances between start, via and end.
+    The rounding of the three points tilts their circle by the angle rounding / height of the
+    triangle. This turns the tool at the end of a FIXED arc by 2 sin(sweep / 2) times that angle,
+    which follows from the distances between start, via and end by the law of sines.
     """
     pairs = (('start', 'end'), ('start', 'via'), ('via', 'end'))
     with np.errstate(over='ignore', divide='ignore', invalid='ignore'):

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Kinematics of an arm with a tool, with refusals that explain why a pose is out of reach.
+Kinematics of an arm with a tool, with errors that explain why the arm cannot reach a pose.
 
 The robot receives poses. Its previous configuration decides in which of up to eight configurations
 it arrives. So configurations are predicted segment by segment: along a line or an arc by following
@@ -60,12 +60,12 @@ _ARM_LENGTH = 0.3
 
 class TcpKinematics:
     """
-    The kinematics of the tool of one arm, with refusals that name the point.
+    The kinematics of the tool of one arm, with errors that name the point.
 
     Planners use poses and rates of the tool in the frame of the path; this class converts them to
-    poses of the flange and rates of the joints, and back. Here the frame of the path is the base,
-    and the tool is the TCP. A subclass for a moving frame overrides all methods up to
-    :attr:`reach`.
+    poses of the flange and rates of the joints, and back. In this class the frame of the path is
+    the robot's base, and the tool is the TCP. A subclass for paths on a part that the arm holds
+    overrides all methods up to :attr:`reach`.
 
     :param arm: nominal or calibrated.
     :param T_flange_tcp: the active TCP.
@@ -81,11 +81,11 @@ class TcpKinematics:
         self._T_tcp_flange = T_flange_tcp.inverse()
 
     def flange(self, T_base_tcp: Pose) -> Pose:
-        """Return the flange pose for a pose of the tool."""
+        """Return the flange pose in base for a pose of the tool."""
         return T_base_tcp @ self._T_tcp_flange
 
     def flange_rows(self, poses: Floats) -> Floats:
-        """Return the flange poses (n, 7) for poses of the tool (n, 7)."""
+        """Return the flange poses in base (n, 7) for poses of the tool (n, 7)."""
         return compose_rows(poses, self._T_tcp_flange)
 
     def tcp(self, T_base_tcp: Pose) -> Pose:
@@ -98,7 +98,7 @@ class TcpKinematics:
 
     @property
     def of_tcp(self) -> TcpKinematics:
-        """The kinematics of the TCP in base, whose poses the robot receives."""
+        """The kinematics whose path is in base and whose tool is the TCP, as the robot's are."""
         return self
 
     def pose_rows(self, q: Floats) -> Floats:
@@ -125,7 +125,7 @@ class TcpKinematics:
 
     @property
     def reach(self) -> float:
-        """Upper bound of the distance of the tool from the frame of the path [m]."""
+        """Upper bound of the distance of the tool from the origin of the frame of the path [m]."""
         return self.arm.model.max_reach + hypot(*self.T_flange_tcp.position)
 
     def solution(self, T_base_tcp: Pose, q_near: Joints) -> Joints | None:
@@ -136,7 +136,7 @@ class TcpKinematics:
         """
         Return the solution nearest to ``q_near``.
 
-        :param where: the name of the pose in a refusal, such as ``trajectory.points[2].pose``.
+        :param where: the name of the pose in error messages (``trajectory.points[2].pose``).
         :raises Unreachable: there is no solution.
         :raises JointLimitExceeded: each solution is outside the range of a joint.
         """
@@ -168,11 +168,10 @@ class TcpKinematics:
 
     def no_solution_error(self, T_base_tcp: Pose, where: str, there: str = '') -> GoalRefused:
         """
-        Return the refusal of a pose without a solution: out of reach, or outside joint limits.
+        Return the error for a pose that has no solution in reach and within the joint limits.
 
-        :param where: the beginning of the refusal.
-        :param there: a phrase before the reason, if the reason is about another place than
-            ``where``.
+        :param where: the name of the pose, at the beginning of the error message.
+        :param there: a phrase before the reason, which names the pose if ``where`` does not.
         """
         T_base_flange = self.flange(T_base_tcp)
         reason = there + explain_unreachable(self.arm, T_base_flange)
@@ -194,7 +193,7 @@ class TcpKinematics:
         poses_beyond: Iterable[Pose] = (),
     ) -> GoalRefused:
         """
-        Return the refusal of a path that the arm cannot continue.
+        Return the error for a path that the arm cannot continue.
 
         It is a JointLimitExceeded if the arm could continue without the limit of a joint,
         otherwise a NearSingularity.
@@ -202,7 +201,7 @@ class TcpKinematics:
         :param T_base_tcp: the first pose that the arm does not reach.
         :param q: the last configuration before it [rad].
         :param q_next: the solution at the pose, to which the arm would have to jump [rad].
-        :param poses_beyond: the poses of the path from this one on, in small steps.
+        :param poses_beyond: the poses of the path from ``T_base_tcp`` on, in small steps.
         """
         goes_on = self._continue_branch(T_base_tcp, q)
         for k, (low, high) in enumerate(self.arm.model.position_limits):
@@ -251,9 +250,9 @@ class TcpKinematics:
         self, T_base_tcp: Pose, posture: Posture, q: Joints, where: str, tf_prefix: str
     ) -> tuple[Joints, str]:
         """
-        Return the solution that a posture selects, and a clause if ``q`` misses it, else ''.
+        Return the solution that a posture selects, and a clause on how ``q`` misses it.
 
-        Errors as for :meth:`nearest`.
+        The clause is '' if ``q`` is that solution. Errors as for :meth:`nearest`.
         """
         named = named_joints(posture, tf_prefix)
         chosen = self.solve_posture(T_base_tcp, named, q, where)
@@ -263,7 +262,7 @@ class TcpKinematics:
         self, T_base_tcp: Pose, posture: Posture, q: Joints, index: int, tf_prefix: str
     ) -> str:
         """
-        Return a clause if a path misses the posture of a point, else ''.
+        Return a clause on how a path misses the posture of a point; '' if it does not.
 
         Errors as for :meth:`nearest`.
 

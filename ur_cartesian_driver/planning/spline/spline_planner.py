@@ -3,11 +3,11 @@
 """
 Plan the joint spline pieces of SPLINE and SERVO goals.
 
-The steps: points with times, twists and accelerations -> the tool over time
-(:mod:`~ur_cartesian_driver.planning.geometry.tool_spline`) -> the arm along this motion
-(:mod:`~.spline_path`) -> limits -> joint polynomials (:mod:`~.joint_polynomials`). A motion can be
-planned in parts: :func:`plan_spline` starts from any :class:`SplineState`, even of a moving arm,
-and :func:`plan_stop` brings a moving arm to rest.
+A piece is a polynomial in time for each joint. The planner makes a spline of tool poses through
+the points (:mod:`~ur_cartesian_driver.planning.geometry.tool_spline`), solves the joints along it
+(:mod:`~.spline_path`), checks the limits, and fits the pieces to the joints
+(:mod:`~.joint_polynomials`). A motion can be planned in parts: :func:`plan_spline` starts from any
+:class:`SplineState`, even of a moving arm, and :func:`plan_stop` brings a moving arm to rest.
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ from ur_cartesian_driver.planning.spline.spline_limits import stretch_remark, wo
 from ur_cartesian_driver.planning.spline.spline_path import solve_spline_path, SplinePath
 from ur_cartesian_driver.planning.spline.spline_points import point_remarks, tool_points
 
-# Number of samples at which a stopping piece is checked.
+# Number of samples at which the piece that stops the arm is checked.
 _SAMPLES = 17
 # Shortest time of the piece that stops the arm [s]: two cycles of the slowest controller (8 ms).
 _SHORTEST_STOP = 0.017
-# Factor on the time of a stopping piece for the next try.
+# If the arm cannot stop in a time, the next try multiplies the time by this.
 _SHORTENING = 0.8
 # Tolerance for rounding: absolute for joint positions [rad], relative for speeds.
 _ROUNDING = 1e-9
@@ -61,7 +61,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SplineState:
-    """The joints at a time from which a spline can be continued."""
+    """The motion of the joints at one time, from which a spline can go on."""
 
     #: Time since the start of the motion [s].
     time: float = 0.0
@@ -69,7 +69,7 @@ class SplineState:
     q: Joints
     #: Joint velocities [rad/s].
     qd: Vector6 = ZERO6
-    #: Joint accelerations [rad/s^2]; 0 after a cubic piece, which does not determine them.
+    #: Joint accelerations [rad/s^2]; 0 after a cubic piece, as the next piece need not keep them.
     qdd: Vector6 = ZERO6
 
     @property
@@ -82,7 +82,7 @@ class SplineState:
         return MotionRows(np.array([self.q]), np.array([self.qd]), np.array([self.qdd]))
 
     def tool(self, kinematics: TcpKinematics) -> ToolPoints:
-        """Return the pose and the rates of the tool in the frame of the path, as one row."""
+        """Return pose and rates of the tool, as one row, in the frame that ``kinematics`` uses."""
         q, qd, qdd = self.rows()
         twist, acceleration = kinematics.tool_rates(q, qd, qdd)
         return ToolPoints(
@@ -98,7 +98,7 @@ class SplineState:
 class SplinePieces:
     """The pieces of one part of a motion, after all checks."""
 
-    #: One row for each piece; the last piece to a point carries the point's report line.
+    #: One row for each piece; the last piece before a point has the point's report line.
     segments: PlannedRows
     #: The path; row 0 is the start, and times are since the start of the motion.
     reference: ReferencePath
@@ -123,11 +123,11 @@ def plan_spline(
     """
     Return the pieces that lead from a state through the points of a goal.
 
-    :param goal: the goal, whose waypoints come after the state and have times since the start of
+    :param goal: the goal, without the waypoints up to ``start``; its times are since the start of
         the motion. With ``keep_open``, the arm may still be moving at the last point; the stop by
         :func:`plan_stop` is then checked as well.
     :param kinematics: the kinematics of the arm with the TCP of the motion.
-    :param first: the index of the first of these waypoints in the whole goal.
+    :param first: the index, in the whole goal, of the first waypoint in ``goal``.
     :param tool_tips: the tool tips to check for collisions; empty = only the TCP of
         ``kinematics``.
     :raises GoalRefused: the spline cannot be executed; the text names point, quantity, value and
@@ -223,7 +223,7 @@ def end_state(plan: Plan) -> SplineState:
 
 def plan_stop(state: SplineState, arm: Arm, options: PlanningOptions, point: int) -> Spline:
     """
-    Return the piece that brings a moving arm to rest, each joint in its direction of motion.
+    Return the piece that brings a moving arm to rest.
 
     The joint velocities are cubics of time that end at 0 with acceleration 0. From the speed v
     and the acceleration a, a stop in the time T decelerates by at most 1.5 v / T + a / 3. T is
@@ -232,7 +232,7 @@ def plan_stop(state: SplineState, arm: Arm, options: PlanningOptions, point: int
     or a joint that still accelerates would exceed its speed limit.
 
     :param state: the moving arm.
-    :param point: index of the point with this state, for refusals.
+    :param point: index of the point at which the arm has this state, for error messages.
     :raises JointLimitExceeded: a joint is too close to the end of its range.
     :raises TooFast: a joint that still accelerates is too close to its speed limit.
     """
@@ -259,7 +259,7 @@ def plan_stop(state: SplineState, arm: Arm, options: PlanningOptions, point: int
 def _stop_fault(
     q: Floats, qd: Floats, arm: Arm, options: PlanningOptions, point: int
 ) -> GoalRefused | None:
-    """Return the refusal of a stop with joints (m, 6) out of range or too fast, else None."""
+    """Return the error if the joints (m, 6) of a stop are out of range or too fast, else None."""
     model = arm.model
     low, high = np.array(model.position_limits).T
     outside = ((q < low - _ROUNDING) | (q > high + _ROUNDING)).any(axis=0)
@@ -288,7 +288,7 @@ def _stop_fault(
 
 @lru_cache(maxsize=8)
 def rows_along(piece: Spline, state: SplineState, samples: int) -> tuple[Floats, Floats, Floats]:
-    """Return q, qd and qdd (samples, 6) at evenly spaced times of a piece from ``state`` on."""
+    """Return q, qd and qdd (samples, 6) of a piece that begins at ``state``, evenly over time."""
     spline = JointSpline.of(state.q, [piece], velocities=state.qd, accelerations=state.qdd)
     return spline.rows(np.linspace(0.0, piece.duration, samples))
 
@@ -301,7 +301,9 @@ def _fit_to_limits(
     options: PlanningOptions,
 ) -> tuple[SplinePath, float, SpeedLimit | None]:
     """
-    Return the path, slowed if it exceeds a limit, the factor on its times, and this limit.
+    Return the path, the factor by which its times were multiplied, and the limit that required it.
+
+    If the path exceeds no limit, it is unchanged, the factor is 1, and the limit is None.
 
     :raises GoalRefused: a limit is exceeded, and the path must not be slowed, or would take too
         long.
@@ -365,7 +367,7 @@ def _clearance_remarks(
     options: PlanningOptions,
     part_changes: Sequence[PartChange],
 ) -> list[str]:
-    """Return the remarks on clearance; a path that ends moving is checked with its stop."""
+    """Return the remarks on clearance; if the arm moves at the end, its stop is checked, too."""
     samples = path.samples
     if end.is_moving:
         stop = plan_stop(end, arm, options, path.first + len(path.spline.positions) - 1)

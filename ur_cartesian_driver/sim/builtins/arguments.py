@@ -1,9 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Checks and converts the arguments that programs pass to functions.
+Checks and converts the arguments that URScript programs pass to built-in functions.
 
-A check returns the converted value, or raises the error that ends the program.
+A check returns the converted value, or raises the error that ends the program; ``name`` is the
+name of the argument in its text.
 """
 
 from __future__ import annotations

@@ -3,15 +3,18 @@
 """
 The planned motions over time, for outputs that are switched during these motions.
 
-The robot program reads the record of an output when the motion before the record returns (at that
-motion's stop, or where its blend begins), and switches the output when the tool reaches the
-trigger pose. So the time of a command (the time of its point plus its offset) becomes a trigger
-pose on the planned path, and the record is sent after the last motion that has returned by then. A
-robot that runs slower than planned switches at the same poses.
+An output is switched by a *record*, an instruction that is sent to the robot program between two
+motions. The program reads the record when the motion before it *returns* (at that motion's stop,
+or where its blend begins), and switches the output when the tool reaches the record's trigger
+pose. So the time of a command (the time of its point plus its offset) becomes a trigger pose on
+the planned path, and the record is sent after the last motion that has returned by then. A robot
+that runs slower than planned switches at the same poses. All times here are *at full speed*: as
+planned, with the robot's speed slider at 100 %.
 
 On lines the tool moves at constant acceleration between two samples of the path, because the
-planner places a sample wherever the acceleration changes. So the speeds at the samples follow from
-their times and distances, and with them the place at each time; on splines see ``path_clock``.
+planner places a sample wherever the acceleration changes. So the times of the samples and the
+distances between them give the speeds at the samples, and the position of the tool at each time.
+For splines, see ``path_clock``.
 """
 
 from __future__ import annotations
@@ -39,7 +42,8 @@ from ur_cartesian_driver.motion.plan.primitive import (
 )
 from ur_cartesian_driver.planning.request.point_events.path_clock import PathClock
 
-#: Returns poses of the TCP in base (n, 7) for poses of the tool in the frame of the path (n, 7).
+#: Returns the poses of the TCP in base (n, 7) for poses of the tool (n, 7) in base or, if the arm
+#: holds a part, in the frame of the part.
 ToTcp: TypeAlias = Callable[[Floats], Floats]
 
 #: Times that differ by at most this [s] are the same.
@@ -49,7 +53,7 @@ SAME_TIME = 1e-6
 _DIRECTION_TIME, _MAX_DIRECTION_TIME = 0.002, 0.6
 # A motion shorter than this [m], [rad] has no direction.
 _MIN_MOTION = 1e-7
-# A motion with less distance per turn than this [m/rad] has the direction of its turn.
+# A motion with less distance per turn than this [m/rad] has the direction of its turn, an axis.
 _TURNING = 0.01
 # The tool turns back if its displacement is less than this fraction of the distance travelled.
 _TURNS_BACK = 0.1
@@ -60,19 +64,20 @@ _BEYOND = 1e-4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DrivenStretch:
-    """A stretch of the path on which the robot program drives an output by a law."""
+    """A stretch of the path on which the robot program computes an output's value by a law."""
 
-    #: Time from which the law no longer drives the output, at full speed [s].
+    #: Time at which the stretch ends, at full speed [s].
     end: float
-    #: The law and the points between which it holds, as part of a sentence.
+    #: The law (for example, the value follows the speed) and the points between which it holds, as
+    #: part of a sentence.
     text: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlacedOutput:
-    """The records of one output, with their place in the plan."""
+    """The records of one output event of the goal, with their place in the plan."""
 
-    #: Name of the event in a refusal.
+    #: Name of the event in error messages.
     field: str
     #: Time at which the output is switched, at full speed [s].
     time: float
@@ -81,14 +86,15 @@ class PlacedOutput:
     #: The row of the segment whose report line names the output.
     report_index: int
     records: tuple[OutputRecord, ...]
+    #: Description of the output and its place, for the report.
     text: str
     #: The stretch that begins here, if one does.
     stretch: DrivenStretch | None = None
     #: Whether a stretch ends here.
     ends_stretch: bool = False
-    #: Time from the switching until the tool is at the place of the output, at full speed [s].
+    #: Time by which the output is switched before the tool is at its place, at full speed [s].
     lead: float = 0.0
-    #: The field that gives the lead, in a refusal.
+    #: Name in error messages of the field that gives the lead.
     lead_field: str = ''
 
 
@@ -126,14 +132,14 @@ class TimedPath:
 
         :param reference: the path of the tool along the segments; its times and ``start_time``
             have the same zero.
-        :param blend_halves: the time in the first half of the blend after each segment [s]; None =
+        :param blend_halves: duration of the first half of the blend after each segment [s]; None =
             no blends.
-        :param start_time: when the first segment begins [s].
-        :param point_times: when points are passed within a motion (n,) [s]; None = each point is
-            at the end of a motion.
+        :param start_time: time at which the first segment begins [s].
+        :param point_times: (n,) time at which each point is passed within a motion [s]; None =
+            each point is at the end of a motion.
         :param control_cycle: cycle of the controller [s], needed for pulses only.
-        :param to_tcp: returns poses of the TCP in base, which the robot program watches; None =
-            the tool is the TCP.
+        :param to_tcp: converts poses of the tool to poses of the TCP in base, which the robot
+            program compares with trigger poses; None = the tool is the TCP.
         """
         self.control_cycle = control_cycle
         self._to_tcp = to_tcp
@@ -179,8 +185,10 @@ class TimedPath:
         Return the passage of the tool through a place before or after a point.
 
         :param distance: distance along the path from the point to the place [m], negative before
-            the point; 0 = ``fraction`` gives it, in lengths of the segment before or after.
-        :param field: name of the event in a refusal.
+            the point; 0 = ``fraction`` gives it.
+        :param fraction: this distance as a fraction of the segment after the point or, if
+            negative, before the point.
+        :param field: name of the event in error messages.
         :raises InvalidGoal: the path does not lead there, or the robot program would read the
             record too late.
         """
@@ -258,7 +266,9 @@ class TimedPath:
 
     def triggered(self, record: SwitchOutput, time: float | None, after: int) -> SwitchOutput:
         """
-        Return a record that is triggered at the TCP pose of a time; None = without a trigger.
+        Return a record that is triggered where the TCP is at a time [s].
+
+        It has no trigger if the time is None, or if the TCP rests or turns back at that time.
 
         :param after: the row of the motion after which the record is read.
         """
@@ -278,9 +288,10 @@ class TimedPath:
         """
         Return the row after which a record with a lead is read, its trigger time [s], and its law.
 
-        The output is triggered where the lead is due at full speed; a slower tool switches later.
+        The tool passes the trigger pose one lead before the place at full speed. The law delays
+        the switching of a slower tool, so that the lead stays the same in real time.
 
-        :param time: when the tool is at the place of the record [s].
+        :param time: time at which the tool is at the place of the output [s].
         :param lead: time by which the output switches earlier, in real time [s].
         :raises InvalidGoal: the lead begins before the record can be read, or before a rest; the
             text gives the longest possible lead.
