@@ -147,7 +147,7 @@ class Path(PathWithEvents):
         """
         Set goal fields that have no method of their own, by their names in the action.
 
-        :raises InvalidGoal: a field cannot have the value, or does not hold for a whole path.
+        :raises InvalidGoal: a field cannot have the value, or is no setting of a whole path.
         """
         for name in fields:
             if name not in SETTINGS:
@@ -183,7 +183,8 @@ class Path(PathWithEvents):
         tool slows down where necessary. A motion can have its own deviation at its end:
         ``line(..., corner_deviation=mm(0.1))``.
 
-        :param deviation: [m]; 0 = corners are rounded only after motions with their own deviation.
+        :param deviation: largest distance from the lines and arcs [m]; 0 = corners are rounded
+            only after motions with their own deviation.
         :param angle: largest turn of the tool away from its programmed orientation [rad]; 0
             selects the default, 0.02.
         :raises InvalidGoal: a number is out of its range.
@@ -269,8 +270,8 @@ class Path(PathWithEvents):
         Let the arm travel to the path if the arm is far away, or the direct way is refused.
 
         The driver plans the travel together with the path (PRIMITIVES without durations). If the
-        path has a start, it becomes the first point; the arm moves there on a line if that is
-        free.
+        path has a start, the start becomes its first point; the arm moves there on a line if that
+        is free of collisions.
         """
         path = self._with_settings('allow_travel()', allow_travel=True)
         if self._start is None:
@@ -280,9 +281,10 @@ class Path(PathWithEvents):
 
     def safe(self, output: Output, value: float, *, restore: bool = False) -> Path:
         """
-        Set the value that an output takes when the motion does not go on as planned.
+        Set the value that an output takes if the motion fails, is cancelled or is paused.
 
-        :param restore: whether the output gets its previous value back after a pause.
+        :param restore: whether the output gets its previous value back after a pause; if not, the
+            goal ends when the paused program is resumed.
         :raises InvalidGoal: the output cannot have the value, or has a safe value already.
         """
         safe, known = output.safe(value, restore), self._settings.safe_outputs

@@ -426,8 +426,8 @@ class GoalClient:
         """
         Wait until the status of the driver is READY or EXECUTING.
 
-        :raises TimeoutError: the driver is neither within ``timeout`` [s]; the text names the
-            next step.
+        :raises TimeoutError: the driver does not become either within ``timeout`` [s]; the error
+            message names the next step.
         """
         latest: list[DriverStatus] = []
         subscription = self._node.create_subscription(
@@ -447,7 +447,7 @@ class GoalClient:
 
     def _find_driver(self, timeout: float) -> Endpoints:
         """
-        Wait for the driver, and return its endpoints, which a driver that is restarted changes.
+        Wait for the driver, and return its endpoints; a restarted driver has other endpoints.
 
         A killed driver stays visible for some seconds beside its successor, so this waits until
         only one driver is left.

@@ -4,8 +4,8 @@
 The simulated controller: programs, motion, power, safety and I/O, one cycle per step.
 
 :func:`~.controller_assembly.assemble` makes a controller. Its user calls :meth:`Controller.step`
-once per cycle, and any other method between two steps. A controller never waits and has neither
-clock nor network, so a controller also runs on a virtual clock.
+once per cycle, and any other method between two steps. A controller never waits and uses neither
+real time nor the network, so it also runs on a virtual clock.
 """
 
 from __future__ import annotations
@@ -398,7 +398,7 @@ class Controller:
         self.ownership.end_of_frame()
 
     def release(self, thread: Hashable) -> None:
-        """Take the motion that the arm makes for a thread from this thread, which has ended."""
+        """Release the motion that a thread commands, because the thread has ended."""
         self.ownership.release(thread)
 
     def start_refusal(self) -> str:

@@ -32,7 +32,7 @@ NESTED_LIST = 'Type error: a list holds lists only as the rows of a matrix'
 
 INT_MIN = -(2**31)
 INT_MAX = 2**31 - 1
-#: Longest string that a controller makes.
+#: Longest string that a controller makes [characters]; a longer one is an error.
 MAX_STRING = 1023
 #: Largest number of items of a list, matrix or struct. The manual names no limit; without one a
 #: program could take all the memory.

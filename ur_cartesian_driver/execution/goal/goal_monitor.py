@@ -141,7 +141,7 @@ class GoalMonitor:
             self._running_time, self._running = 0.0, self._motions_begun
         self._track(before, state, passed, behind)
         waits = self._has_begun and self._tracker.waits
-        # A wait of the program takes real time, but the reported speed scaling is 0 meanwhile.
+        # Planned waits take real time, although the reported speed scaling is 0 meanwhile.
         held = state.target_speed_fraction <= 0.0 or not playing
         self.rate = state.effective_speed or float(waits and not held)
         elapsed = passed * self.rate
@@ -208,7 +208,7 @@ class GoalMonitor:
         return self._tracker.place() if self._has_begun else None
 
     def buffered(self, sent: int) -> float:
-        """Return the planned time from the arm's place to the end of ``sent`` records [s]."""
+        """Return the planned time from the arm's place to the end of the ``sent`` records [s]."""
         return max(0.0, self.records.end_time(sent) - self._tracker.time())
 
     def records_begun(self) -> int:

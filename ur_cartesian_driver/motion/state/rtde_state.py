@@ -137,7 +137,8 @@ class RobotState:
     target_tcp_twist: Annotated[Vector6, Rtde('target_TCP_speed')] = ZERO6
     #: Force [N] and torque [Nm] at the TCP in base axes.
     actual_tcp_wrench: Annotated[Vector6, Rtde('actual_TCP_force', monitored=False)] = ZERO6
-    #: The slowdown in addition to the speed slider, 0 to 1 (:mod:`~.effective_speed`).
+    #: The slowdown in addition to the speed slider: 1 = none, 0 = at rest
+    #: (:mod:`~.effective_speed`).
     speed_scaling: Annotated[float, Rtde('speed_scaling')] = 1.0
     #: The speed slider, 0 to 1.
     target_speed_fraction: Annotated[float, Rtde('target_speed_fraction')] = 1.0
@@ -164,7 +165,7 @@ class RobotState:
     points_begun: Annotated[int, Rtde('output_int_register_26', optional=True)] = 0
     #: Version of our robot program.
     program_version: Annotated[int, Rtde('output_int_register_32', optional=True)] = 0
-    #: Number of our robot program, which identifies it.
+    #: Random number that identifies our robot program.
     program_number: Annotated[int, Rtde('output_int_register_33', optional=True)] = 0
     #: Count of the connections of our robot program; it changes with each connection.
     program_run: Annotated[int, Rtde('output_int_register_34', optional=True)] = 0
@@ -173,7 +174,8 @@ class RobotState:
     #: Version of the controller's own planning of movej and movel (motion version), as it was when
     #: our robot program connected; 0 = unknown.
     motion_version: Annotated[int, Rtde('output_int_register_36', optional=True)] = 0
-    #: Counts of the pulses that our robot program has given; see the module ``registers``.
+    #: Counts of the pulses that our robot program has given, packed into one number: see
+    #: ``PULSE_COUNTS`` in :mod:`~ur_cartesian_driver.protocol.program.registers`.
     pulse_counts: Annotated[int, Rtde('output_int_register_37', optional=True)] = 0
     #: Fraction of the planned speed at which our robot program runs splines (feed override), 0 to
     #: 1; total delay of splines by it since our robot program connected [s].

@@ -232,7 +232,7 @@ class _PartPlanner:
             max_approach_distance=0.0,
             max_points=min(self._options.max_points + REPLANNED_POINTS, MAX_POINTS),
         )
-        # The first replanned motion was sent before: planning starts from the blend after it.
+        # The first replanned motion has been sent, so planning starts from the blend after it.
         running = replannable[0].planned if len(replannable) == REPLANNED_POINTS else None
         try:
             plan = plan_goal(goal, self._at_rest(q_start), self._arm, options, running)
@@ -376,7 +376,7 @@ class _PartPlanner:
         return self.spline_part(plan, begin, found.end, records_before)
 
     def _spline_goal(self, start: SplineState) -> GoalTable:
-        """Return the checked goal of the appended points: motion times, poses of the TCP."""
+        """Return the checked goal of the appended points, with motion times and TCP poses."""
         before, appended = self._before, self._appended
         points = WaypointRows.of(appended.waypoints)
         # The points are checked as a goal of their own, with times since the point before them.

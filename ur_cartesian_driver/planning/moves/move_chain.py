@@ -27,7 +27,8 @@ import numpy as np
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.plan.plan import BlendEntry
 
-#: After a blend, a late move that has a time runs at most at this multiple of its mean speed.
+#: A move that has a time, but leaves the blend before it late, runs at most at this multiple of
+#: its mean speed.
 _MAX_CATCH_UP = 2.0
 #: Relative change below which a handover counts as unchanged.
 _SAME = 1e-10
@@ -178,7 +179,7 @@ class MoveTimes(_Columns):
 
     @property
     def begins(self) -> Floats:
-        """Time at which each move leaves the blend before it, or rest [s]."""
+        """Time at which each move leaves the blend before it, or begins from rest [s]."""
         before = self.blend_time + self.idle
         return np.cumsum(before + self.between) - self.between
 

@@ -111,7 +111,7 @@ class ProgramArm(Protocol):
         """Brake if a thread was killed in a motion that no other thread continues."""
 
     def release(self, thread: Hashable) -> None:
-        """Take the motion that the arm makes for a thread from this thread, which has ended."""
+        """Release the motion that a thread commands, because the thread has ended."""
 
     def start_refusal(self) -> str:
         """Return the reason why no program can run now; empty = a program can run."""
