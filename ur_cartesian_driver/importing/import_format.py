@@ -39,7 +39,7 @@ class Term:
     #: The row, in the documentation's table of this format, that lists the term.
     topic: str
     treatment: Treatment
-    #: Why the term is left out, or what to do instead: the text of the remark or the refusal.
+    #: Why the term is left out, or what to do instead: the text of the remark or the error.
     reason: str = ''
 
 

@@ -67,7 +67,7 @@ HEARTBEAT_PERIOD = 0.5
 
 
 class RobotLoop:
-    """Ties together the link to the robot, the running motion, and the pipe to the owner."""
+    """Connects the link to the robot, the running motion, and the pipe to the owner."""
 
     def __init__(
         self, configure: Configure, memory: StateMemory, notify: asyncio.StreamWriter
@@ -129,8 +129,8 @@ class RobotLoop:
                     await self._serve_requests(requests)
                 finally:
                     self._motion.close()
-                    # Only while the link is open can the TCP be restored. Our robot program would
-                    # restore it by itself, but another program may be running.
+                    # The TCP can be restored only while the link is open. Our robot program would
+                    # also restore it by itself, but another program may be running.
                     self._tcp_restorer.restore_if_due(self._newest.latest)
                 for task in (link, ticks, *self._tasks):
                     task.cancel()
@@ -164,7 +164,7 @@ class RobotLoop:
                 self._refuse(refusal_of(request, text), f'{type(request).__name__}: {text}')
 
     def _refuse(self, refusal: Notification | None, line: str) -> None:
-        """Log a line; send the owner a refusal, unless it is None (no answer is expected)."""
+        """Log a line; send the owner a refusal, unless it is None: then no answer is expected."""
         self._pipe.log(logging.ERROR, line)
         if refusal is not None:
             self._pipe.send(refusal)

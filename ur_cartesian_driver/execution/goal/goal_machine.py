@@ -386,7 +386,7 @@ class GoalMachine:
         return [] if signal is None else self._apply(signal, text, now)
 
     def _enter(self, state: GoalState, signal: GoalSignal, now: float) -> list[GoalCommand]:
-        """Set the deadline of a state, and return the commands in addition to the feeder's."""
+        """Set the deadline of a state; return the commands to add to the feeder's commands."""
         match state:
             case GoalState.MOVING:
                 self._deadline, self.outcome.has_moved = inf, True

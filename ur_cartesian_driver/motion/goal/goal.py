@@ -182,6 +182,7 @@ MAX_OUTPUT_DISTANCE = 10.0
 #: Of a pulse train: the longest way between two pulses [m], the longest pulse [s], most pulses.
 MAX_PULSE_DISTANCE, MAX_PULSE_WIDTH, MAX_PULSE_COUNT = 2.0, 1.0, 1_000_000
 
+# Annotations that several fields share.
 FINITE, NOT_NEGATIVE = Range(), Range(0.0)
 FRACTION, SMALL_LEAD = Range(0.0, 1.0), Range(0.0, 10.0)
 #: In a spline, NaN lets the driver choose the number.

@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector6, ZERO6
 from ur_cartesian_driver.motion.plan.move_rows import SplineRows
 from ur_cartesian_driver.motion.plan.primitive import Spline
 
-#: Times that differ by less than this [s] are the same; times on the wire are whole microseconds.
+#: Times that differ by less than this [s] are the same; the robot gets them in microseconds.
 SAME_TIME = 5e-7
 
 

@@ -40,7 +40,7 @@ from ur_cartesian_driver.planning.preflight.cell_clearance import CellClearance
 from ur_cartesian_driver.planning.preflight.cell_stretches import cell_stretches
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
-# Rows per block. Blocks bound the memory, and blocks after a refusal are not checked.
+# Rows per block. Blocks bound the memory; those after a refused violation are not checked.
 _BLOCK = 4096
 # A separating pair may come closer by this much [m], because of rounding.
 _RECEDING_TOLERANCE = 1e-4
@@ -157,7 +157,7 @@ class Clearance:
         return close
 
     def violation_at(self, q: Joints) -> Violation | None:
-        """Return a violation if :meth:`too_close` is true of this configuration [rad]."""
+        """Return a violation if :meth:`too_close` is true of a configuration [rad], else None."""
         row = np.array([q])
         for checker in self._checkers:
             _, distances = checker.measure(row, np.ones(len(checker.bounds), dtype=np.bool_))
@@ -268,8 +268,8 @@ def _bodies(arm: Arm, T_flange_tcp: Pose, tool_radius: float) -> CollisionBodies
     return CollisionBodies(arm, T_flange_tcp, tool_radius)
 
 
-# A goal may take and release a dozen parts. Each corner of its offset band is checked with all the
-# cells that result.
+# This cache is larger because a goal may take and release a dozen parts: the cells that result are
+# used again at each corner of the offset band (each combination of the largest path offsets).
 @lru_cache(maxsize=32)
 def _cell_clearance(
     arm: Arm, T_flange_active: Pose, cell: Cell, tool_radius: float, T_flange_tip: Pose

@@ -68,7 +68,8 @@ _TOOL_PART = 0.6
 #: Fraction of the jerk limit that the time law may use, because the pieces have a little more
 #: jerk than the law.
 _JERK_PART = 0.97
-#: The width of a corner is at most the distance that the tool travels in this time [s].
+#: The width of a corner, within which the path is rounded, is at most the distance that the tool
+#: travels in this time [s].
 _WIDTH_TIME = 0.25
 #: Widths up to this [m] are allowed even if the tool is slower.
 _SLOW_WIDTH = 0.001
@@ -79,7 +80,7 @@ _NO_TRAVEL, _NO_TURN = 1e-6, 1e-6
 #: Three are enough, because a quintic that agrees with the law at its ends is farthest from it
 #: near the quarters.
 _SAMPLES_INSIDE = 3
-#: Accelerations inside a piece are measured if they may exceed those of the tool spline by more
+#: Accelerations inside a piece are measured if they may exceed the tool spline's by more
 #: than the fraction _MORE_ACCELERATION of their limit, and inside all pieces if a joint anywhere
 #: exceeds the fraction _FAST of its speed or acceleration limit.
 _MORE_ACCELERATION, _FAST = 0.002, 0.5

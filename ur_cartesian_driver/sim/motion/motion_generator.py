@@ -209,8 +209,8 @@ class MotionGenerator:
         """
         Move the tool straight; ``t`` and ``r`` as in :meth:`movej`.
 
-        :param a: acceleration [m/s^2]; times ``turn_ratio`` [rad/m], the angular one of a turn.
-        :param v: speed [m/s]; times ``turn_ratio``, the angular speed of a turn.
+        :param a: acceleration [m/s^2]; for a turn, ``a * turn_ratio`` [rad/s^2].
+        :param v: speed [m/s]; for a turn, ``v * turn_ratio`` [rad/s].
         """
         parameters = ProfileParameters(acceleration=a, speed=v, time=t)
         ratio = self.laws.turn_ratio
@@ -345,7 +345,8 @@ class MotionGenerator:
         """
         Brake in joint space at ``a`` [rad/s^2], regardless of speed scaling and path.
 
-        A stop takes at least one cycle, because programs repeat it until the arm is steady.
+        A stop takes at least one cycle: programs repeat it until the arm is steady, and such a
+        loop has to take time.
         """
         return self._replace(self._active.joint_stop(a))
 
