@@ -101,7 +101,9 @@ def no_calls(_: SimulatedRobot) -> Mapping[str, Callable[..., Any]]:
 @contextmanager
 def simulator(calls: Calls = no_calls, **settings: Any) -> Iterator[Child]:
     """
-    Run a simulated robot; calls: ``ports``, ``state``, ``inject``, ``begin``, ...
+    Run a simulated robot in a child process; the calls are in :func:`_simulate`.
+
+    ``cycles`` returns the start times of the controller's cycles since ``begin``.
 
     :param calls: a function at the top level of a module; it returns additional calls.
     :param settings: fields of the robot's SimulatorConfig.
@@ -147,7 +149,7 @@ def note_cycles(robot: SimulatedRobot) -> list[float]:
 
 @contextmanager
 def empty_loop() -> Iterator[Child]:
-    """Run a loop that does nothing 500 times a second; calls: ``begin``, ``cycles``."""
+    """Run an empty loop at 500 Hz; calls ``begin`` and ``cycles`` as in :func:`simulator`."""
     with child(_loop) as loop:
         yield loop
 

@@ -4,8 +4,8 @@
 Endless short goals with random cancels, stops of the robot and cut connections.
 
 Every goal has to end with a result, and node and robot process must not grow once they are warm.
-The server keeps a goal for 60 s after its end, for late clients, so warm means later than that.
-The same seed gives the same goals.
+They are warm after more than 60 s, because the server keeps a goal for 60 s after its end, for
+late clients. The same seed gives the same goals.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ class Arc(NamedTuple):
     end: Sequence[float]
     #: The angle at the start, measured from the first axis of the plane towards the second.
     begin: float
-    #: The angle of all turns, in the same direction positive.
+    #: The angle of all turns, positive in the same direction.
     sweep: float
     #: The distances of start and end from the centre.
     radii: tuple[float, float]

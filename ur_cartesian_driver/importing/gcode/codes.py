@@ -327,7 +327,7 @@ def code_named(name: str) -> Code | None:
     if row is None and '.' in name:
         family = CODES.get(name.partition('.')[0])
         return family if family and family.topic == 'printers' else None
-    # A name must have three letters, because X_5 is a broken word.
+    # A name must have at least three letters, because X_5 is a broken word.
     is_name = '_' in name and sum(map(str.isalpha, name)) > 2
     if row is None and is_name:
         start = next(filter(name.startswith, _HARMLESS), 'other names with _')

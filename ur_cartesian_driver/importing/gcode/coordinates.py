@@ -134,7 +134,7 @@ class Coordinates:
 
     def shift(self, line: int, offsets: Mapping[int, float]) -> None:
         """
-        Shift the origin of the coordinates [m] from that of the work offset (G52).
+        Shift the origin of the coordinates by offsets [m] from the work offset (G52).
 
         :raises BrokenFile: G92 is in use.
         """

@@ -121,7 +121,7 @@ def _entry(law: Law, estimate: Estimate) -> dict[str, Any]:
 
 
 def _dumped(content: dict[str, Any]) -> str:
-    """Return fields as YAML, with innermost lists and mappings in brackets instead of lines."""
+    """Return fields as YAML, with nested lists and mappings in brackets on one line."""
     import yaml
 
     is_nested = any(isinstance(value, list | dict) for value in content.values())

@@ -23,7 +23,7 @@ class PathStart(NamedTuple):
     pose: Pose
 
 
-#: Moves after which a blend runs at ``MotionLaws.blend_speed_ratio``; after a movep it does not.
+#: Moves whose blends follow ``blend_begin`` and ``blend_speed_ratio`` of the laws; not movep.
 BLENDS_BY_LAWS = ('movej', 'movel', 'movec')
 
 ParameterFunction: TypeAlias = Callable[[MovePath, PathStart], ProfileParameters]

@@ -210,7 +210,7 @@ class CircularMovePath:
         return rows
 
     def _angle_of(self, point: Vector3) -> float:
-        # The angle grows from start through via to end, because the normal is cross(via, end).
+        # The angle grows from start through via to end, as the normal is along cross(a, b).
         r = subtract(point, self.centre)
         return atan2(dot(r, self._y), dot(r, self._x)) % (2.0 * pi)
 

@@ -38,9 +38,9 @@ from ur_cartesian_driver.sim.motion.paths.move_paths import (
 _ROUNDING = 1e-9
 # Speeds and lengths up to this are treated as zero, in the units of any path.
 _MIN_SPEED = 1e-9
-# If a timed move has lost time in a blend, it runs faster afterwards to keep its time. Its average
-# speed after the blend is at most this many times the average speed with which it would keep its
-# time from the entry of the blend to the end.
+# A timed move that has lost time in a blend runs faster afterwards. Its average speed after the
+# blend is at most this many times the average speed that its time requires from the entry of the
+# blend to the end.
 _MAX_CATCH_UP = 2.0
 
 
