@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A bead that begins and ends between points, with leads for a slow valve; pictures on the way."""
+"""A bead that begins and ends between points, with leads for a valve; a picture every 5 mm."""
 
 from ur_cartesian_driver.path import digital, mm, Path, Pose
 
