@@ -173,10 +173,10 @@ class MotionHandle:
         """
         Slow the motion from now on; ignored by a motion that has ended.
 
-        The motion then runs at ``fraction``, multiplied by the robot's speed slider. The goal's
-        ``feed_override`` sets the bounds of the fraction, and the rate at which it changes. Call
-        the method again before ``feed_override.timeout`` has passed: a stale or invalid fraction
-        brings the motion to ``feed_override.minimum``.
+        The motion then runs at the planned speed times ``fraction`` times the robot's speed
+        slider. The goal's ``feed_override`` sets the bounds of the fraction, and the rate at which
+        it changes. Call the method again before ``feed_override.timeout`` has passed: a stale or
+        invalid fraction brings the motion to ``feed_override.minimum``.
 
         :param fraction: fraction of the planned speed, 0 to 1; all other numbers, and NaN, are
             invalid.
@@ -209,7 +209,7 @@ class MotionHandle:
 
     def add_done_callback(self, callback: Callable[[Outcome], None]) -> None:
         """
-        Call ``callback`` with the outcome, as soon as it arrives or at once if it has arrived.
+        Call ``callback`` with the outcome; at once if the outcome has arrived already.
 
         A later call comes from the thread that delivers the outcome, usually the driver's.
         """

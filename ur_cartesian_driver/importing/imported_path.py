@@ -36,8 +36,8 @@ _OPTIONAL = {
     'times': 1,
     'dwells': 1,
 }
-#: Largest distance [m] of a point from the origin; no arm reaches farther. A larger distance
-#: means, for example, that millimetres were read as metres.
+#: Largest accepted distance [m] of a point from the origin; no arm reaches so far. A larger
+#: distance means, for example, that millimetres were read as metres.
 MAX_DISTANCE = 20.0
 JOINTS_HAVE_NO_FRAME = 'joint positions have no frame; give no frame, tool, origin or scale'
 UNKNOWN3: Vector3 = (nan, nan, nan)
@@ -127,7 +127,7 @@ class ImportedPath:
     """
     Points in columns, n rows [m, m/s, s]; NaN = the file has no value.
 
-    The motion of a row ends at its point.
+    The motion described by a row ends at the point in this row.
     """
 
     positions: Floats

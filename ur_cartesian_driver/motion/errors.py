@@ -93,7 +93,11 @@ class DriverError(Exception):
 
 
 class GoalRefused(DriverError):
-    """A goal was refused before it moved the arm, or its rest was, because the cell changed."""
+    """
+    A goal was refused before anything moved.
+
+    If the cell (the bodies around the arm) changes during a goal, its rest can be refused, too.
+    """
 
     def reworded(self, sentence: str) -> GoalRefused:
         """Return the same refusal with another sentence."""

@@ -165,7 +165,7 @@ def seen_from(
     quintic: bool,
 ) -> PathPoint:
     """
-    Return a point given for the tool as a point for another frame on the tool.
+    Convert a point given for the tool to the point for another frame on the tool.
 
     :param T_tool_new: the pose of the other frame in the frame of the tool.
     :param before: the pose of the preceding point or start; None = not known.

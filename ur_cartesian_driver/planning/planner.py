@@ -227,9 +227,9 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     if planner.kinematics.frame_moves:
         check_part_keeps_orientation(goal, planner.targets, state.actual_tcp_pose, first)
     if options.laws.blend_begin < 1.0 and goal.segments.blend_radii.any():
-        # The digital twin's law gives the blends that were measured on this robot. A goal must not
-        # pass only thanks to that law, so the path with the assumed blends is checked first, but
-        # not its duration.
+        # The law of the digital twin describes the blends as measured on this robot. A goal must
+        # not pass only thanks to this law, so the path with the assumed blends is checked first,
+        # but not its duration.
         _checked_path(planner, first, replace(options, twin=None, twin_file=''), [], {})
     paths, geometries, lines = _checked_path(
         planner, first, options, planner.remarks, planner.reasons

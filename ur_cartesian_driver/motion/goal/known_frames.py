@@ -193,7 +193,7 @@ class Frames:
         self, frame_id: str, controlled_frame: str, snapshot: ArmSnapshot | None = None
     ) -> MovingFrame | None:
         """
-        Return the moving frame of a goal whose part the arm holds at a fixed tool, else None.
+        Return the goal's moving frame if the arm holds the part at a fixed tool, else None.
 
         The tool is fixed if the controlled frame is known to be fixed in the base and is none of
         the robot's own frames (``base`` or ``base_link``), where no tool can be.

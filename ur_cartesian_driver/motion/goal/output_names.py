@@ -60,7 +60,7 @@ def output_fault(kind: OutputKind, pin: int, value: float) -> tuple[str, str, st
 
 
 def pulse_outputs(trains: Sequence[PulseTrain]) -> tuple[tuple[OutputKind, int], ...]:
-    """Return the outputs of the pulse trains, each once; the robot program numbers them so."""
+    """Return the outputs of pulse trains, each once; the robot program numbers them likewise."""
     return tuple(dict.fromkeys((train.output, train.pin) for train in trains))
 
 

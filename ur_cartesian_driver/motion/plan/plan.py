@@ -3,9 +3,9 @@
 """
 A plan: primitives, the reference path of the tool, and a report of the planner's choices.
 
-A primitive is one motion or rest of the robot. Times *at full speed* are expected if the robot's
-speed slider is at 100 %. The package ``planning`` makes a plan after all checks have passed. Plans
-are immutable.
+A primitive is one motion or rest of the robot. A time *at full speed* is the expected time if the
+robot's speed slider is at 100 %. The package ``planning`` makes a plan after all checks have
+passed. Plans are immutable.
 """
 
 from __future__ import annotations

@@ -94,7 +94,11 @@ _AXES: dict[int, Vector3] = {
 
 
 def as_named(goal: GoalTable) -> GoalTable:
-    """Return a goal without a free axis; poses keep their orientations or the nearest allowed."""
+    """
+    Return a goal without a free axis.
+
+    Each pose keeps its orientation or, if that is not allowed, gets the nearest allowed one.
+    """
     segments = goal.segments
     return _turned(goal, np.clip(0.0, segments.free_minima, segments.free_maxima))
 
@@ -417,7 +421,11 @@ class _FreePath:
         return f'{text}; between points the axis leaves its way by up to {deviation:.1f} degrees'
 
     def _axis_deviation(self, goal: GoalTable) -> float:
-        """Return the greatest deviation [rad] of the axis, halfway between points."""
+        """
+        Return the greatest deviation [rad] of the axis from the shortest way between points.
+
+        It is measured halfway between each two points.
+        """
         poses = transform_rows(goal.T_base_frame, goal.waypoints.poses)
         counts = self.free[1:] & ~self.is_joint[1:]
         if not counts.any():

@@ -8,7 +8,8 @@ of the path*, which is the robot's base or the frame of a held part. ``u`` is th
 way: by length on a line or an arc, by joint travel on a joint line. :mod:`~.blended_path` holds
 the curves of a goal in columns, and adds the blends between them.
 
-Poses are sent to the robot with positions rounded to micrometres; here this is *the rounding*.
+Positions are rounded to micrometres when they are sent to the robot; the comments below call this
+*the rounding*.
 """
 
 from __future__ import annotations
@@ -113,7 +114,7 @@ class ArcRows(NamedTuple):
         return ArcRows(*[column[row] for column in self])
 
     def turn(self, u: Floats) -> Floats:
-        """Return the rotations (n, 4) about the axes from the starts of the arcs to ``u`` (n,)."""
+        """Return the quaternions (n, 4) of the turns from the arcs' starts to ``u`` (n,)."""
         half = (0.5 * u * self.sweep)[:, None]
         return np.concatenate([np.sin(half) * self.axis, np.cos(half)], axis=1)
 
@@ -227,7 +228,7 @@ class JointLineCurve:
         return tcp_rows(self.arm, self.T_flange_tcp, self.joint_rows(u))
 
     def trim(self, radius: float, *, at_end: bool) -> float:
-        """Return the ``u`` nearest to the start (or end) that is at least ``radius`` [m] away."""
+        """Return the ``u`` nearest to the start (or end) with the tool ``radius`` [m] from it."""
         center = np.array([(self.end if at_end else self.start).row()])
         low, high = 0.0, 1.0
         for n in (max(16, self.samples), *_TRIM_DIVISIONS):

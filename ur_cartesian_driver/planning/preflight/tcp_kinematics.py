@@ -98,7 +98,7 @@ class TcpKinematics:
 
     @property
     def of_tcp(self) -> TcpKinematics:
-        """The kinematics whose path is in base and whose tool is the TCP, as the robot's are."""
+        """The kinematics for poses of the TCP in base, which are the poses the robot receives."""
         return self
 
     def pose_rows(self, q: Floats) -> Floats:

@@ -69,7 +69,7 @@ class SplineState:
     q: Joints
     #: Joint velocities [rad/s].
     qd: Vector6 = ZERO6
-    #: Joint accelerations [rad/s^2]; 0 after a cubic piece, as the next piece need not keep them.
+    #: Joint accelerations [rad/s^2]; 0 after a cubic piece, as cubics prescribe no accelerations.
     qdd: Vector6 = ZERO6
 
     @property
@@ -288,7 +288,7 @@ def _stop_fault(
 
 @lru_cache(maxsize=8)
 def rows_along(piece: Spline, state: SplineState, samples: int) -> tuple[Floats, Floats, Floats]:
-    """Return q, qd and qdd (samples, 6) of a piece that begins at ``state``, evenly over time."""
+    """Return q, qd and qdd (samples, 6) at equal time steps of a piece that starts at a state."""
     spline = JointSpline.of(state.q, [piece], velocities=state.qd, accelerations=state.qdd)
     return spline.rows(np.linspace(0.0, piece.duration, samples))
 

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Compiles the syntax trees of URScript programs to Python code, which runs faster than the trees.
+Compiles the syntax trees of URScript programs to Python code, once, so that cycles cost little.
 
 A thread may evaluate a limited number of syntax tree nodes in each cycle of the controller; its
 `fuel` is the number that is left. At the beginning of a block of statements, the Python code
@@ -118,7 +118,7 @@ class _FunctionCompiler(ExpressionCompiler):
         self._parts: list[CodeType] = []
         #: Number of loops around the current statement in the current part.
         self._loops = 0
-        #: The jumps out of the current part (see `_part`); None = the code is not in a part.
+        #: The kinds of jumps out of the current part (see `_part`); None = the code is in no part.
         self._exits: set[str] | None = None
         #: Global variables that the current part assigns.
         self._assigned: set[str] = set()

@@ -128,7 +128,7 @@ class TimedPath:
         to_tcp: ToTcp | None = None,
     ) -> None:
         """
-        Compute when each motion ends, and when it returns.
+        Compute when each motion ends, and when it returns, so that the program goes on.
 
         :param reference: the path of the tool along the segments; its times and ``start_time``
             have the same zero.
@@ -292,7 +292,7 @@ class TimedPath:
         the switching of a slower tool, so that the lead stays the same in real time.
 
         :param time: time at which the tool is at the place of the output [s].
-        :param lead: time by which the output switches earlier, in real time [s].
+        :param lead: real time by which the output switches before ``time`` [s].
         :raises InvalidGoal: the lead begins before the record can be read, or before a rest; the
             text gives the longest possible lead.
         """
