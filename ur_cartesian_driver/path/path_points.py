@@ -57,7 +57,7 @@ class PathPoint:
     #: Duration of the motion [ns]; 0 = the speed decides.
     duration: int = 0
     #: The events that happen or begin here; their waypoint indices count from this point. If an
-    #: event covers several points, a last waypoint of 0 means that its end is not known yet.
+    #: event covers several points, a last waypoint of 0 means that its end is not given yet.
     events: tuple[Any, ...] = ()
     #: Whether the blend comes from the :class:`Feed`, not from the motion; if so, the last point
     #: of a path gets no blend.
@@ -75,7 +75,7 @@ class PathPoint:
 
 @dataclass(frozen=True, slots=True)
 class MotionOptions:
-    """Settings of one motion, except its target."""
+    """Settings given for one motion, except its target; None = not given, see :class:`Feed`."""
 
     blend: float | None
     speed: float | None
