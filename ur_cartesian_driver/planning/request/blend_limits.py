@@ -19,7 +19,7 @@ from ur_cartesian_driver.planning.request.goal_fields import is_spline, is_timed
 BLEND_LAWS = ('blend_begin', 'blend_shape', 'blend_speed_ratio')
 # Clean recordings show a law more exactly than an arm follows it: its interval does not contain
 # what the law leaves out.
-_LEAST_UNCERTAINTY = 0.03
+_MIN_UNCERTAINTY = 0.03
 
 
 def check_blends(goal: GoalTable, options: PlanningOptions) -> None:
@@ -121,9 +121,9 @@ def blend_uncertainty(options: PlanningOptions) -> float:
 
     It is a fraction of the deviation that is assumed if the laws were not measured: half the
     height of the parabola. If they were, only the uncertainty of ``blend_begin`` remains, to which
-    this height is proportional, but not less than :data:`_LEAST_UNCERTAINTY`.
+    this height is proportional, but not less than :data:`_MIN_UNCERTAINTY`.
     """
     if not blends_are_measured(options) or (twin := options.used_twin) is None:
         return 1.0
     interval = 2.0 * twin.half_width('blend_begin') / options.laws.blend_begin
-    return min(max(interval, _LEAST_UNCERTAINTY), 1.0)
+    return min(max(interval, _MIN_UNCERTAINTY), 1.0)
