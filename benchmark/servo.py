@@ -160,7 +160,7 @@ def _servo(robot: Child, seconds: float) -> tuple[SetpointStream, JointSpline]:
         if not outcome.succeeded:
             raise RuntimeError(outcome.text)
         time.sleep(0.1)
-    return _measured_stream(robot, spline_of(plan), max(lags[3:-3])), spline_of(plan)
+    return _measured_stream(robot, spline_of(plan), float(np.median(lags[3:-3]))), spline_of(plan)
 
 
 def _goal(here: Pose, seconds: float) -> Goal:
